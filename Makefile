@@ -1,0 +1,44 @@
+# Steadyhand: makes `.venv` from requirements.lock, then only forwards to the command.
+# STUDY=path takes any study folder; ARGS="--jobs 2" hands options through.
+
+.DEFAULT_GOAL := help
+STUDY ?= studies/feng2016
+steadyhand := .venv/bin/steadyhand
+python := .venv/bin/python
+
+.PHONY: help report check simulate test lint bench lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+.venv/installed: requirements.lock pyproject.toml tools/make-venv tools/uv.lock
+	@sh tools/make-venv
+
+report: .venv/installed ## write the report of STUDY (default: the bundled study) into reports/
+	@$(steadyhand) report "$(STUDY)" $(ARGS)
+
+check: .venv/installed ## do the bundled studies' statistics still come out the same?
+	@$(steadyhand) check studies/feng2016 studies/reach $(ARGS)
+
+simulate: .venv/installed ## write the logs of a simulated STUDY anew
+	@$(steadyhand) simulate "$(STUDY)" $(ARGS)
+
+test: lint ## lint, then every test
+	@$(python) -m pytest -n auto $(ARGS)
+
+lint: .venv/installed ## ruff, mypy strict, import-linter
+	@$(python) -m ruff check .
+	@$(python) -m ruff format --check .
+	@$(python) -m mypy
+	@.venv/bin/lint-imports
+
+bench: .venv/installed ## how fast, as ratios in one run
+	@$(python) -m tests.benchmarks $(ARGS)
+
+lock: .venv/installed ## bring requirements.lock up to date with pyproject.toml
+	@sh tools/make-lock
+
+clean: ## remove the environment, the caches and the written reports
+	@rm -rf .venv .uv .steadyhand-cache .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	@find fusion_core pipeline tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	@find reports -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +

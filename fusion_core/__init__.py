@@ -1,0 +1,35 @@
+"""Steadyhand's estimators: given late, noisy positions and prompt accelerations, where is the hand now, and how sure?
+
+NumPy, SciPy and Numba only: no files, sockets, clocks or DataFrames. The README has the notation table.
+"""
+
+from fusion_core.estimator import Estimator, replay_loop
+from fusion_core.filters import Raw
+from fusion_core.kalman import FusionKalman, PositionKalman
+from fusion_core.samples import FloatArray, Sample, Samples, Track
+from fusion_core.sensors import OPERATORS, Sensor
+from fusion_core.window_gp import WindowGP
+
+ESTIMATORS: dict[str, type[Raw | PositionKalman | WindowGP | FusionKalman]] = {
+    "raw": Raw,
+    "position_kalman": PositionKalman,
+    "window_gp": WindowGP,
+    "fusion_kalman": FusionKalman,
+}
+"""Every estimator by the name study.yaml gives as `type`."""
+
+__all__ = [
+    "ESTIMATORS",
+    "OPERATORS",
+    "Estimator",
+    "FloatArray",
+    "FusionKalman",
+    "PositionKalman",
+    "Raw",
+    "Sample",
+    "Samples",
+    "Sensor",
+    "Track",
+    "WindowGP",
+    "replay_loop",
+]

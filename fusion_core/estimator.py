@@ -1,0 +1,78 @@
+"""What every estimator is, and the plain loop that any faster path is pinned to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from fusion_core.samples import FloatArray, Sample, Samples, Track
+from fusion_core.sensors import Sensor
+
+
+class Estimator(Protocol):
+    """A frozen value of parameters with a pure state. Causal: it knows only samples that were given to it."""
+
+    @property
+    def sensors(self) -> Mapping[str, Sensor]:
+        """The sensors it uses, by name."""
+
+    def start(self) -> Any:
+        """The state before any sample."""
+
+    def update(self, state: Any, sensor: str, sample: Sample) -> Any:
+        """The state after one more sample; `state` itself is left as it was."""
+
+    def predict(self, state: Any, time: float) -> tuple[FloatArray, FloatArray]:
+        """Mean and SD of the position at `time` (s), each (d,) in mm; NaN before the first position."""
+
+    def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
+        """What the estimator would have shown at `times`, each from the samples that had arrived by then."""
+
+
+def arrivals(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> Iterator[tuple[str, Sample]]:
+    """Every sample of the sensors in order of arrival; equal arrivals in the sensors' order."""
+    names = [name for name in sensors if name in samples]
+    arrival = np.concatenate([samples[name].arrival for name in names]) if names else np.empty(0)
+    which = np.repeat(np.arange(len(names)), [len(samples[name]) for name in names])
+    index = np.concatenate([np.arange(len(samples[name])) for name in names]) if names else np.empty(0, int)
+    for position in np.lexsort((index, which, arrival)):
+        name = names[which[position]]
+        yield name, samples[name][int(index[position])]
+
+
+def replay_loop(estimator: Estimator, samples: Mapping[str, Samples], times: FloatArray) -> Track:
+    """Replay by one `update` a sample and one `predict` a time: the reference for every batch path."""
+    dimension = next(iter(estimator.sensors.values())).dimension
+    mean = np.full((len(times), dimension), np.nan)
+    sd = np.full((len(times), dimension), np.nan)
+    state = estimator.start()
+    pending = arrivals(estimator.sensors, samples)
+    upcoming = next(pending, None)
+    for index in np.argsort(times, kind="stable"):
+        time = float(times[index])
+        while upcoming is not None and upcoming[1].arrival <= time:
+            state = estimator.update(state, *upcoming)
+            upcoming = next(pending, None)
+        mean[index], sd[index] = estimator.predict(state, time)
+    return Track(times, mean, sd)
+
+
+def unknown(dimension: int) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD before there is anything to say."""
+    return np.full(dimension, np.nan), np.full(dimension, np.nan)
+
+
+def require_positive(**values: float) -> None:
+    """ValueError that names the parameter unless every value is finite and above zero."""
+    for name, value in values.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be a number above 0, got {value}")
+
+
+def require_not_negative(**values: float) -> None:
+    """ValueError that names the parameter unless every value is finite and zero or more."""
+    for name, value in values.items():
+        if not (np.isfinite(value) and value >= 0):
+            raise ValueError(f"{name} must be a number, 0 or more, got {value}")

@@ -1,0 +1,62 @@
+"""A sensor's noise from a stretch in which the hand is still, as the paper set its two noise SDs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from fusion_core.accuracy import stretches
+from fusion_core.samples import FloatArray, Samples
+
+_SPAN_S = 0.5
+
+
+def still_by_acceleration(acceleration: Samples, shortest_s: float = 1.0) -> tuple[float, float] | None:
+    """The longest stretch (begin, end) in s in which the accelerations vary little; None if there is none.
+
+    Little: an SD over 0.5 s below twice the twentieth part's, so that the phone's own noise sets the scale.
+    """
+    if len(acceleration) < 3 or np.ptp(acceleration.time) < 2 * shortest_s:
+        return None
+    order = np.argsort(acceleration.time, kind="stable")
+    time, value = acceleration.time[order], acceleration.value[order]
+    span = max(3, round(_SPAN_S / float(np.median(np.diff(time)))))
+    if len(time) <= span:
+        return None
+    spread = _moving_sd(value, span)
+    middle = time[span // 2 : span // 2 + len(spread)]
+    return longest(stretches(middle, spread < 2 * np.percentile(spread, 5), shortest_s))
+
+
+def longest(found: Iterable[tuple[float, float]]) -> tuple[float, float] | None:
+    """The longest of some stretches; None if there is none."""
+    return max(found, key=lambda stretch: stretch[1] - stretch[0], default=None)
+
+
+def _moving_sd(value: FloatArray, span: int) -> FloatArray:
+    """SD over every `span` consecutive rows, axes summed."""
+    centred = value - value.mean(axis=0)
+    zero = np.zeros((1, value.shape[1]))
+    first = np.vstack([zero, np.cumsum(centred, axis=0)])
+    second = np.vstack([zero, np.cumsum(centred**2, axis=0)])
+    mean = (first[span:] - first[:-span]) / span
+    variance = (second[span:] - second[:-span]) / span - mean**2
+    sd: FloatArray = np.sqrt(np.maximum(variance.sum(axis=1), 0.0))
+    return sd
+
+
+def residuals(samples: Samples, begin: float, end: float) -> FloatArray:
+    """What is left of the readings in a stretch once a slow drift (a parabola an axis) is taken off, (n, d).
+
+    Scaled by √(n / (n − 3)), so that their root mean square estimates the SD. Empty with fewer than 10 readings.
+    """
+    inside = (samples.time >= begin) & (samples.time <= end)
+    value = samples.value[inside]
+    if len(value) < 10:
+        return np.empty((0, samples.value.shape[1]))
+    unit = (samples.time[inside] - begin) / (end - begin)
+    powers = np.stack([np.ones_like(unit), unit, unit**2], axis=1)
+    fitted = powers @ np.linalg.lstsq(powers, value, rcond=None)[0]
+    left: FloatArray = (value - fitted) * np.sqrt(len(value) / (len(value) - 3))
+    return left

@@ -1,0 +1,162 @@
+"""The content-addressed cache: an entry is a folder named by everything that may change what is in it."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+_ROOT = Path(__file__).resolve().parent.parent
+_OURS = ("pipeline", "fusion_core")
+_MODULE_TEXT = re.compile(rf"(?:{'|'.join(_OURS)})(?:\.\w+)+")
+_DISTRIBUTIONS = {"yaml": "PyYAML", "mcap_ros2": "mcap-ros2-support"}
+_MANIFEST = "entry.json"
+
+
+def digest_of(value: object) -> str:
+    """SHA-256 of a value as JSON with sorted keys."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, ensure_ascii=True).encode()).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@cache
+def code_digest(module: str) -> str:
+    """Digest of a module, of all our modules it reaches, their data files, and the libraries they import."""
+    sources: dict[str, str] = {}
+    libraries: set[str] = set()
+    pending = [module]
+    while pending:
+        path = _source(pending.pop())
+        name = "" if path is None else path.relative_to(_ROOT).as_posix()
+        if path is None or name in sources:
+            continue
+        sources[name] = file_digest(path)
+        if path.name == "__init__.py":
+            for beside in sorted(path.parent.iterdir()):
+                if beside.is_file() and beside.suffix not in (".py", ".pyc"):
+                    sources[beside.relative_to(_ROOT).as_posix()] = file_digest(beside)
+        for reached in _imports(path):
+            if reached.split(".")[0] in _OURS:
+                pending += [reached, *_parents(reached)]
+            else:
+                libraries.add(reached.split(".")[0])
+    return digest_of([sources, versions(libraries), sys.version_info[:2]])
+
+
+def _source(module: str) -> Path | None:
+    path = _ROOT.joinpath(*module.split("."))
+    if path.with_suffix(".py").is_file():
+        return path.with_suffix(".py")
+    return path / "__init__.py" if (path / "__init__.py").is_file() else None
+
+
+def _parents(module: str) -> list[str]:
+    parts = module.split(".")
+    return [".".join(parts[:size]) for size in range(1, len(parts))]
+
+
+def _imports(path: Path) -> Iterator[str]:
+    """The modules a source imports, wherever it does, and those it names as text to import when needed."""
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found = _MODULE_TEXT.match(node.value)
+            if found:
+                yield found.group()
+
+
+def versions(libraries: Iterable[str]) -> dict[str, str]:
+    """The installed version of each library that has one (those of Python itself have none)."""
+    found = {}
+    for library in sorted(set(libraries) - sys.stdlib_module_names):
+        try:
+            name = _DISTRIBUTIONS.get(library, library)
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A folder of results, what its stage said beside them, and a digest of both."""
+
+    folder: Path
+    said: Mapping[str, Any]
+    content: str
+
+
+class Cache:
+    """Entries under one folder, by stage and key. An entry appears whole or not at all."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def _folder(self, stage: str, key: str) -> Path:
+        return self.root / stage / key[:2] / key
+
+    def get(self, stage: str, key: str) -> Entry | None:
+        """The entry, or None if there is none or a file of it is missing or has another size."""
+        folder = self._folder(stage, key)
+        try:
+            manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+            for name, stated in manifest["files"].items():
+                if (folder / name).stat().st_size != stated["size"]:
+                    return None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return Entry(folder, manifest["said"], manifest["content"])
+
+    @contextmanager
+    def new(self, stage: str) -> Iterator[Path]:
+        """A folder to fill; it is removed unless `keep` takes it over."""
+        (self.root / "new").mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"{stage}-", dir=self.root / "new"))
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def keep(self, stage: str, key: str, folder: Path, said: Mapping[str, Any]) -> Entry:
+        """Take a filled folder into the cache under its key."""
+        files = {
+            path.relative_to(folder).as_posix(): {"size": path.stat().st_size, "sha256": file_digest(path)}
+            for path in sorted(folder.rglob("*"))
+            if path.is_file()
+        }
+        content = digest_of([files, dict(said)])
+        manifest = {"stage": stage, "key": key, "files": files, "said": dict(said), "content": content}
+        (folder / _MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
+        final = self._folder(stage, key)
+        final.parent.mkdir(parents=True, exist_ok=True)
+        if self.get(stage, key) is None:
+            shutil.rmtree(final, ignore_errors=True)
+            try:
+                folder.rename(final)
+            except OSError:
+                if self.get(stage, key) is None:  # not even another run's
+                    raise
+        found = self.get(stage, key)
+        if found is None:
+            raise OSError(f"{final}: the entry just written cannot be read back")
+        return found

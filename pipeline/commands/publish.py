@@ -1,0 +1,63 @@
+"""From the cache to the user's folder: a study's report, and where it came from."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.cache import versions
+from pipeline.provenance import LIBRARIES
+from pipeline.runner import Result
+
+_PROVENANCE = "provenance.json"
+
+
+def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
+    """Bring the report's files into `folder`; what an earlier report left there and this one lacks goes."""
+    entry = result.entry("report")
+    files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
+    files.pop("entry.json")
+    files["results.json"] = result.entry("compare") / "results.json"
+    for stale in set(_published(folder)) - set(files):
+        (folder / stale).unlink(missing_ok=True)
+    for name, source in files.items():
+        _copy(source, folder / name)
+    provenance: dict[str, Any] = {
+        "study": result.name,
+        "command": [Path(command[0]).name, *command[1:]],
+        "python": platform.python_version(),
+        "versions": versions(["steadyhand", *LIBRARIES]),
+        "settings": json.loads(result.study.model_dump_json(exclude_defaults=True)),
+        "inputs_sha256": result.inputs,
+        "files": sorted(files),
+    }
+    text = json.dumps(provenance, indent=1, ensure_ascii=False) + "\n"
+    (folder / _PROVENANCE).write_text(text, encoding="utf-8")
+
+
+def publish_results(result: Result, folder: Path) -> None:
+    """results.json alone."""
+    _copy(result.entry("compare") / "results.json", folder / "results.json")
+
+
+def _published(folder: Path) -> list[str]:
+    """The files an earlier report put there, inside the folder only."""
+    try:
+        listed = json.loads((folder / _PROVENANCE).read_text(encoding="utf-8"))["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    root = folder.resolve()
+    return [name for name in listed if isinstance(name, str) and (root / name).resolve().is_relative_to(root)]
+
+
+def _copy(source: Path, target: Path) -> None:
+    if target.is_file() and target.read_bytes() == source.read_bytes():
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source, target)
+
+

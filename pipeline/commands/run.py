@@ -1,0 +1,114 @@
+"""`report` and `compare`: bring studies up to date and write what was asked for."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+from pipeline import results
+from pipeline.cache import Cache
+from pipeline.commands import console
+from pipeline.commands.publish import publish, publish_results
+from pipeline.commands.summary import summary
+from pipeline.errors import PipelineError
+from pipeline.runner import InThisProcess, Result, bring_up_to_date
+from pipeline.stage import Stage
+from pipeline.stages import COMPARE, STAGES
+
+_CLONE = Path(__file__).resolve().parents[2]
+CACHE_FOLDER = ".steadyhand-cache"
+
+
+def reports_folder() -> Path:
+    """The clone's `reports`, or `./reports` where the program does not run from a clone."""
+    return _CLONE / "reports" if (_CLONE / "reports" / "README.md").is_file() else Path.cwd() / "reports"
+
+
+def cache_in(folder: Path | None) -> Cache:
+    """The cache in a folder, or beside the reports."""
+    return Cache(folder if folder is not None else reports_folder().parent / CACHE_FOLDER)
+
+
+@contextmanager
+def executor_of(jobs: int | None) -> Iterator[Executor]:
+    """This process for one job, a pool of processes for more; no process starts before there is work."""
+    count = jobs or os.cpu_count() or 1
+    if count == 1:
+        yield InThisProcess()
+        return
+    import multiprocessing
+
+    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield pool
+
+
+def results_of(studies: Sequence[Path], stages: Sequence[Stage], jobs: int | None, cache: Path | None) -> Iterator[Result]:
+    """Each study brought up to date, one after the other."""
+    with executor_of(jobs) as executor:
+        for folder in studies:
+            with console.progress() as progress:
+                result = bring_up_to_date(folder, stages, cache_in(cache), executor, progress)
+            yield result
+
+
+def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:
+    """A folder a study; `--out` itself for a single one."""
+    if out is not None and len(studies) == 1:
+        return [out]
+    names = [study.resolve().name for study in studies]
+    for name in names:
+        if names.count(name) > 1:
+            raise PipelineError(f'two studies are called "{name}", and their reports would be one; rename a folder')
+    return [(out or reports_folder()) / name for name in names]
+
+
+def report(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None) -> None:
+    """Write reports; exit with 1 where some session was set aside or read in part."""
+    _run(studies, STAGES, out, jobs, cache)
+
+
+def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None) -> None:
+    """Write results.json only."""
+    _run(studies, COMPARE, out, jobs, cache)
+
+
+def _run(studies: Sequence[Path], stages: Sequence[Stage], out: Path | None, jobs: int | None, cache: Path | None) -> None:
+    folders = _out_folders(studies, out)
+    code = 0
+    began = time.monotonic()
+    for result, folder in zip(results_of(studies, stages, jobs, cache), folders, strict=True):
+        for session, reason in result.set_aside:
+            console.warn(f"{result.name}: session {session.id} set aside: {reason}")
+        for session, reason in result.in_part:
+            console.warn(f"{result.name}: session {session.id} read in part: {reason}")
+        for line in summary(results.read(result.entry("compare") / "results.json")):
+            console.say(line)
+        if stages is STAGES:
+            publish(result, folder, sys.argv)
+            console.say(f"Report: {_short(folder / 'report.html')}  {_short(folder / 'report.pdf')}")
+        else:
+            publish_results(result, folder)
+            console.say(f"Results: {_short(folder / 'results.json')}")
+        console.say(_what_was_done(result, time.monotonic() - began))
+        code = max(code, result.exit_code)
+    sys.exit(code)
+
+
+def _short(path: Path) -> str:
+    """Relative to where the user is, when that is shorter."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
+
+
+def _what_was_done(result: Result, seconds: float) -> str:
+    done = [f"{stage} {count}" for stage, count in result.computed.items() if count]
+    if not done:
+        return f"Nothing had changed, so nothing was computed again ({seconds:.1f} s)."
+    return f"Computed: {', '.join(done)} ({seconds:.1f} s)."

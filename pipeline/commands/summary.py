@@ -1,0 +1,30 @@
+"""The few lines a terminal shows of a study's results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pipeline.wording import comparison_sentence, measure_label, number
+
+Row = Mapping[str, Any]
+
+
+def summary(results: Mapping[str, Any]) -> Iterator[str]:
+    """Title and origin, then every comparison, and each estimator's mean error."""
+    study = results["study"]
+    yield f"{study['title']} (data: {study['data_origin']})"
+    for row in results["comparisons"]:
+        yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
+    errors: dict[str, list[float]] = {}
+    for row in results["accuracy"]:
+        errors.setdefault(row["estimator"], []).append(row["rmse_mm"])
+    for estimator, values in errors.items():
+        mean = sum(values) / len(values)
+        yield f"  {estimator}: RMSE {number(mean)} mm (mean of {len(values)} sessions)"
+    differing = [row for row in results["printed"] if row["verdict"] in ("differs", "contradiction")]
+    agreeing = sum(row["verdict"] == "agrees" for row in results["printed"])
+    if results["printed"]:
+        yield f"  printed figures reproduced to the digit: {agreeing}; not, or in contradiction: {len(differing)}"
+    for row in differing:
+        yield f"    {row['what']}: printed {row['printed']}, computed {row['computed']} ({row['verdict']})"

@@ -1,0 +1,25 @@
+"""What Steadyhand says when it cannot go on, and the one helper for naming what was meant."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class PipelineError(Exception):
+    """A message for the user: the study, the file, the field, what was found and the remedy. No traceback."""
+
+    exit_code = 2
+
+
+class SessionError(PipelineError):
+    """One session cannot be used; the others go on. Its text is the reason in the exclusions."""
+
+
+def did_you_mean(found: str, known: Iterable[str]) -> str:
+    """`; did you mean "x"?` for the likeliest of the known words, else what there is to choose from."""
+    words = list(known)
+    close = difflib.get_close_matches(found, words, n=1, cutoff=0.5)
+    if close:
+        return f'; did you mean "{close[0]}"?'
+    return f"; known: {', '.join(words)}" if words else ""

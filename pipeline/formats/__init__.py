@@ -1,0 +1,22 @@
+"""Log formats: one module a format, each with `read(path, wanted) -> Log`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+
+from pipeline.errors import SessionError
+from pipeline.formats.log import Log, Wanted
+
+READERS = {".mcap": "pipeline.formats.mcap"}
+"""The module that reads a file, by its suffix."""
+
+
+def read_log(path: Path, wanted: Iterable[Wanted]) -> Log:
+    """A log by the reader of its suffix; SessionError where there is none, or the log cannot be used."""
+    module = READERS.get(path.suffix.lower())
+    if module is None:
+        raise SessionError(f"no reader for files ending in {path.suffix!r}; known: {', '.join(READERS)}")
+    log: Log = import_module(module).read(path, wanted)
+    return log

@@ -1,0 +1,53 @@
+"""What any log comes down to, whatever its format: readings per stream in SI, events, facts, and what was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+Content = Literal["position", "acceleration", "events", "anything"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A topic to decode, and what the study expects in it."""
+
+    topic: str
+    content: Content
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A topic's messages in the order of the file. `lost` is None where nobody can know.
+
+    `values` are SI, by content: position (n, 3) m; acceleration (n, 10): specific force in m/s², angular velocity
+    in rad/s, orientation xyzw (NaN where unknown); events and anything (n, 0). `events` holds the decoded objects.
+    """
+
+    stamp_ns: IntArray
+    arrival_ns: IntArray
+    values: FloatArray
+    events: tuple[Mapping[str, object], ...] = ()
+    lost: int | None = 0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def read(self) -> int:
+        """How many messages could be read."""
+        return len(self.arrival_ns)
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log's facts and topics; `faults` say what is wrong with the file as a whole (it was read in part)."""
+
+    facts: Mapping[str, str]
+    topics: Mapping[str, Readings]
+    faults: tuple[str, ...] = field(default=())

@@ -1,0 +1,16 @@
+"""What a report says of its own making."""
+
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "pandas",
+    "pyarrow",
+    "pydantic",
+    "mcap",
+    "mcap_ros2",
+    "matplotlib",
+    "jinja2",
+    "typst",
+)
+"""The libraries whose versions a report names, by import name."""

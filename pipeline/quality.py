@@ -1,0 +1,70 @@
+"""Quality facts of a stream: how often, how regularly, how late, what is missing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.formats.log import IntArray, Readings
+
+_SECONDS = 1e-9
+_STEP_BACK_MIN = 10  # messages: a clock that went back stays back; a late message comes alone
+
+
+def quality_row(session: str, stream: str, readings: Readings, notes: list[str]) -> dict[str, Any]:
+    """One row of the table `quality`. Stamps are judged in order of arrival."""
+    order = np.argsort(readings.arrival_ns, kind="stable")
+    stamp, arrival = readings.stamp_ns[order], readings.arrival_ns[order]
+    remarks = [*readings.notes, *notes]
+    row: dict[str, Any] = {
+        "session": session,
+        "stream": stream,
+        "messages_read": readings.read,
+        "messages_lost": readings.lost,
+        "duplicates": readings.read - len(np.unique(stamp)),
+        "out_of_order": _behind(stamp),
+    }
+    if readings.lost is None:
+        remarks.append("how many messages the log lost cannot be known")
+    if np.any(np.diff(readings.arrival_ns) < 0):
+        remarks.append("messages are not in order of arrival in the file; sorted")
+    steps = np.diff(np.unique(stamp)) * _SECONDS
+    if len(steps):
+        usual = float(np.median(steps))
+        missing = int(np.sum(np.round(steps[steps > 1.5 * usual] / usual) - 1))
+        intervals = np.diff(arrival) * _SECONDS
+        regular = intervals[intervals <= 1.5 * usual]
+        row["rate_hz"] = len(steps) / float(steps.sum())
+        row["gap_max_s"] = float(steps.max())
+        row["jitter_ms"] = float(np.std(regular) * 1e3) if len(regular) > 1 else None
+        row["latency_s"] = float(np.median(arrival - stamp) * _SECONDS)
+        if missing and stream != "events":
+            remarks.append(f"{missing} samples missing ({missing / (missing + len(steps) + 1):.1%})")
+    row["note"] = "; ".join(remarks) or None
+    return row
+
+
+def _behind(stamp: IntArray) -> int:
+    """How many stamps are earlier than one before them."""
+    return int(np.sum(stamp[1:] < np.maximum.accumulate(stamp)[:-1])) if len(stamp) > 1 else 0
+
+
+def clock_went_back(readings: Readings) -> float | None:
+    """By how many seconds a clock was set back in mid-stream, or None.
+
+    Late messages come singly; a clock that was set back runs through the same times a second time. Looked for in
+    the recorder's clock by the order of the file, and in the sender's by the order of arrival.
+    """
+    order = np.argsort(readings.arrival_ns, kind="stable")
+    for times in (readings.arrival_ns, readings.stamp_ns[order]):
+        descents = np.flatnonzero(np.diff(times) < 0) + 1
+        if len(descents) == 0 or len(times) < _STEP_BACK_MIN * (len(descents) + 1):
+            continue
+        for at in descents:
+            behind = times[at:] < times[:at].max()
+            run = len(behind) if behind.all() else int(np.argmin(behind))
+            again = times[:at] > times[at]
+            if run >= _STEP_BACK_MIN and int(again.sum()) >= _STEP_BACK_MIN:
+                return float((times[:at].max() - times[at]) * _SECONDS)
+    return None

@@ -1,0 +1,269 @@
+"""Brings a study's tables up to date: which entries there are, which must be computed, and where."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import asdict, dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol
+
+from pipeline.cache import Cache, Entry, code_digest, digest_of, file_digest
+from pipeline.errors import PipelineError, SessionError
+from pipeline.stage import Outcome, Stage, Work
+from pipeline.study import Session, Study, find_sessions, load_study
+
+
+class Progress(Protocol):
+    """Who is told how far things are."""
+
+    def begin(self, stage: str, total: int) -> None:
+        """A stage is about to compute so many pieces of work."""
+
+    def advance(self) -> None:
+        """One piece is done."""
+
+    def end(self) -> None:
+        """The stage is done."""
+
+
+class InThisProcess(Executor):
+    """An executor that computes when asked to."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute now."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - handed on by the future
+            future.set_exception(error)
+        return future
+
+
+@dataclass
+class Result:
+    """A study brought up to date: the entries of each stage and what happened to the sessions."""
+
+    name: str
+    study: Study
+    entries: dict[str, list[Entry]] = field(default_factory=dict)
+    computed: dict[str, int] = field(default_factory=dict)
+    set_aside: list[tuple[Session, str]] = field(default_factory=list)
+    in_part: list[tuple[Session, str]] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def exit_code(self) -> int:
+        """1 where some session was set aside or read in part."""
+        return 1 if self.set_aside or self.in_part else 0
+
+    def entry(self, stage: str) -> Path:
+        """The folder of a stage of scope "study"."""
+        (entry,) = self.entries[stage]
+        return entry.folder
+
+
+def bring_up_to_date(
+    folder: Path, stages: Sequence[Stage], cache: Cache, executor: Executor, progress: Progress
+) -> Result:
+    """Run the stages over a study; what the cache holds is not computed again.
+
+    Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
+    """
+    study = load_study(folder)
+    sessions = find_sessions(folder, study)
+    result = Result(folder.resolve().name, study)
+    result.inputs = _input_digests(folder, study, sessions)
+    entries: dict[str, dict[str, Entry]] = {}
+    for stage in stages:
+        if stage.scope == "session":
+            entries[stage.name] = _run_sessions(stage, folder, result, sessions, entries, cache, executor, progress)
+            sessions = _still_usable(result, sessions, entries[stage.name])
+            _require_something(folder, study, sessions, result)
+            result.entries[stage.name] = list(entries[stage.name].values())
+        else:
+            entry = _run_study(stage, folder, result, sessions, entries, cache, executor, progress)
+            entries[stage.name] = {"": entry}
+            result.entries[stage.name] = [entry]
+    return result
+
+
+def _input_digests(folder: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
+    """SHA-256 of every file of the study that is read, by its path in the study."""
+    root = folder.resolve()
+    paths = [root / "study.yaml", *(session.path for session in sessions)]
+    for field_name in ("participants", "trials", "questionnaires", "measures", "printed"):
+        name = getattr(study, field_name)
+        if name is not None:
+            paths.append(root / name)
+    return {path.relative_to(root).as_posix(): file_digest(path) for path in paths}
+
+
+def _declared(study: Study, stage: Stage) -> Study:
+    """The study as the stage may see it: settings it did not declare are at their defaults."""
+    kept = {name: getattr(study, name) for name in stage.settings}
+    return Study.model_construct(**kept)
+
+
+def _settings(study: Study, stage: Stage) -> Any:
+    # Order matters in mappings too: it is the order in which streams and estimators are shown.
+    return json.loads(study.model_dump_json(include=set(stage.settings))), list(study.streams), list(study.estimators)
+
+
+def _work(
+    stage: Stage, folder: Path, result: Result, sessions: Sequence[Session], entries: dict[str, dict[str, Entry]]
+) -> tuple[Work, str]:
+    """A piece of work without its folder, and the key of its result."""
+    read = {name: _entries_for(entries[name], sessions) for name in stage.reads}
+    inputs = {getattr(result.study, name): "" for name in stage.files if getattr(result.study, name)}
+    inputs = {name: result.inputs[Path(name).as_posix()] for name in inputs}
+    if stage.reads_log:
+        path = sessions[0].path.relative_to(folder.resolve()).as_posix()
+        inputs[path] = result.inputs[path]
+    if "study" in stage.files:
+        inputs = dict(result.inputs)
+    whole = stage.scope == "study"
+    work = Work(
+        result.name,
+        _declared(result.study, stage),
+        folder.resolve(),
+        Path(),
+        tuple(sessions),
+        {name: tuple(entry.folder for entry in found) for name, found in read.items()},
+        tuple(result.set_aside) if whole else (),
+        tuple(result.in_part) if whole else (),
+        inputs,
+    )
+    key = digest_of(
+        [
+            stage.name,
+            code_digest(stage.function.split(":")[0]),
+            _settings(result.study, stage),
+            result.name,
+            [[session.id, session.participant, session.condition] for session in sessions],
+            inputs,
+            {name: [entry.content for entry in found] for name, found in read.items()},
+            [[session.id, reason] for session, reason in (*work.set_aside, *work.in_part)],
+        ]
+    )
+    return work, key
+
+
+def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[Entry]:
+    return [found[""]] if "" in found else [found[session.id] for session in sessions if session.id in found]
+
+
+def _run_sessions(
+    stage: Stage,
+    folder: Path,
+    result: Result,
+    sessions: Sequence[Session],
+    entries: dict[str, dict[str, Entry]],
+    cache: Cache,
+    executor: Executor,
+    progress: Progress,
+) -> dict[str, Entry]:
+    """The stage's entry for each session, computed where the cache has none."""
+    found: dict[str, Entry] = {}
+    missing: list[tuple[Session, Work, str]] = []
+    for session in sessions:
+        work, key = _work(stage, folder, result, [session], entries)
+        entry = cache.get(stage.name, key)
+        if entry is None:
+            missing.append((session, work, key))
+        else:
+            found[session.id] = entry
+    result.computed[stage.name] = len(missing)
+    if missing:
+        progress.begin(stage.name, len(missing))
+        waiting = {
+            executor.submit(compute, stage, work, key, cache.root): session for session, work, key in missing
+        }
+        try:
+            for future in as_completed(waiting):
+                found[waiting[future].id] = future.result()
+                progress.advance()
+        finally:
+            for future in waiting:
+                future.cancel()
+        progress.end()
+    return {session.id: found[session.id] for session in sessions}
+
+
+def _run_study(
+    stage: Stage,
+    folder: Path,
+    result: Result,
+    sessions: Sequence[Session],
+    entries: dict[str, dict[str, Entry]],
+    cache: Cache,
+    executor: Executor,
+    progress: Progress,
+) -> Entry:
+    work, key = _work(stage, folder, result, sessions, entries)
+    entry = cache.get(stage.name, key)
+    result.computed[stage.name] = int(entry is None)
+    if entry is None:
+        progress.begin(stage.name, 1)
+        entry = compute(stage, work, key, cache.root)
+        progress.advance()
+        progress.end()
+    return entry
+
+
+def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
+    """Run a stage's function into the cache. Runs in whatever process the executor has.
+
+    A session that cannot be used is an outcome, not an error: the others go on. So is a fault of ours that one
+    session alone brings out; such an outcome is kept under a key of its own and tried again in the next run.
+    """
+    cache = Cache(cache_root)
+    module, name = stage.function.split(":")
+    with cache.new(stage.name) as out:
+        try:
+            outcome = getattr(import_module(module), name)(replace(work, out=out))
+        except SessionError as error:
+            outcome = Outcome(set_aside=str(error))
+        except PipelineError:
+            raise
+        except Exception as error:
+            if stage.scope != "session":
+                raise
+            fault = f"{type(error).__name__}: {error}"
+            outcome = Outcome(set_aside=f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}")
+            key = digest_of([key, fault])
+        return cache.keep(stage.name, key, out, asdict(outcome))
+
+
+def _still_usable(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:
+    """The sessions that go on, with participant and condition as the log says; the others are set aside."""
+    usable = []
+    for session in sessions:
+        outcome = Outcome(**entries[session.id].said)
+        known = replace(
+            session,
+            participant=outcome.participant or session.participant,
+            condition=outcome.condition or session.condition,
+        )
+        if outcome.set_aside is not None:
+            result.set_aside.append((known, outcome.set_aside))
+            continue
+        if outcome.in_part is not None:
+            result.in_part.append((known, outcome.in_part))
+        usable.append(known)
+    return usable
+
+
+def _require_something(folder: Path, study: Study, sessions: Sequence[Session], result: Result) -> None:
+    """A study without tables needs one usable session."""
+    if sessions or study.trials or study.questionnaires or study.measures:
+        return
+    if result.set_aside:
+        reasons = "\n".join(f"  {session.id}: {reason}" for session, reason in result.set_aside)
+        raise PipelineError(f"{folder}: no session can be used:\n{reasons}")
+    hint = ""
+    if study.simulation is not None:
+        hint = f"; its logs are made by: steadyhand simulate {folder}"
+    raise PipelineError(f'{folder}: no file matches sessions: "{study.sessions}"{hint}')

@@ -1,0 +1,68 @@
+"""What a stage is: the contract between the runner, which knows no stage, and the stages, which know no runner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from pipeline.study import Session, Study
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a stage reads and which settings may change its output; nothing else can reach it.
+
+    `function` is "module:function", imported only when there is something to compute. A stage of scope "session"
+    runs once a session, one of scope "study" once. `reads` names earlier stages, `settings` keys of study.yaml,
+    `files` keys of study.yaml that name a file.
+    """
+
+    name: str
+    scope: Literal["session", "study"]
+    function: str
+    reads: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    reads_log: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a stage says beside its tables. Not None: why the session cannot be used, or was read only in part."""
+
+    set_aside: str | None = None
+    in_part: str | None = None
+    participant: str | None = None
+    condition: str | None = None
+
+
+@dataclass(frozen=True)
+class Work:
+    """One piece of work. `study` holds the declared settings only, `entries` the folders of the stages read.
+
+    For a stage of scope "study" each stage read has a folder a session, in the order of `sessions`; a stage of
+    scope "study" has one.
+    """
+
+    study_name: str
+    study: Study
+    folder: Path
+    out: Path
+    sessions: tuple[Session, ...] = ()
+    entries: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    set_aside: tuple[tuple[Session, str], ...] = ()
+    in_part: tuple[tuple[Session, str], ...] = ()
+    inputs: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def session(self) -> Session:
+        """The one session of a stage of scope "session"."""
+        (session,) = self.sessions
+        return session
+
+    def entry(self, stage: str) -> Path:
+        """The one folder of an earlier stage."""
+        (folder,) = self.entries[stage]
+        return folder

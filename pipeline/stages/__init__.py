@@ -1,0 +1,74 @@
+"""The stages in order. Each names all that may change its output; nothing else reaches it."""
+
+from __future__ import annotations
+
+from pipeline.stage import Stage
+from pipeline.study import Study
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        "ingest",
+        "session",
+        "pipeline.stages.ingest:run",
+        settings=("streams", "events", "conditions"),
+        reads_log=True,
+    ),
+    Stage(
+        "fuse",
+        "session",
+        "pipeline.stages.fuse:run",
+        reads=("ingest",),
+        settings=("streams", "estimators", "axes"),
+    ),
+    Stage(
+        "assess",
+        "session",
+        "pipeline.stages.assess:run",
+        reads=("ingest", "fuse"),
+        settings=("streams", "estimators", "axes", "shown"),
+    ),
+    Stage(
+        "measure",
+        "study",
+        "pipeline.stages.measure:run",
+        reads=("ingest", "assess"),
+        settings=(
+            "conditions",
+            "display",
+            "exclusions",
+            "participants",
+            "trials",
+            "questionnaires",
+            "measures",
+        ),
+        files=("participants", "trials", "questionnaires", "measures"),
+    ),
+    Stage(
+        "compare",
+        "study",
+        "pipeline.stages.compare:run",
+        reads=("ingest", "assess", "measure"),
+        settings=(
+            "title",
+            "data_origin",
+            "conditions",
+            "comparisons",
+            "alpha",
+            "exclusions",
+            "participants",
+            "printed",
+        ),
+        files=("participants", "printed"),
+    ),
+    Stage(
+        "report",
+        "study",
+        "pipeline.stages.report:run",
+        reads=("ingest", "fuse", "assess", "measure", "compare"),
+        settings=tuple(Study.model_fields),
+        files=("study",),
+    ),
+)
+
+COMPARE = STAGES[:-1]
+"""What `steadyhand compare` runs: everything but figures and pages."""

@@ -1,0 +1,155 @@
+"""A log to tables, decoded once: the only place that turns SI into the house's millimetres."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline import tables
+from pipeline.errors import SessionError, did_you_mean
+from pipeline.formats import read_log
+from pipeline.formats.log import Log, Readings, Wanted
+from pipeline.quality import clock_went_back, quality_row
+from pipeline.stage import Outcome, Work
+from pipeline.study import Session, Stream, Study
+
+MM_PER_M = 1000.0
+_NEEDED = ("position", "acceleration")  # without these a session has nothing to fuse
+_CONTENT = {"acceleration": "acceleration", "position": "position", "reference": "position", "display": "position"}
+
+
+def run(work: Work) -> Outcome:
+    """One session's positions, imu, events and quality; SessionError with the reason if it cannot be used."""
+    study, session = work.study, work.session
+    wanted = [Wanted(stream.topic, _CONTENT[stream.kind]) for stream in study.streams.values()]  # type: ignore[arg-type]
+    if study.events is not None:
+        wanted.append(Wanted(study.events.topic, "events"))
+    log = read_log(session.path, wanted)
+    participant, condition = _who(session, log, study)
+    in_part = list(log.faults)
+    quality, positions, imu = [], [], []
+    for name, stream in study.streams.items():
+        readings = _stream(log, name, stream, in_part)
+        if readings is None:
+            continue
+        finite, notes = _finite(readings, stream)
+        quality.append(quality_row(session.id, name, readings, notes))
+        (imu if stream.kind == "acceleration" else positions).append(_table(session.id, name, stream, finite))
+    events = _events(log, study, session.id, in_part, quality)
+    for name, parts in (("positions", positions), ("imu", imu)):
+        if parts:
+            tables.write(name, pd.concat(parts), work.out)
+    tables.write("events", events, work.out)
+    tables.write("quality", tables.frame("quality", quality), work.out)
+    in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
+    return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
+
+
+def _who(session: Session, log: Log, study: Study) -> tuple[str, str]:
+    """Participant and condition, by the file's name and the log's facts, which must agree."""
+    said: dict[str, str] = {}
+    for what, by_name in (("participant", session.participant), ("condition", session.condition)):
+        fact = log.facts.get(what)
+        by_fact = unicodedata.normalize("NFC", fact) if fact else None
+        if by_name and by_fact and by_name != by_fact:
+            raise SessionError(f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them')
+        found = by_name or by_fact
+        if not found:
+            raise SessionError(f"neither its name nor its metadata says which {what} it is")
+        said[what] = found
+    if said["condition"] not in study.conditions:
+        hint = did_you_mean(said["condition"], study.conditions)
+        raise SessionError(f'condition "{said["condition"]}" is not in study.yaml{hint}')
+    return said["participant"], said["condition"]
+
+
+def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings | None:
+    """The stream's readings. A sensor that is missing, empty, unreadable or set back ends the session's use."""
+    readings = log.topics.get(stream.topic)
+    fault = None
+    if readings is None:
+        there = ", ".join(sorted(log.topics)) or "none of those that study.yaml names"
+        fault = f'stream "{name}": topic {stream.topic} is not in the log (there: {there})'
+    elif readings.read == 0:
+        why = f": {'; '.join(readings.notes)}" if readings.notes else ""
+        fault = f'stream "{name}": topic {stream.topic} holds no samples{why}'
+    else:
+        back = clock_went_back(readings)
+        if back is not None:
+            fault = f'stream "{name}": the clock went backwards by {back:.3f} s, so times cannot be told'
+    if fault is None:
+        return readings
+    if stream.kind in _NEEDED:
+        raise SessionError("; ".join([fault, *log.faults]))
+    in_part.append(fault)
+    return None
+
+
+def _finite(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
+    """Without readings that are not finite, and a note of what was left out or will be."""
+    width = 3 if stream.kind != "acceleration" else 6
+    keep = np.isfinite(readings.values[:, :width]).all(axis=1)
+    notes = []
+    if not keep.all():
+        notes.append(f"{int((~keep).sum())} samples left out: NaN or infinite")
+        if not keep.any():
+            raise SessionError(f"topic {stream.topic} holds no finite sample")
+    if stream.kind == "acceleration":
+        unknown = int(np.isnan(readings.values[keep, 6]).sum())
+        if unknown == keep.sum():
+            notes.append("no orientation in the log, so no acceleration in the tracker frame")
+        elif unknown:
+            notes.append(f"{unknown} samples of unknown orientation, not fused")
+    kept = Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep])
+    return kept, notes
+
+
+def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.DataFrame:
+    """A stream's rows, in order of arrival, in millimetres."""
+    order = np.lexsort((readings.stamp_ns, readings.arrival_ns))
+    columns: dict[str, Any] = {
+        "session": session,
+        "stream": name,
+        "time_ns": readings.stamp_ns[order],
+        "arrival_ns": readings.arrival_ns[order],
+    }
+    values = readings.values[order]
+    for index, axis in enumerate("xyz"):
+        column = f"a{axis}_mm_s2" if stream.kind == "acceleration" else f"{axis}_mm"
+        columns[column] = values[:, index] * MM_PER_M
+    if stream.kind == "acceleration":
+        columns |= {f"g{axis}_rad_s": values[:, 3 + index] for index, axis in enumerate("xyz")}
+        columns |= {f"q{axis}": values[:, 6 + index] for index, axis in enumerate("xyzw")}
+        return tables.as_table("imu", pd.DataFrame(columns))
+    return tables.as_table("positions", pd.DataFrame(columns))
+
+
+def _events(
+    log: Log, study: Study, session: str, in_part: list[str], quality: list[dict[str, Any]]
+) -> pd.DataFrame:
+    """The session's events by arrival."""
+    if study.events is None:
+        return tables.frame("events", [])
+    readings = log.topics.get(study.events.topic)
+    if readings is None or readings.read == 0:
+        in_part.append(f"events: topic {study.events.topic} holds none")
+        return tables.frame("events", [])
+    quality.append(quality_row(session, "events", readings, []))
+    order = np.argsort(readings.arrival_ns, kind="stable")
+    rows = [_event(session, int(readings.arrival_ns[at]), readings.events[at]) for at in order]
+    return tables.frame("events", rows)
+
+
+def _event(session: str, time_ns: int, event: Mapping[str, Any]) -> dict[str, Any]:
+    row: dict[str, Any] = {"session": session, "time_ns": time_ns, "type": event["type"]}
+    trial = event.get("trial")
+    row["trial"] = int(trial) if isinstance(trial, int | float) and np.isfinite(trial) else None
+    for axis in "xyz":
+        for key, column in ((f"target_{axis}", f"target_{axis}_mm"), (axis, f"{axis}_mm")):
+            value = event.get(key)
+            row[column] = value * MM_PER_M if isinstance(value, float) and np.isfinite(value) else None
+    return row

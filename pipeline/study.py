@@ -1,0 +1,373 @@
+"""study.yaml as frozen models, and the sessions it names. studies/README.md is the reference for its users."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from pipeline.errors import PipelineError, did_you_mean
+
+SETTINGS_FILE = "study.yaml"
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def identifier(value: object) -> object:
+    """An id as text in Unicode NFC: 7 and "7" are one, and so are the two ways to write "é"."""
+    if isinstance(value, bool):
+        raise ValueError(f'is read as true/false; put it in quotes: "{value}"')
+    if isinstance(value, int | float):
+        value = str(value)
+    return unicodedata.normalize("NFC", value) if isinstance(value, str) else value
+
+
+Id = Annotated[str, BeforeValidator(identifier), Field(min_length=1)]
+Vector = tuple[float, float, float]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Frozen(BaseModel):
+    """Immutable, and every key is known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _Stream(Frozen):
+    topic: str
+    stamp: Literal["arrival", "measurement"] = "measurement"
+    latency_s: NotNegative = 0.0
+
+
+class PositionStream(_Stream):
+    """A tracker. `stamp: arrival` says that it stamps on delivery: measured at stamp − latency_s."""
+
+    kind: Literal["position"]
+    noise_sd_mm: Positive = 8.0
+
+
+class AccelerationStream(_Stream):
+    """A phone's IMU: body-frame specific force, turned into the tracker frame by the orientation in the log."""
+
+    kind: Literal["acceleration"]
+    gravity_mm_s2: Vector
+    noise_sd_mm_s2: Positive = 100.0
+
+
+class ReferenceStream(_Stream):
+    """Ground truth, brought into the tracker's frame by a rotation and a translation."""
+
+    kind: Literal["reference"]
+    rotation_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    translation_mm: Vector = (0.0, 0.0, 0.0)
+
+
+class DisplayStream(_Stream):
+    """What the participant saw."""
+
+    kind: Literal["display"]
+
+
+Stream = Annotated[
+    PositionStream | AccelerationStream | ReferenceStream | DisplayStream, Field(discriminator="kind")
+]
+
+
+class Events(Frozen):
+    topic: str
+
+
+class Display(Frozen):
+    px_per_mm: Positive
+    unit: Literal["px", "mm"] = "px"
+
+
+class Estimator(BaseModel):
+    """`type` names one of fusion_core.ESTIMATORS, `use` its streams; the other keys are its parameters."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    type: str
+    use: tuple[str, ...] | None = None
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The keys that are the estimator's own."""
+        return dict(self.model_extra or {})
+
+
+class Comparison(Frozen):
+    measure: str
+    test: Literal["rm_anova", "t_paired", "wilcoxon", "friedman"]
+    within: tuple[str, ...] = ("condition",)
+    adjust: Literal["none", "holm", "bonferroni", "benjamini_hochberg"] = "none"
+    zeros: Literal["dropped", "pratt"] = "dropped"
+
+
+class Exclusion(Frozen):
+    """What is left out by decision: a participant, or one of their conditions, or a session, in one measure or all."""
+
+    participant: Id | None = None
+    condition: Id | None = None
+    session: Id | None = None
+    measure: str | None = None
+    reason: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _names_someone(self) -> Exclusion:
+        if self.participant is None and self.session is None:
+            raise ValueError("names neither a participant nor a session")
+        return self
+
+
+class ReachSimulation(Frozen):
+    """The paper's Experiment 1: still, a minimum-jerk reach along x, still again; written by `steadyhand simulate`."""
+
+    kind: Literal["reach"]
+    seed: int
+    recordings: Annotated[int, Field(ge=1, le=999)]
+    distance_mm: Positive = 200.0
+    still_before_s: NotNegative = 1.6
+    reach_s: Positive = 0.9
+    still_after_s: NotNegative = 1.1
+    tracker_rate_hz: Positive = 30.0
+    imu_rate_hz: Positive = 90.0
+    reference_rate_hz: Positive = 90.0
+
+
+class Study(Frozen):
+    """A study folder's settings. A contrast is first − second in the order of `conditions`."""
+
+    title: str = ""
+    notes: str = ""
+    citation: str = ""
+    data_origin: Literal["recorded", "simulated", "reconstructed"] = "recorded"
+    conditions: Annotated[tuple[Id, ...], Field(min_length=1)]
+    participants: str | None = None
+    sessions: str | None = None
+    axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
+    streams: Mapping[str, Stream] = {}
+    events: Events | None = None
+    display: Display | None = None
+    estimators: Mapping[str, Estimator] = {}
+    shown: Mapping[Id, str] = {}
+    trials: str | None = None
+    questionnaires: str | None = None
+    measures: str | None = None
+    printed: str | None = None
+    comparisons: tuple[Comparison, ...] = ()
+    alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
+    exclusions: tuple[Exclusion, ...] = ()
+    simulation: ReachSimulation | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Study:
+        _unique("conditions", self.conditions)
+        _unique("axes", self.axes)
+        for condition, shown in self.shown.items():
+            _known("shown", condition, self.conditions)
+            _known(f"shown.{condition}", shown, self.estimators)
+        for excluded in self.exclusions:
+            if excluded.condition is not None:
+                _known("exclusions: condition", excluded.condition, self.conditions)
+        for name, estimator in self.estimators.items():
+            for stream in estimator.use or ():
+                _known(f"estimators.{name}.use", stream, self.sensor_streams)
+        for comparison in self.comparisons:
+            if "condition" not in comparison.within or len(set(comparison.within)) < len(comparison.within):
+                raise ValueError(f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice')
+            if len(comparison.within) > 3 or (len(comparison.within) > 1 and comparison.test != "rm_anova"):
+                raise ValueError(f"comparisons: {comparison.test} does not take within: {list(comparison.within)}")
+        if self.sessions is not None:
+            _check_pattern(self.sessions)
+        if not (self.sessions or self.trials or self.questionnaires or self.measures):
+            raise ValueError("names no data; give sessions, trials, questionnaires or measures")
+        return self
+
+    @property
+    def sensor_streams(self) -> dict[str, PositionStream | AccelerationStream]:
+        """The streams an estimator may use."""
+        return {n: s for n, s in self.streams.items() if isinstance(s, PositionStream | AccelerationStream)}
+
+    def stream_of_kind(self, kind: str) -> str | None:
+        """The name of the first stream of a kind."""
+        return next((name for name, stream in self.streams.items() if stream.kind == kind), None)
+
+
+def _unique(field: str, values: tuple[str, ...]) -> None:
+    for value in values:
+        if values.count(value) > 1:
+            raise ValueError(f'{field}: "{value}" stands there twice')
+
+
+def _known(field: str, value: str, known: Mapping[str, object] | tuple[str, ...]) -> None:
+    if value not in known:
+        raise ValueError(f'{field}: "{value}" is not known{did_you_mean(value, known)}')
+
+
+_PLACEHOLDER = re.compile(r"\{(\w+)\}")
+_PLACEHOLDERS = ("participant", "condition", "session")
+
+
+def _check_pattern(pattern: str) -> None:
+    names = _PLACEHOLDER.findall(pattern)
+    for name in names:
+        if name not in _PLACEHOLDERS:
+            raise ValueError(f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, _PLACEHOLDERS)}')
+    _unique("sessions: placeholder", tuple(names))
+    if not names:
+        raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
+
+
+@dataclass(frozen=True)
+class Session:
+    """One participant in one condition, one log. Null where the file's name does not say."""
+
+    id: str
+    participant: str | None
+    condition: str | None
+    path: Path
+
+
+class _UniqueKeyLoader(yaml.CSafeLoader):
+    """A key that stands twice in one mapping is an error, not the last one's victory."""
+
+
+def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, object]:
+    seen: set[str] = set()
+    for key, _ in node.value:
+        if isinstance(key, yaml.ScalarNode):
+            if key.value in seen:
+                raise yaml.MarkedYAMLError(problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark)
+            seen.add(key.value)
+    return dict(loader.construct_mapping(node, deep=True))
+
+
+_UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """A YAML file that holds a mapping; PipelineError that names the file and line where it does not."""
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_UniqueKeyLoader)  # noqa: S506 - safe
+    except FileNotFoundError:
+        raise PipelineError(f"{path}: there is no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise PipelineError(f"{path}: cannot be read: {error}") from None
+    except yaml.MarkedYAMLError as error:
+        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        raise PipelineError(f"{path}{line}: not valid YAML: {error.problem}") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise PipelineError(f"{path}: not valid YAML: {error}") from None
+    if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
+        raise PipelineError(f"{path}: holds no settings; it needs lines like `title: My study`")
+    return content
+
+
+def load_study(folder: Path) -> Study:
+    """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy."""
+    if not folder.is_dir():
+        raise PipelineError(f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it")
+    path = folder / SETTINGS_FILE
+    if not path.is_file():
+        raise PipelineError(f"{folder}: holds no {SETTINGS_FILE}; studies/README.md shows what goes into one")
+    content = read_yaml(path)
+    content.setdefault("title", folder.resolve().name)
+    study = parse(Study, content, path)
+    for field in ("participants", "trials", "questionnaires", "measures", "printed"):
+        name = getattr(study, field)
+        if name is not None:
+            inside(folder, name, f"{path}: {field}")
+    if study.sessions is not None:
+        inside(folder, study.sessions, f"{path}: sessions", must_exist=False)
+    return study
+
+
+def parse(model: type[_Model], content: dict[str, Any], path: Path) -> _Model:
+    """Content as a model; every fault in one PipelineError, a line each."""
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise PipelineError("\n".join(f"{path}: {_explained(fault, model)}" for fault in error.errors())) from None
+
+
+def _explained(fault: Any, model: type[BaseModel]) -> str:
+    """One fault of pydantic's in the user's words."""
+    location = [part for part in fault["loc"] if part not in ("position", "acceleration", "reference", "display", "reach") or part is fault["loc"][0]]
+    field = ".".join(str(part) for part in location)
+    if fault["type"] == "extra_forbidden":
+        return f'unknown key "{field}"{did_you_mean(str(location[-1]), _keys_at(model, fault["loc"][:-1]))}'
+    if fault["type"] == "missing":
+        return f'"{field}" is missing'
+    if fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        return f'"{field}" needs a kind: position, acceleration, reference or display'
+    message = fault["msg"].removeprefix("Value error, ")
+    message = message[0].lower() + message[1:]
+    found = fault.get("input")
+    shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
+    return f'"{field}": {message}{shown}' if field else f"{message}{shown}"
+
+
+def _keys_at(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
+    """The keys that are known where an unknown one stood."""
+    kinds: dict[object, type[BaseModel]] = {
+        "position": PositionStream,
+        "acceleration": AccelerationStream,
+        "reference": ReferenceStream,
+        "display": DisplayStream,
+    }
+    nested: dict[object, type[BaseModel]] = {
+        "events": Events,
+        "display": Display,
+        "comparisons": Comparison,
+        "exclusions": Exclusion,
+        "simulation": ReachSimulation,
+    }
+    if location and model is Study:
+        model = kinds[location[-1]] if location[0] == "streams" else nested.get(location[0], model)
+    return list(model.model_fields)
+
+
+def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path:
+    """A path of the study, refused if it leads out of its folder by `..`, a root or a link."""
+    root = folder.resolve()
+    path = root / name
+    if Path(name).is_absolute() or ".." in Path(name).parts or not path.resolve().is_relative_to(root):
+        raise PipelineError(f'{field}: "{name}" leads out of the study folder; put the file into it')
+    if must_exist and not path.is_file():
+        raise PipelineError(f'{field}: there is no file "{name}" in the study folder')
+    return path
+
+
+def find_sessions(folder: Path, study: Study) -> list[Session]:
+    """The logs that match the study's pattern, sorted by id; two equal ids are a PipelineError."""
+    if study.sessions is None:
+        return []
+    root = folder.resolve()
+    pieces = _PLACEHOLDER.split(Path(study.sessions).as_posix())
+    pattern = "".join(
+        re.escape(piece) if index % 2 == 0 else f"(?P<{piece}>[^_/]+)" for index, piece in enumerate(pieces)
+    )
+    fixed = Path(pieces[0]).parent if not pieces[0].endswith("/") else Path(pieces[0])
+    sessions: dict[str, Session] = {}
+    for path in sorted((root / fixed).rglob("*")):
+        relative = unicodedata.normalize("NFC", path.relative_to(root).as_posix())
+        match = re.fullmatch(pattern, relative)
+        if match is None or not path.is_file():
+            continue
+        inside(folder, path.relative_to(root).as_posix(), f"{folder / SETTINGS_FILE}: sessions")
+        found = match.groupdict()
+        session = Session(Path(relative).stem, found.get("participant"), found.get("condition"), path)
+        if session.id in sessions:
+            other = sessions[session.id].path.relative_to(root)
+            raise PipelineError(
+                f'{folder / SETTINGS_FILE}: sessions: "{other}" and "{path.relative_to(root)}" are both session '
+                f'"{session.id}"; a session\'s id is its file\'s name, rename one'
+            )
+        sessions[session.id] = session
+    return [sessions[key] for key in sorted(sessions)]

@@ -1,0 +1,167 @@
+"""A study's own CSV tables: participants, trials, questionnaires, measures; checked row by row, every fault named."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.study import identifier
+
+MISSING = ("", "NA", "N/A")
+_SHOWN_FAULTS = 5
+
+PARTICIPANT_REQUIRED = ("participant",)
+TRIAL_REQUIRED = ("participant", "condition", "trial", "target_x_mm", "target_y_mm", "selected_x_mm", "selected_y_mm")
+TRIAL_OPTIONAL = ("session", "target_z_mm", "selected_z_mm", "start_s", "selection_s")
+RATING_REQUIRED = ("participant", "condition", "questionnaire", "scale", "rating")
+MEASURE_REQUIRED = ("participant", "condition", "measure", "value")
+MEASURE_RESERVED = ("trial", "period", "sequence", "unit")
+
+
+def _read(path: Path, required: Sequence[str], optional: Sequence[str] | None) -> pd.DataFrame:
+    """A CSV file as text, ids in NFC; other columns are welcome only where `optional` is None."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, strict=True)
+            numbered = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise PipelineError(f"{path}: cannot be read as CSV in UTF-8: {error}") from None
+    if not numbered:
+        raise PipelineError(f"{path}: is empty; its first line must name the columns {', '.join(required)}")
+    header = [name.strip() for name in numbered[0][1]]
+    for name in header:
+        if header.count(name) > 1:
+            raise PipelineError(f'{path}: the column "{name}" stands there twice')
+        if not name:
+            raise PipelineError(f"{path}: a column has no name")
+    for name in required:
+        if name not in header:
+            raise PipelineError(f'{path}: the column "{name}" is missing; found: {", ".join(header)}')
+    if optional is not None:
+        for name in header:
+            if name not in required and name not in optional:
+                hint = did_you_mean(name, [*required, *optional])
+                raise PipelineError(f'{path}: the column "{name}" is not known{hint}')
+    for line, row in numbered[1:]:
+        if len(row) != len(header):
+            raise PipelineError(f"{path}, row {line}: has {len(row)} cells, the first line {len(header)}")
+    cells = [[cell.strip() for cell in row] for _, row in numbered[1:]]
+    table = pd.DataFrame(cells, columns=header, dtype=object)
+    for name in header:
+        table[name] = table[name].map(identifier)
+    table.index = pd.Index([line for line, _ in numbered[1:]])  # the file's own line numbers
+    return table
+
+
+def _required_text(path: Path, table: pd.DataFrame, columns: Iterable[str]) -> None:
+    for column in columns:
+        for line in table.index[table[column] == ""]:
+            raise PipelineError(f'{path}, row {line}: "{column}" is empty')
+
+
+def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
+    """A column as numbers, NaN for a missing cell; text is an error that names its rows."""
+    values, faults = [], []
+    for line, text in table[column].items():
+        try:
+            values.append(np.nan if text in MISSING else float(text))
+        except ValueError:
+            faults.append(f'row {line}: "{column}" should be a number, found "{text}"')
+    if faults:
+        more = f"; and {len(faults) - _SHOWN_FAULTS} more" if len(faults) > _SHOWN_FAULTS else ""
+        hint = " (a decimal comma? use a point)" if any('"' in f and "," in f.split("found")[1] for f in faults) else ""
+        raise PipelineError(f"{path}, {'; '.join(faults[:_SHOWN_FAULTS])}{more}{hint}")
+    return pd.Series(values, index=table.index, dtype=np.float64)
+
+
+def _whole_numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
+    values = _numbers(path, table, column)
+    for line, value in values.items():
+        if not (np.isfinite(value) and value == round(value)):
+            raise PipelineError(f'{path}, row {line}: "{column}" should be a whole number, found "{table.at[line, column]}"')
+    return values.astype(np.int64)
+
+
+def _check_conditions(path: Path, table: pd.DataFrame, conditions: Sequence[str]) -> None:
+    for line, condition in table["condition"].items():
+        if condition not in conditions:
+            hint = did_you_mean(condition, conditions)
+            raise PipelineError(f'{path}, row {line}: condition "{condition}" is not in study.yaml{hint}')
+
+
+def _check_unique(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
+    repeated = table[table.duplicated(list(columns), keep=False)]
+    if len(repeated):
+        what = ", ".join(f"{column} {repeated.iloc[0][column]}" for column in columns)
+        same = repeated[(repeated[list(columns)] == repeated.iloc[0][list(columns)]).all(axis=1)]
+        rows = ", ".join(str(line) for line in same.index[:_SHOWN_FAULTS])
+        raise PipelineError(f"{path}: rows {rows} are duplicates ({what}); keep one of them")
+
+
+def read_participants(path: Path) -> pd.DataFrame:
+    """A row a participant, everything as text; the column participant is unique."""
+    table = _read(path, PARTICIPANT_REQUIRED, None)
+    _required_text(path, table, ["participant"])
+    _check_unique(path, table, ["participant"])
+    return table
+
+
+def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
+    """A row a trial: ids, trial (whole number), coordinates in mm and times in s (NaN where missing)."""
+    table = _read(path, TRIAL_REQUIRED, TRIAL_OPTIONAL)
+    for column in TRIAL_OPTIONAL:
+        if column not in table:
+            table[column] = ""
+    _required_text(path, table, ["participant", "condition"])
+    _check_conditions(path, table, conditions)
+    table["trial"] = _whole_numbers(path, table, "trial")
+    _check_unique(path, table, ["participant", "condition", "session", "trial"])
+    for column in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]):
+        table[column] = _numbers(path, table, column)
+    return table
+
+
+def read_questionnaires(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
+    """A row a rating, NaN where missing."""
+    table = _read(path, RATING_REQUIRED, ("session",))
+    _required_text(path, table, RATING_REQUIRED[:4])
+    _check_conditions(path, table, conditions)
+    table["rating"] = _numbers(path, table, "rating")
+    keys = [*RATING_REQUIRED[:4], *(["session"] if "session" in table else [])]
+    _check_unique(path, table, keys)
+    return table
+
+
+def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
+    """A row a value, NaN where missing, and the names of the further within-factors, each a column of text."""
+    table = _read(path, MEASURE_REQUIRED, None)
+    factors = [name for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]
+    _required_text(path, table, [*MEASURE_REQUIRED[:3], *factors])
+    _check_conditions(path, table, conditions)
+    table["value"] = _numbers(path, table, "value")
+    keys = [*MEASURE_REQUIRED[:3], *factors, *(name for name in ("trial", "period") if name in table)]
+    _check_unique(path, table, keys)
+    return table, factors
+
+
+def participant_facts(table: pd.DataFrame) -> dict[str, Any]:
+    """How many, of which sex and age, for the report; what the file does not say is left out."""
+    facts: dict[str, Any] = {"n": len(table)}
+    columns = {name.lower(): name for name in table}
+    for name in ("sex", "gender"):
+        if name in columns:
+            facts["sex"] = {str(k): int(v) for k, v in table[columns[name]].value_counts().items() if k}
+            break
+    for name in ("age", "age_years"):
+        if name in columns:
+            ages = pd.to_numeric(table[columns[name]], errors="coerce").dropna()
+            if len(ages):
+                facts["age"] = {"mean": float(ages.mean()), "min": float(ages.min()), "max": float(ages.max())}
+            break
+    return facts

@@ -1,0 +1,253 @@
+"""The tables every stage speaks: their columns, with the unit in each name, and the one crossing to fusion_core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fusion_core.samples import Samples
+
+_TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
+_POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
+
+
+def _schema(*columns: tuple[str, pa.DataType]) -> pa.Schema:
+    return pa.schema(list(columns))
+
+
+TABLES: Mapping[str, pa.Schema] = {
+    "positions": _schema(
+        ("session", _TEXT), ("stream", _TEXT), ("time_ns", _TIME), ("arrival_ns", _TIME), *_POSITION
+    ),
+    "imu": _schema(
+        ("session", _TEXT),
+        ("stream", _TEXT),
+        ("time_ns", _TIME),
+        ("arrival_ns", _TIME),
+        *[(f"a{axis}_mm_s2", _FLOAT) for axis in "xyz"],
+        *[(f"g{axis}_rad_s", _FLOAT) for axis in "xyz"],
+        *[(f"q{axis}", _FLOAT) for axis in "xyzw"],
+    ),
+    "events": _schema(
+        ("session", _TEXT),
+        ("time_ns", _TIME),
+        ("type", _TEXT),
+        ("trial", _COUNT),
+        *[(f"target_{axis}_mm", _FLOAT) for axis in "xyz"],
+        *_POSITION,
+    ),
+    "quality": _schema(
+        ("session", _TEXT),
+        ("stream", _TEXT),
+        ("messages_read", _COUNT),
+        ("messages_lost", _COUNT),
+        ("rate_hz", _FLOAT),
+        ("gap_max_s", _FLOAT),
+        ("duplicates", _COUNT),
+        ("out_of_order", _COUNT),
+        ("jitter_ms", _FLOAT),
+        ("latency_s", _FLOAT),
+        ("note", _TEXT),
+    ),
+    "tracks": _schema(
+        ("session", _TEXT),
+        ("estimator", _TEXT),
+        ("time_ns", _TIME),
+        *_POSITION,
+        *[(f"sd_{axis}_mm", _FLOAT) for axis in "xyz"],
+    ),
+    "trials": _schema(
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("trial", _COUNT),
+        ("estimator", _TEXT),
+        ("position_error_mm", _FLOAT),
+        ("squared_error_mm2", _FLOAT),
+        ("duration_s", _FLOAT),
+    ),
+    "measures": _schema(
+        ("participant", _TEXT), ("condition", _TEXT), ("factors", _TEXT), ("measure", _TEXT), ("value", _FLOAT)
+    ),
+    "descriptives": _schema(
+        ("measure", _TEXT),
+        ("condition", _TEXT),
+        ("n", _COUNT),
+        ("mean", _FLOAT),
+        ("sd", _FLOAT),
+        ("median", _FLOAT),
+        ("ci_low", _FLOAT),
+        ("ci_high", _FLOAT),
+    ),
+    "comparisons": _schema(
+        ("measure", _TEXT),
+        ("test", _TEXT),
+        ("effect", _TEXT),
+        ("contrast", _TEXT),
+        ("n", _COUNT),
+        ("statistic_name", _TEXT),
+        ("statistic", _FLOAT),
+        ("df1", _FLOAT),
+        ("df2", _FLOAT),
+        ("p", _FLOAT),
+        ("p_adjusted", _FLOAT),
+        ("adjust", _TEXT),
+        ("method", _TEXT),
+        ("effect_size_name", _TEXT),
+        ("effect_size", _FLOAT),
+        ("ci_low", _FLOAT),
+        ("ci_high", _FLOAT),
+        ("mean_difference", _FLOAT),
+        ("reduction", _FLOAT),
+        ("status", _TEXT),
+        ("details", _TEXT),  # JSON
+    ),
+    "accuracy": _schema(
+        ("study", _TEXT),
+        ("session", _TEXT),
+        ("estimator", _TEXT),
+        ("variant", _TEXT),
+        ("reference", _TEXT),
+        ("rmse_mm", _FLOAT),
+        ("sd_mm", _FLOAT),
+        ("coverage_95", _FLOAT),
+        ("lag_s", _FLOAT),
+        ("lag_low_s", _FLOAT),
+        ("lag_high_s", _FLOAT),
+        ("lead_xcorr_s", _FLOAT),
+        ("jitter_mm", _FLOAT),
+    ),
+    "replay_agreement": _schema(
+        ("session", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("max_mm", _FLOAT), ("rms_mm", _FLOAT)
+    ),
+    "sensor_noise": _schema(
+        ("session", _TEXT),
+        ("stream", _TEXT),
+        ("unit", _TEXT),
+        ("begin_s", _FLOAT),
+        ("end_s", _FLOAT),
+        ("n", _COUNT),
+        ("sd", _FLOAT),
+        ("stated_sd", _FLOAT),
+    ),
+    "noise_residuals": _schema(("session", _TEXT), ("stream", _TEXT), ("axis", _TEXT), ("residual", _FLOAT)),
+    "exclusions": _schema(
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("measure", _TEXT),
+        ("what", _TEXT),
+        ("reason", _TEXT),
+    ),
+    "printed": _schema(
+        ("what", _TEXT),
+        ("source", _TEXT),
+        ("printed", _TEXT),
+        ("computed", _TEXT),
+        ("computed_value", _FLOAT),
+        ("verdict", _TEXT),
+        ("explanation", _TEXT),
+    ),
+}
+"""Every table by name. Columns never vary with data or options; what does not apply is null."""
+
+Row = Mapping[str, Any]
+
+
+def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
+    """Rows as the named table; a key it does not know is a programming error (KeyError)."""
+    listed = list(rows)
+    columns = TABLES[name].names
+    for row in listed:
+        unknown = set(row) - set(columns)
+        if unknown:
+            raise KeyError(f"table {name} has no column {', '.join(sorted(unknown))}")
+    return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
+
+
+def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
+    """A frame with exactly the table's columns, in its order and types."""
+    converted = pd.DataFrame(index=data.index)
+    for column in TABLES[name]:
+        values = data[column.name] if column.name in data else pd.Series([None] * len(data), index=data.index)
+        converted[column.name] = _typed(values, column.type)
+    return converted
+
+
+def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
+    if kind == _TEXT:
+        return values.astype("string")
+    if kind == _FLOAT:
+        return pd.to_numeric(values).astype("float64")
+    return pd.to_numeric(values).astype("Int64")
+
+
+def write(name: str, data: pd.DataFrame, folder: Path) -> None:
+    """The table as Parquet, `<name>.parquet`."""
+    table = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name], preserve_index=False)
+    floats = [column.name for column in TABLES[name] if column.type == _FLOAT]
+    times = [column.name for column in TABLES[name] if column.name.endswith("_ns")]
+    encodings = dict.fromkeys(floats, "BYTE_STREAM_SPLIT") | dict.fromkeys(times, "DELTA_BINARY_PACKED")
+    plain = [column.name for column in TABLES[name] if column.name not in encodings]
+    pq.write_table(
+        table.replace_schema_metadata(None),
+        folder / f"{name}.parquet",
+        compression="zstd",
+        use_dictionary=plain,
+        column_encoding=encodings,
+        store_schema=False,
+    )
+
+
+def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
+    """The table out of one or many folders; those without it count as empty."""
+    parts = []
+    for folder in [folders] if isinstance(folders, Path) else folders:
+        path = folder / f"{name}.parquet"
+        if path.is_file():
+            with pq.ParquetFile(path) as file:
+                parts.append(file.read(use_threads=False))
+    whole = pa.concat_tables(parts) if parts else TABLES[name].empty_table()
+    return as_table(name, whole.to_pandas())
+
+
+def records(name: str, data: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows as plain objects for JSON: null for what does not apply, `details` and `factors` as they are stored."""
+    rows: list[dict[str, Any]] = []
+    for row in as_table(name, data).itertuples(index=False):
+        rows.append({key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)})
+    return rows
+
+
+def _plain(value: Any) -> Any:
+    if value is None or value is pd.NA or (isinstance(value, float) and not np.isfinite(value)):
+        return None
+    if isinstance(value, np.integer):
+        return int(value)
+    return float(value) if isinstance(value, float) else value
+
+
+NANOSECONDS = 1e-9
+
+
+def samples(
+    time_ns: np.ndarray[Any, Any], arrival_ns: np.ndarray[Any, Any], value: np.ndarray[Any, Any], origin_ns: int
+) -> Samples:
+    """The crossing into fusion_core: readings by arrival, in seconds since `origin_ns`, each reading once.
+
+    A reading whose stamp and values another one already had is a copy of it and left out (`quality` counts them).
+    """
+    order = np.lexsort((time_ns, arrival_ns))
+    time_ns, arrival_ns, value = time_ns[order], arrival_ns[order], value[order]
+    kept = np.flatnonzero(~pd.DataFrame(value).assign(stamp=time_ns).duplicated())
+    return Samples(
+        (time_ns[kept] - origin_ns) * NANOSECONDS,
+        (arrival_ns[kept] - origin_ns) * NANOSECONDS,
+        np.ascontiguousarray(value[kept], dtype=np.float64),
+    )

@@ -1,0 +1,211 @@
+"""Numbers, units, names and sentences as people read them. No figure is computed here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+Row = Mapping[str, Any]
+
+MINUS = "\u2212"
+THIN = "\u2009"
+NOTHING = "–"
+
+_LABELS = {
+    "selection_mse_px2": "Selection error, MSE (px²)",
+    "selection_mse_mm2": "Selection error, MSE (mm²)",
+    "selection_rmse_px": "Selection error, RMSE (px)",
+    "selection_rmse_mm": "Selection error, RMSE (mm)",
+    "completion_time_s": "Completion time (s)",
+    "trial_time_s": "Time per trial (s)",
+}
+_UNITS = {
+    "_px2": " (px²)",
+    "_mm2": " (mm²)",
+    "_mm_s2": " (mm/s²)",
+    "_mm_s": " (mm/s)",
+    "_px": " (px)",
+    "_mm": " (mm)",
+    "_ms": " (ms)",
+    "_s": " (s)",
+    "_percent": " (%)",
+}
+_QUESTIONNAIRES = {"nasa_tlx": "NASA-TLX", "sus": "SUS", "ueq": "UEQ"}
+_EFFECT_SIZES = {
+    "generalized eta squared": "η²G",
+    "Cohen's d_z": "d_z",
+    "matched-pairs rank-biserial": "r_rb",
+    "Kendall's W": "W",
+}
+TESTS = {
+    "rm_anova": "repeated-measures ANOVA",
+    "t_paired": "paired t test",
+    "wilcoxon": "Wilcoxon signed-rank test",
+    "friedman": "Friedman test",
+}
+
+
+def measure_label(measure: str) -> str:
+    """A measure's name for people, with its unit."""
+    if measure in _LABELS:
+        return _LABELS[measure]
+    questionnaire, slash, scale = measure.partition("/")
+    if slash:
+        return f"{_QUESTIONNAIRES.get(questionnaire, _spaced(questionnaire))}: {_spaced(scale).lower()}"
+    for suffix, unit in _UNITS.items():
+        if measure.endswith(suffix):
+            return _spaced(measure.removesuffix(suffix)) + unit
+    return _spaced(measure)
+
+
+def short_label(measure: str) -> str:
+    """A measure's name without its unit or its questionnaire."""
+    label = measure_label(measure)
+    return label.partition(": ")[2].capitalize() if "/" in measure else label.partition(" (")[0]
+
+
+def unit_of(measure: str) -> str:
+    """The unit in a measure's label, or nothing."""
+    label = measure_label(measure)
+    return label[label.rindex("(") + 1 : -1] if label.endswith(")") else ""
+
+
+def _spaced(name: str) -> str:
+    words = name.replace("_", " ").strip()
+    return words[:1].upper() + words[1:]
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """With `digits` decimals up to 1000, grouped whole numbers above, more digits for the small."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    size = abs(value)
+    if size >= 1000:
+        text = f"{value:,.0f}".replace(",", THIN)
+    elif size == 0 or size >= 0.1:
+        text = f"{value:.{digits}f}"
+    else:
+        text = f"{value:.{digits + 1}g}" if size >= 1e-4 else f"{value:.1e}"
+    return text.replace("-", MINUS)
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """A share as percent."""
+    return NOTHING if value is None or not math.isfinite(value) else f"{100 * value:.{digits}f} %".replace("-", MINUS)
+
+
+def seconds(value: float | None) -> str:
+    """A lag in milliseconds, with its sign."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    return f"{1000 * value:+.0f}".replace("-", MINUS).replace("+0", "0")
+
+
+def share(value: float | None, digits: int = 3) -> str:
+    """A figure that cannot exceed 1, without its leading zero."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    text = f"{value:.{digits}f}"
+    return text.replace("0.", ".", 1).replace("-", MINUS) if abs(value) < 1 else text.replace("-", MINUS)
+
+
+def p_value(p: float | None) -> str:
+    """A p value with four digits."""
+    if p is None:
+        return NOTHING
+    return "< .0001" if p < 0.0001 else share(p, 4)
+
+
+def p_phrase(p: float | None, symbol: str = "p") -> str:
+    """`p = .0071`, `p < .0001`."""
+    text = p_value(p)
+    return f"{symbol} {text}" if text.startswith("<") else f"{symbol} = {text}"
+
+
+def interval(low: float | None, high: float | None, digits: int = 2) -> str:
+    """`[low, high]`, or nothing."""
+    if low is None or high is None:
+        return NOTHING
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def degrees(value: float | None) -> str:
+    """Degrees of freedom: whole where they are."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if float(value).is_integer() else f"{value:.2f}"
+
+
+def statistic(row: Row) -> str:
+    """`F(1, 11) = 10.86`, as the test prints it."""
+    if row["statistic"] is None:
+        return NOTHING
+    value = number(row["statistic"])
+    freedom = ", ".join(text for text in (degrees(row["df1"]), degrees(row["df2"])) if text)
+    name = {"W+": "W₊", "chi2": "χ²"}.get(row["statistic_name"], row["statistic_name"])
+    return f"{name}({freedom}) = {value}" if freedom else f"{name} = {value}"
+
+
+def effect_size(row: Row) -> str:
+    """`d_z = 0.65 [0.01, 1.27]`."""
+    if row["effect_size"] is None:
+        return NOTHING
+    name = _EFFECT_SIZES.get(row["effect_size_name"], row["effect_size_name"])
+    bounds = interval(row["ci_low"], row["ci_high"])
+    return f"{name} = {number(row['effect_size'])}" + ("" if bounds == NOTHING else f" {bounds}")
+
+
+def contrast(row: Row) -> str:
+    """The pair a row compares, or its effect; typographic."""
+    if row["contrast"] is not None:
+        return str(row["contrast"]).replace(" - ", f" {MINUS} ")
+    return "conditions" if row["effect"] == "condition" else str(row["effect"]).replace(":", " × ")
+
+
+def corrected(row: Row) -> str | None:
+    """The sphericity-corrected p of an ANOVA of more than two conditions."""
+    details = row["details"] or {}
+    if details.get("p_gg") is None:
+        return None
+    return f"Greenhouse-Geisser ε = {share(details['epsilon_gg'])}, {p_phrase(details['p_gg'])}"
+
+
+def decisive_p(row: Row) -> float | None:
+    """The p value to judge by: adjusted over its family if it has one, else corrected for sphericity if it can be."""
+    if row["p_adjusted"] is not None:
+        return float(row["p_adjusted"])
+    details = row["details"] or {}
+    return details.get("p_gg") if details.get("p_gg") is not None else row["p"]
+
+
+def comparison_sentence(row: Row) -> str:
+    """One row in APA's manner, without the measure's name."""
+    head = contrast(row) + ", " if row["contrast"] is not None or ":" in row["effect"] else ""
+    if row["status"] != "ok":
+        return f"{head}{TESTS[row['test']]} {row['status']} (n = {row['n']})"
+    parts = [f"{head}{statistic(row)}", p_phrase(row["p"])]
+    if corrected(row):
+        parts.append(corrected(row) or "")
+    if row["p_adjusted"] is not None:
+        parts.append(p_phrase(row["p_adjusted"], f"{row['adjust'].capitalize().replace('_', ' ')}-adjusted p"))
+    parts.append(effect_size(row))
+    parts.append(f"n = {row['n']}")
+    if row["reduction"] is not None:
+        parts.append(reduction_phrase(row["reduction"]))
+    return ", ".join(parts)
+
+
+def reduction_phrase(reduction: float) -> str:
+    """`reduced by 38.3 %`, `increased by 4.0 %`."""
+    return f"{'reduced' if reduction >= 0 else 'increased'} by {percent(abs(reduction))}"
+
+
+def listing(words: list[str]) -> str:
+    """`a, b and c`."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def counted(count: int, noun: str, plural: str | None = None) -> str:
+    """`1 session`, `3 sessions`."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
