@@ -63,9 +63,7 @@ def coverage_95(estimate: FloatArray, sd: FloatArray, reference: FloatArray) -> 
     return float(np.mean(np.abs(estimate - reference) <= 1.96 * sd))
 
 
-def lag(
-    time: FloatArray, estimate: FloatArray, reference: Samples, random: np.random.Generator
-) -> Interval:
+def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.random.Generator) -> Interval:
     """The shift in s within ±0.5 s that minimises Σ‖estimate(t) − reference(t − lag)‖², positive = late.
 
     Sub-sample by a parabola through the smallest squared distance and its neighbours; the 95 % interval is the
@@ -141,7 +139,9 @@ def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: S
     return float(lead[inside][peak])
 
 
-def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tuple[FloatArray, FloatArray] | None:
+def lead_curve(
+    time: FloatArray, estimate: FloatArray, tracker: Samples
+) -> tuple[FloatArray, FloatArray] | None:
     """The curve behind `lead_by_cross_correlation`: leads in s and correlations in mm²; None without overlap."""
     if len(time) < 3 or len(tracker) < 2:
         return None

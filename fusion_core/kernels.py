@@ -24,9 +24,7 @@ class SquaredExponential:
     inverse_scale_s2: float
 
     def __post_init__(self) -> None:
-        require_positive(
-            signal_variance_mm2=self.signal_variance_mm2, inverse_scale_s2=self.inverse_scale_s2
-        )
+        require_positive(signal_variance_mm2=self.signal_variance_mm2, inverse_scale_s2=self.inverse_scale_s2)
 
     def covariance(
         self, time: FloatArray, order: IntArray, other_time: FloatArray, other_order: IntArray

@@ -22,7 +22,9 @@ Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Where to write; with several studies a folder each in it.")
 ]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to compute in. Default: one a processor.")]
-CacheFolder = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")]
+CacheFolder = Annotated[
+    Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")
+]
 
 
 @app.command()
@@ -44,7 +46,9 @@ def compare(studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFo
 @app.command()
 def check(
     studies: Studies,
-    accept: Annotated[bool, typer.Option("--accept", help="Take today's results as the expected ones.")] = False,
+    accept: Annotated[
+        bool, typer.Option("--accept", help="Take today's results as the expected ones.")
+    ] = False,
     jobs: Jobs = None,
     cache: CacheFolder = None,
 ) -> None:
@@ -82,15 +86,22 @@ def main() -> None:
 
     try:
         app()
+    except BrokenPipeError:  # the reader of our output, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
     except PipelineError as error:
         print(f"steadyhand: {error}", file=sys.stderr)  # noqa: T201
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
         sys.exit(130)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    except Exception as error:
+        if os.environ.get("STEADYHAND_TRACEBACK"):
+            raise
+        fault = f"{type(error).__name__}: {error}"
+        print(f"steadyhand: a fault of Steadyhand's own, please report it: {fault}", file=sys.stderr)  # noqa: T201
+        print("(STEADYHAND_TRACEBACK=1 shows where)", file=sys.stderr)  # noqa: T201
+        sys.exit(2)
 
 
 if __name__ == "__main__":

@@ -75,7 +75,9 @@ def _decimal(path: Path, text: str) -> Decimal:
     try:
         return Decimal(text)
     except InvalidOperation:
-        raise PipelineError(f'{path}: "{text}" should be a number, in quotes and with the digits as printed') from None
+        raise PipelineError(
+            f'{path}: "{text}" should be a number, in quotes and with the digits as printed'
+        ) from None
 
 
 def _half_unit(value: Decimal) -> Decimal:

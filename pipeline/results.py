@@ -21,11 +21,14 @@ LISTS = (
     "quality",
     "exclusions",
     "sensor_noise",
+    "shown_at_selection",
     "printed",
 )
 
 
-def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
+def write(
+    path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]
+) -> None:
     """The file; `details` of a comparison as an object, what does not apply as null."""
     content: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -42,7 +45,9 @@ def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame]
         content[table] = tables.records(table, found[table]) if table in found else []
     for row in content["comparisons"]:
         row["details"] = None if row["details"] is None else json.loads(row["details"])
-    path.write_text(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+    path.write_text(
+        json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -79,7 +79,9 @@ def bring_up_to_date(
     entries: dict[str, dict[str, Entry]] = {}
     for stage in stages:
         if stage.scope == "session":
-            entries[stage.name] = _run_sessions(stage, folder, result, sessions, entries, cache, executor, progress)
+            entries[stage.name] = _run_sessions(
+                stage, folder, result, sessions, entries, cache, executor, progress
+            )
             sessions = _still_usable(result, sessions, entries[stage.name])
             _require_something(folder, study, sessions, result)
             result.entries[stage.name] = list(entries[stage.name].values())
@@ -109,20 +111,28 @@ def _declared(study: Study, stage: Stage) -> Study:
 
 def _settings(study: Study, stage: Stage) -> Any:
     # Order matters in mappings too: it is the order in which streams and estimators are shown.
-    return json.loads(study.model_dump_json(include=set(stage.settings))), list(study.streams), list(study.estimators)
+    return (
+        json.loads(study.model_dump_json(include=set(stage.settings))),
+        list(study.streams),
+        list(study.estimators),
+    )
 
 
 def _work(
-    stage: Stage, folder: Path, result: Result, sessions: Sequence[Session], entries: dict[str, dict[str, Entry]]
+    stage: Stage,
+    folder: Path,
+    result: Result,
+    sessions: Sequence[Session],
+    entries: dict[str, dict[str, Entry]],
 ) -> tuple[Work, str]:
     """A piece of work without its folder, and the key of its result."""
     read = {name: _entries_for(entries[name], sessions) for name in stage.reads}
-    inputs = {getattr(result.study, name): "" for name in stage.files if getattr(result.study, name)}
-    inputs = {name: result.inputs[Path(name).as_posix()] for name in inputs}
+    names = [getattr(result.study, field_name) for field_name in stage.files]
+    inputs = {name: result.inputs[Path(name).as_posix()] for name in names if name is not None}
     if stage.reads_log:
         path = sessions[0].path.relative_to(folder.resolve()).as_posix()
         inputs[path] = result.inputs[path]
-    if "study" in stage.files:
+    if stage.names_inputs:
         inputs = dict(result.inputs)
     whole = stage.scope == "study"
     work = Work(
@@ -232,7 +242,9 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
             if stage.scope != "session":
                 raise
             fault = f"{type(error).__name__}: {error}"
-            outcome = Outcome(set_aside=f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}")
+            outcome = Outcome(
+                set_aside=f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}"
+            )
             key = digest_of([key, fault])
         return cache.keep(stage.name, key, out, asdict(outcome))
 

@@ -26,6 +26,7 @@ class Stage:
     settings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     reads_log: bool = False
+    names_inputs: bool = False  # its output lists every file of the study that was read
 
 
 @dataclass(frozen=True)

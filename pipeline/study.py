@@ -180,9 +180,13 @@ class Study(Frozen):
                 _known(f"estimators.{name}.use", stream, self.sensor_streams)
         for comparison in self.comparisons:
             if "condition" not in comparison.within or len(set(comparison.within)) < len(comparison.within):
-                raise ValueError(f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice')
+                raise ValueError(
+                    f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice'
+                )
             if len(comparison.within) > 3 or (len(comparison.within) > 1 and comparison.test != "rm_anova"):
-                raise ValueError(f"comparisons: {comparison.test} does not take within: {list(comparison.within)}")
+                raise ValueError(
+                    f"comparisons: {comparison.test} does not take within: {list(comparison.within)}"
+                )
         if self.sessions is not None:
             _check_pattern(self.sessions)
         if not (self.sessions or self.trials or self.questionnaires or self.measures):
@@ -218,7 +222,9 @@ def _check_pattern(pattern: str) -> None:
     names = _PLACEHOLDER.findall(pattern)
     for name in names:
         if name not in _PLACEHOLDERS:
-            raise ValueError(f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, _PLACEHOLDERS)}')
+            raise ValueError(
+                f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, _PLACEHOLDERS)}'
+            )
     _unique("sessions: placeholder", tuple(names))
     if not names:
         raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
@@ -243,7 +249,9 @@ def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, o
     for key, _ in node.value:
         if isinstance(key, yaml.ScalarNode):
             if key.value in seen:
-                raise yaml.MarkedYAMLError(problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark)
+                raise yaml.MarkedYAMLError(
+                    problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark
+                )
             seen.add(key.value)
     return dict(loader.construct_mapping(node, deep=True))
 
@@ -272,7 +280,9 @@ def read_yaml(path: Path) -> dict[str, Any]:
 def load_study(folder: Path) -> Study:
     """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy."""
     if not folder.is_dir():
-        raise PipelineError(f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it")
+        raise PipelineError(
+            f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it"
+        )
     path = folder / SETTINGS_FILE
     if not path.is_file():
         raise PipelineError(f"{folder}: holds no {SETTINGS_FILE}; studies/README.md shows what goes into one")
@@ -293,12 +303,19 @@ def parse(model: type[_Model], content: dict[str, Any], path: Path) -> _Model:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise PipelineError("\n".join(f"{path}: {_explained(fault, model)}" for fault in error.errors())) from None
+        raise PipelineError(
+            "\n".join(f"{path}: {_explained(fault, model)}" for fault in error.errors())
+        ) from None
 
 
 def _explained(fault: Any, model: type[BaseModel]) -> str:
     """One fault of pydantic's in the user's words."""
-    location = [part for part in fault["loc"] if part not in ("position", "acceleration", "reference", "display", "reach") or part is fault["loc"][0]]
+    location = [
+        part
+        for part in fault["loc"]
+        if part not in ("position", "acceleration", "reference", "display", "reach")
+        or part is fault["loc"][0]
+    ]
     field = ".".join(str(part) for part in location)
     if fault["type"] == "extra_forbidden":
         return f'unknown key "{field}"{did_you_mean(str(location[-1]), _keys_at(model, fault["loc"][:-1]))}'
@@ -367,7 +384,7 @@ def find_sessions(folder: Path, study: Study) -> list[Session]:
             other = sessions[session.id].path.relative_to(root)
             raise PipelineError(
                 f'{folder / SETTINGS_FILE}: sessions: "{other}" and "{path.relative_to(root)}" are both session '
-                f'"{session.id}"; a session\'s id is its file\'s name, rename one'
+                f"\"{session.id}\"; a session's id is its file's name, rename one"
             )
         sessions[session.id] = session
     return [sessions[key] for key in sorted(sessions)]

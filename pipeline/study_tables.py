@@ -17,7 +17,15 @@ MISSING = ("", "NA", "N/A")
 _SHOWN_FAULTS = 5
 
 PARTICIPANT_REQUIRED = ("participant",)
-TRIAL_REQUIRED = ("participant", "condition", "trial", "target_x_mm", "target_y_mm", "selected_x_mm", "selected_y_mm")
+TRIAL_REQUIRED = (
+    "participant",
+    "condition",
+    "trial",
+    "target_x_mm",
+    "target_y_mm",
+    "selected_x_mm",
+    "selected_y_mm",
+)
 TRIAL_OPTIONAL = ("session", "target_z_mm", "selected_z_mm", "start_s", "selection_s")
 RATING_REQUIRED = ("participant", "condition", "questionnaire", "scale", "rating")
 MEASURE_REQUIRED = ("participant", "condition", "measure", "value")
@@ -75,7 +83,11 @@ def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
             faults.append(f'row {line}: "{column}" should be a number, found "{text}"')
     if faults:
         more = f"; and {len(faults) - _SHOWN_FAULTS} more" if len(faults) > _SHOWN_FAULTS else ""
-        hint = " (a decimal comma? use a point)" if any('"' in f and "," in f.split("found")[1] for f in faults) else ""
+        hint = (
+            " (a decimal comma? use a point)"
+            if any('"' in f and "," in f.split("found")[1] for f in faults)
+            else ""
+        )
         raise PipelineError(f"{path}, {'; '.join(faults[:_SHOWN_FAULTS])}{more}{hint}")
     return pd.Series(values, index=table.index, dtype=np.float64)
 
@@ -84,7 +96,9 @@ def _whole_numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
     values = _numbers(path, table, column)
     for line, value in values.items():
         if not (np.isfinite(value) and value == round(value)):
-            raise PipelineError(f'{path}, row {line}: "{column}" should be a whole number, found "{table.at[line, column]}"')
+            raise PipelineError(
+                f'{path}, row {line}: "{column}" should be a whole number, found "{table.at[line, column]}"'
+            )
     return values.astype(np.int64)
 
 
@@ -162,6 +176,10 @@ def participant_facts(table: pd.DataFrame) -> dict[str, Any]:
         if name in columns:
             ages = pd.to_numeric(table[columns[name]], errors="coerce").dropna()
             if len(ages):
-                facts["age"] = {"mean": float(ages.mean()), "min": float(ages.min()), "max": float(ages.max())}
+                facts["age"] = {
+                    "mean": float(ages.mean()),
+                    "min": float(ages.min()),
+                    "max": float(ages.max()),
+                }
             break
     return facts

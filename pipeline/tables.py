@@ -73,7 +73,11 @@ TABLES: Mapping[str, pa.Schema] = {
         ("duration_s", _FLOAT),
     ),
     "measures": _schema(
-        ("participant", _TEXT), ("condition", _TEXT), ("factors", _TEXT), ("measure", _TEXT), ("value", _FLOAT)
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("factors", _TEXT),
+        ("measure", _TEXT),
+        ("value", _FLOAT),
     ),
     "descriptives": _schema(
         ("measure", _TEXT),
@@ -137,6 +141,9 @@ TABLES: Mapping[str, pa.Schema] = {
         ("stated_sd", _FLOAT),
     ),
     "noise_residuals": _schema(("session", _TEXT), ("stream", _TEXT), ("axis", _TEXT), ("residual", _FLOAT)),
+    "shown_at_selection": _schema(
+        ("condition", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("rmse_mm", _FLOAT)
+    ),
     "exclusions": _schema(
         ("participant", _TEXT),
         ("condition", _TEXT),
@@ -168,7 +175,9 @@ def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
         unknown = set(row) - set(columns)
         if unknown:
             raise KeyError(f"table {name} has no column {', '.join(sorted(unknown))}")
-    return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
+    return as_table(
+        name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns)
+    )
 
 
 def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
@@ -237,7 +246,10 @@ NANOSECONDS = 1e-9
 
 
 def samples(
-    time_ns: np.ndarray[Any, Any], arrival_ns: np.ndarray[Any, Any], value: np.ndarray[Any, Any], origin_ns: int
+    time_ns: np.ndarray[Any, Any],
+    arrival_ns: np.ndarray[Any, Any],
+    value: np.ndarray[Any, Any],
+    origin_ns: int,
 ) -> Samples:
     """The crossing into fusion_core: readings by arrival, in seconds since `origin_ns`, each reading once.
 

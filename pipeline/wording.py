@@ -92,7 +92,11 @@ def number(value: float | None, digits: int = 2) -> str:
 
 def percent(value: float | None, digits: int = 1) -> str:
     """A share as percent."""
-    return NOTHING if value is None or not math.isfinite(value) else f"{100 * value:.{digits}f} %".replace("-", MINUS)
+    return (
+        NOTHING
+        if value is None or not math.isfinite(value)
+        else f"{100 * value:.{digits}f} %".replace("-", MINUS)
+    )
 
 
 def seconds(value: float | None) -> str:
@@ -188,7 +192,9 @@ def comparison_sentence(row: Row) -> str:
     if corrected(row):
         parts.append(corrected(row) or "")
     if row["p_adjusted"] is not None:
-        parts.append(p_phrase(row["p_adjusted"], f"{row['adjust'].capitalize().replace('_', ' ')}-adjusted p"))
+        parts.append(
+            p_phrase(row["p_adjusted"], f"{row['adjust'].capitalize().replace('_', ' ')}-adjusted p")
+        )
     parts.append(effect_size(row))
     parts.append(f"n = {row['n']}")
     if row["reduction"] is not None:

@@ -38,7 +38,12 @@ class PlainLines:
 
     def begin(self, stage: str, total: int) -> None:
         """A line that says what is coming."""
-        self._label, self._total, self._done, self._said = _LABELS.get(stage, stage), total, 0, time.monotonic()
+        self._label, self._total, self._done, self._said = (
+            _LABELS.get(stage, stage),
+            total,
+            0,
+            time.monotonic(),
+        )
         warn(f"{self._label} …" if total == 1 else f"{self._label}: {total} sessions …")
 
     def advance(self) -> None:
@@ -58,7 +63,12 @@ class Bars:
     def __init__(self) -> None:
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-        columns = (TextColumn("{task.description:<20}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        columns = (
+            TextColumn("{task.description:<20}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        )
         self._bars = Progress(*columns, transient=True)
         self._task = self._bars.add_task("", total=None, visible=False)
         self.live = self._bars

@@ -47,7 +47,9 @@ def executor_of(jobs: int | None) -> Iterator[Executor]:
         yield pool
 
 
-def results_of(studies: Sequence[Path], stages: Sequence[Stage], jobs: int | None, cache: Path | None) -> Iterator[Result]:
+def results_of(
+    studies: Sequence[Path], stages: Sequence[Stage], jobs: int | None, cache: Path | None
+) -> Iterator[Result]:
     """Each study brought up to date, one after the other."""
     with executor_of(jobs) as executor:
         for folder in studies:
@@ -63,7 +65,9 @@ def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:
     names = [study.resolve().name for study in studies]
     for name in names:
         if names.count(name) > 1:
-            raise PipelineError(f'two studies are called "{name}", and their reports would be one; rename a folder')
+            raise PipelineError(
+                f'two studies are called "{name}", and their reports would be one; rename a folder'
+            )
     return [(out or reports_folder()) / name for name in names]
 
 
@@ -77,7 +81,9 @@ def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: 
     _run(studies, COMPARE, out, jobs, cache)
 
 
-def _run(studies: Sequence[Path], stages: Sequence[Stage], out: Path | None, jobs: int | None, cache: Path | None) -> None:
+def _run(
+    studies: Sequence[Path], stages: Sequence[Stage], out: Path | None, jobs: int | None, cache: Path | None
+) -> None:
     folders = _out_folders(studies, out)
     code = 0
     began = time.monotonic()

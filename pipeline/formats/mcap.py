@@ -46,7 +46,9 @@ _PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond i
 class _Topic:
     """What is gathered of one topic while the file is walked."""
 
-    messages: list[tuple[int, int, int, bytes]] = field(default_factory=list)  # log, publish time, channel, payload
+    messages: list[tuple[int, int, int, bytes]] = field(
+        default_factory=list
+    )  # log, publish time, channel, payload
     in_damaged_chunks: int = 0
 
 
@@ -59,7 +61,9 @@ class _Walk:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     topics: dict[str, _Topic] = field(default_factory=dict)
-    orphans: list[tuple[int, int, int, bytes]] = field(default_factory=list)  # their channel is named later, or never
+    orphans: list[tuple[int, int, int, bytes]] = field(
+        default_factory=list
+    )  # their channel is named later, or never
     facts: dict[str, str] = field(default_factory=dict)
     stated: dict[int, int] | None = None
     faults: list[str] = field(default_factory=list)
@@ -98,13 +102,17 @@ def _walk_file(walk: _Walk, file: BinaryIO, size: int) -> None:
     while not walk.complete:
         head = file.read(_RECORD_HEAD.size)
         if len(head) < _RECORD_HEAD.size:
-            walk.faults.append("the log ends without its summary: it was cut off, or its recorder was stopped")
+            walk.faults.append(
+                "the log ends without its summary: it was cut off, or its recorder was stopped"
+            )
             walk.unknown_loss = True
             return
         opcode, length = _RECORD_HEAD.unpack(head)
         if length > size - file.tell():
             what = "a chunk of messages" if opcode == Opcode.CHUNK else "a record"
-            walk.faults.append(f"the log is cut off, or damaged, {file.tell()} bytes in: {what} is not all there")
+            walk.faults.append(
+                f"the log is cut off, or damaged, {file.tell()} bytes in: {what} is not all there"
+            )
             walk.unknown_loss = True
             return
         body = file.read(length)
@@ -124,7 +132,9 @@ def _adopt_orphans(walk: _Walk) -> None:
             walk.topics[channel.topic].messages.append(message)
     nameless = sum(message[2] not in walk.channels for message in walk.orphans)
     if nameless:
-        walk.faults.append(f"{nameless} messages are left out: the log does not say what topic they belong to")
+        walk.faults.append(
+            f"{nameless} messages are left out: the log does not say what topic they belong to"
+        )
         walk.unknown_loss = True
 
 
@@ -204,7 +214,9 @@ def _take_message_record(walk: _Walk, opcode: int, body: bytes) -> None:
         assert isinstance(schema, Schema)  # noqa: S101
         before = walk.schemas.setdefault(schema.id, schema)
         if (before.name, before.encoding, before.data) != (schema.name, schema.encoding, schema.data):
-            raise SessionError(f'schema {schema.id} is defined twice, as "{before.name}" and as "{schema.name}"')
+            raise SessionError(
+                f'schema {schema.id} is defined twice, as "{before.name}" and as "{schema.name}"'
+            )
 
 
 def _take_chunk(walk: _Walk, body: bytes) -> None:
@@ -295,7 +307,9 @@ def _lost(walk: _Walk, topic: str, undecodable: int) -> int | None:
     """How many messages the log says it held and that are not there; None where it does not say."""
     gathered = walk.topics[topic]
     if walk.stated is not None:
-        stated = sum(walk.stated.get(key, 0) for key, channel in walk.channels.items() if channel.topic == topic)
+        stated = sum(
+            walk.stated.get(key, 0) for key, channel in walk.channels.items() if channel.topic == topic
+        )
         return max(stated - len(gathered.messages), gathered.in_damaged_chunks) + undecodable
     if walk.unknown_loss:
         return None
@@ -310,7 +324,9 @@ def _counted(factory: DecoderFactory, channel: Channel, schema: Schema | None, p
     return None, [], None
 
 
-def _ros(factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes, content: str) -> object:
+def _ros(
+    factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes, content: str
+) -> object:
     """A CDR message by the stock decoder, once its type and length are what they must be."""
     needed = SCHEMAS[content]
     if schema is None or schema.name != needed:
@@ -337,7 +353,9 @@ def _position(factory: DecoderFactory, channel: Channel, schema: Schema | None, 
     return _stamp(message), _plausible([point.x, point.y, point.z], "position"), None
 
 
-def _acceleration(factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes) -> Decoded:
+def _acceleration(
+    factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes
+) -> Decoded:
     message = _ros(factory, channel, schema, payload, "acceleration")
     force, rate, turn = message.linear_acceleration, message.angular_velocity, message.orientation  # type: ignore[attr-defined]
     motion = _plausible([force.x, force.y, force.z, rate.x, rate.y, rate.z], "acceleration")
@@ -443,14 +461,18 @@ def write(path: Path, facts: Mapping[str, str], messages: Iterable[Message]) -> 
         schemas = {
             "position": writer.register_schema(SCHEMAS["position"], "ros2msg", _POINT_STAMPED.encode()),
             "acceleration": writer.register_schema(SCHEMAS["acceleration"], "ros2msg", _IMU.encode()),
-            "events": writer.register_schema("steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA).encode()),
+            "events": writer.register_schema(
+                "steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA).encode()
+            ),
         }
         channels: dict[str, int] = {}
         encode = _Encoder()
         for sequence, message in enumerate(messages):
             if message.topic not in channels:
                 encoding = "json" if message.content == "events" else "cdr"
-                channels[message.topic] = writer.register_channel(message.topic, encoding, schemas[message.content])
+                channels[message.topic] = writer.register_channel(
+                    message.topic, encoding, schemas[message.content]
+                )
             writer.add_message(
                 channels[message.topic], message.arrival_ns, encode(message), message.stamp_ns, sequence
             )
@@ -471,7 +493,9 @@ class _Encoder:
         if message.event is not None:
             return json.dumps(message.event, allow_nan=False).encode()
         assert message.values is not None  # noqa: S101
-        header = {"stamp": dict(zip(("sec", "nanosec"), divmod(message.stamp_ns, 1_000_000_000), strict=True))}
+        header = {
+            "stamp": dict(zip(("sec", "nanosec"), divmod(message.stamp_ns, 1_000_000_000), strict=True))
+        }
         values = [float(value) for value in message.values]
         if message.content == "position":
             return bytes(self._position({"header": {**header, "frame_id": "tracker"}, "point": _xyz(values)}))
@@ -480,7 +504,10 @@ class _Encoder:
             self._imu(
                 {
                     "header": {**header, "frame_id": "phone"},
-                    "orientation": {**_xyz(values[6:9] if known else [0.0] * 3), "w": values[9] if known else 1.0},
+                    "orientation": {
+                        **_xyz(values[6:9] if known else [0.0] * 3),
+                        "w": values[9] if known else 1.0,
+                    },
                     "orientation_covariance": [0.0 if known else -1.0] + [0.0] * 8,
                     "angular_velocity": _xyz(values[3:6]),
                     "angular_velocity_covariance": [0.0] * 9,

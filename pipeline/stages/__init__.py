@@ -66,7 +66,7 @@ STAGES: tuple[Stage, ...] = (
         "pipeline.stages.report:run",
         reads=("ingest", "fuse", "assess", "measure", "compare"),
         settings=tuple(Study.model_fields),
-        files=("study",),
+        names_inputs=True,
     ),
 )
 

@@ -24,7 +24,8 @@ def run(work: Work) -> Outcome:
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
     tracks = {
-        name: rows for name, rows in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False)
+        name: rows
+        for name, rows in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False)
     }
     rows = [_accuracy(work, loaded, name, rows) for name, rows in tracks.items()]
     tables.write("accuracy", tables.frame("accuracy", [row for row in rows if row]), work.out)
@@ -128,7 +129,9 @@ def _trials(work: Work, events: pd.DataFrame, tracks: dict[Any, pd.DataFrame]) -
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
     starts = events[events["type"] == "trial_start"]
     selections = events[events["type"] == "selection"]
-    for index, (start, following) in enumerate(zip(starts.itertuples(), starts["time_ns"].shift(-1), strict=True)):
+    for index, (start, following) in enumerate(
+        zip(starts.itertuples(), starts["time_ns"].shift(-1), strict=True)
+    ):
         after = selections[selections["time_ns"] >= start.time_ns]
         if not pd.isna(following):
             after = after[after["time_ns"] < following]
@@ -142,7 +145,10 @@ def _trials(work: Work, events: pd.DataFrame, tracks: dict[Any, pd.DataFrame]) -
             yield trial | {"estimator": "recorded"}
             continue
         selection = after.iloc[0]
-        target = {axis: _first(selection[f"target_{axis}_mm"], getattr(start, f"target_{axis}_mm")) for axis in "xyz"}
+        target = {
+            axis: _first(selection[f"target_{axis}_mm"], getattr(start, f"target_{axis}_mm"))
+            for axis in "xyz"
+        }
         axes = [axis for axis in "xyz" if target[axis] is not None]
         duration_s = float(selection["time_ns"] - start.time_ns) * tables.NANOSECONDS
         shown: dict[str, pd.Series] = {"recorded": selection}

@@ -50,8 +50,13 @@ def run(work: Work) -> Outcome:
     for name in _SESSION_TABLES:
         entries = work.entries["ingest" if name == "quality" else "assess"]
         found[name] = _without_excluded(study, work, tables.read(name, entries))
+    found["shown_at_selection"] = tables.frame(
+        "shown_at_selection", shown_at_selection(study, found["trials"])
+    )
     if study.printed is not None:
-        found["printed"] = compare_printed(work.folder / study.printed, found["descriptives"], found["comparisons"], study.alpha)
+        found["printed"] = compare_printed(
+            work.folder / study.printed, found["descriptives"], found["comparisons"], study.alpha
+        )
     for name, table in found.items():
         tables.write(name, table, work.out)
     results.write(work.out / "results.json", work.study_name, study, found, _people(work, measures))
@@ -102,7 +107,9 @@ def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataF
 def participant_means(study: Study, measures: pd.DataFrame, measure: str) -> pd.DataFrame:
     """A row a participant, a column a condition in the study's order: means over everything else, NaN if missing."""
     rows = measures[measures["measure"] == measure]
-    wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean", sort=True)
+    wide = rows.pivot_table(
+        index="participant", columns="condition", values="value", aggfunc="mean", sort=True
+    )
     return wide.reindex(columns=list(study.conditions))
 
 
@@ -143,6 +150,23 @@ def _root_rows(rows: Iterable[Row]) -> list[Row]:
     ]
 
 
+def shown_at_selection(study: Study, trials: pd.DataFrame) -> list[Row]:
+    """What each estimator would have shown when people selected: √(mean over participants of their MSEs)."""
+    if set(trials["estimator"]) <= {"recorded"}:
+        return []
+    rows = []
+    known = trials[trials["squared_error_mm2"].notna()]
+    squared = known.groupby(["condition", "estimator", "participant"], sort=False)["squared_error_mm2"].mean()
+    for condition in study.conditions:
+        for estimator in dict.fromkeys(known["estimator"]):
+            if (condition, estimator) in squared.index:
+                people = squared.loc[(condition, estimator)]
+                rmse_mm = float(np.sqrt(people.mean()))
+                row = {"condition": condition, "estimator": estimator, "n": len(people), "rmse_mm": rmse_mm}
+                rows.append(row)
+    return rows
+
+
 def comparisons(study: Study, measures: pd.DataFrame) -> tuple[list[Row], list[Row]]:
     """Every row of `comparisons`, and the exclusions that came of incomplete participants."""
     rows: list[Row] = []
@@ -174,7 +198,9 @@ def _matching(entry: Comparison, known: Sequence[str]) -> list[str]:
     return found
 
 
-def _compare(study: Study, entry: Comparison, measure: str, measures: pd.DataFrame, left_out: list[Row]) -> list[Row]:
+def _compare(
+    study: Study, entry: Comparison, measure: str, measures: pd.DataFrame, left_out: list[Row]
+) -> list[Row]:
     if len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons: need two conditions or more, and conditions lists one")
     if len(entry.within) > 1:
@@ -225,7 +251,10 @@ def _factorial(
 def _list_incomplete(entry: Comparison, measure: str, wide: pd.DataFrame, left_out: list[Row]) -> None:
     """Who is left out of a comparison because a cell is missing (listwise)."""
     for participant in wide.index[wide.isna().any(axis=1)]:
-        absent = [column if isinstance(column, str) else " × ".join(column) for column in wide.columns[wide.loc[participant].isna()]]
+        absent = [
+            column if isinstance(column, str) else " × ".join(column)
+            for column in wide.columns[wide.loc[participant].isna()]
+        ]
         left_out.append(
             {
                 "participant": participant,

@@ -19,7 +19,12 @@ from pipeline.study import Session, Stream, Study
 
 MM_PER_M = 1000.0
 _NEEDED = ("position", "acceleration")  # without these a session has nothing to fuse
-_CONTENT = {"acceleration": "acceleration", "position": "position", "reference": "position", "display": "position"}
+_CONTENT = {
+    "acceleration": "acceleration",
+    "position": "position",
+    "reference": "position",
+    "display": "position",
+}
 
 
 def run(work: Work) -> Outcome:
@@ -45,7 +50,9 @@ def run(work: Work) -> Outcome:
             tables.write(name, pd.concat(parts), work.out)
     tables.write("events", events, work.out)
     tables.write("quality", tables.frame("quality", quality), work.out)
-    in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
+    in_part += [
+        f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]
+    ]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
 
@@ -56,7 +63,9 @@ def _who(session: Session, log: Log, study: Study) -> tuple[str, str]:
         fact = log.facts.get(what)
         by_fact = unicodedata.normalize("NFC", fact) if fact else None
         if by_name and by_fact and by_name != by_fact:
-            raise SessionError(f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them')
+            raise SessionError(
+                f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them'
+            )
         found = by_name or by_fact
         if not found:
             raise SessionError(f"neither its name nor its metadata says which {what} it is")

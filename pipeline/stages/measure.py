@@ -122,7 +122,9 @@ def _tabled_values(work: Work) -> Iterator[pd.DataFrame]:
         yield _values(ratings, "", "rating", str(work.study.questionnaires)).assign(measure=names)
     if measures is not None:
         table, factors = study_tables.read_measures(measures, conditions)
-        rows = _values(table.assign(session=None), "", "value", str(work.study.measures)).assign(measure=table["measure"])
+        rows = _values(table.assign(session=None), "", "value", str(work.study.measures)).assign(
+            measure=table["measure"]
+        )
         if factors:
             told = [json.dumps(dict(zip(factors, row, strict=True))) for row in table[factors].to_numpy()]
             rows["factors"] = told
@@ -139,7 +141,9 @@ def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
     return hit.astype(bool)
 
 
-def _without_excluded(study: Study, values: pd.DataFrame, trials: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
+def _without_excluded(
+    study: Study, values: pd.DataFrame, trials: pd.DataFrame, exclusions: list[Row]
+) -> pd.DataFrame:
     """The values that stay; an exclusion that fits nothing in the data is an error, for it is likely misspelt."""
     values = values.reset_index(drop=True)
     for excluded in study.exclusions:
@@ -149,7 +153,9 @@ def _without_excluded(study: Study, values: pd.DataFrame, trials: pd.DataFrame, 
                 known |= set(trials[column].dropna())
             if wanted is not None and wanted not in known:
                 hint = did_you_mean(wanted, sorted(known))
-                raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
+                raise PipelineError(
+                    f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}'
+                )
         values = values[~_matches(excluded, values)]
         exclusions.append(
             {
@@ -178,7 +184,9 @@ def _unselected(trials: pd.DataFrame) -> list[Row]:
     recorded = trials[trials["estimator"] == "recorded"]
     missing = recorded[recorded["squared_error_mm2"].isna()]
     rows = []
-    for (participant, condition, session), found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
+    for (participant, condition, session), found in missing.groupby(
+        [*CELL, "session"], dropna=False, sort=True
+    ):
         named = ", ".join(str(trial) for trial in found["trial"][:10]) + (", …" if len(found) > 10 else "")
         rows.append(
             {
@@ -219,14 +227,17 @@ def _cells(values: pd.DataFrame) -> pd.DataFrame:
 
 def _totals(cells: pd.DataFrame) -> pd.DataFrame:
     """`<questionnaire>/total`: a participant's sum over the scales; none where a scale is missing."""
-    parts = cells["measure"].str.partition("/")
-    ratings = cells[(parts[1] == "/")].assign(questionnaire=parts[0], scale=parts[2])
+    parts = [str(measure).partition("/") for measure in cells["measure"]]
+    told = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
+    ratings = told[told["scale"] != ""]
     rows = []
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
         scales = set(answered["scale"])
         if "total" in scales:
             continue
-        for (participant, condition, factors), cell in answered.groupby([*CELL, "factors"], dropna=False, sort=False):
+        for (participant, condition, factors), cell in answered.groupby(
+            [*CELL, "factors"], dropna=False, sort=False
+        ):
             if set(cell["scale"]) == scales and len(scales) > 1:
                 rows.append((participant, condition, factors, f"{questionnaire}/total", cell["value"].sum()))
     return pd.DataFrame(rows, columns=[*CELL, "factors", "measure", "value"])
@@ -237,7 +248,9 @@ def _check_sources(values: pd.DataFrame) -> None:
     sources = values.groupby("measure")["source"].unique()
     for measure, found in sources.items():
         if len(found) > 1:
-            raise PipelineError(f'"{measure}" stands both in {found[0]} and in {found[1]}; rename one of them')
+            raise PipelineError(
+                f'"{measure}" stands both in {found[0]} and in {found[1]}; rename one of them'
+            )
 
 
 def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
@@ -250,10 +263,16 @@ def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
         for participant in sorted(listed - set(named)):
             hint = did_you_mean(participant, sorted(named)) if len(named) else ""
             rows.append(
-                {"participant": participant, "what": "not in participants", "reason": f"kept; check its spelling{hint}"}
+                {
+                    "participant": participant,
+                    "what": "not in participants",
+                    "reason": f"kept; check its spelling{hint}",
+                }
             )
         listed |= set(named)
-    excluded = {e.participant for e in work.study.exclusions if e.participant and not (e.measure or e.session)}
+    excluded = {
+        e.participant for e in work.study.exclusions if e.participant and not (e.measure or e.session)
+    }
     seen = set(zip(measures["participant"], measures["condition"], strict=True))
     seen |= {(session.participant, session.condition) for session in work.sessions}
     for participant in sorted(listed):

@@ -60,7 +60,9 @@ def _result(effect: str, n: int, **known: Any) -> Result:
     )
 
 
-def _tested(effect: str, scores: FloatArray, error: float, other_variation: float, values: FloatArray) -> Result:
+def _tested(
+    effect: str, scores: FloatArray, error: float, other_variation: float, values: FloatArray
+) -> Result:
     n, contrasts = scores.shape
     explained = float(n * np.sum(scores.mean(axis=0) ** 2))
     df1, df2 = float(contrasts), float(contrasts * (n - 1))

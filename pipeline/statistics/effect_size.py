@@ -71,6 +71,10 @@ def partial_eta_squared_interval(
 
 
 def _solve(function: Callable[[float], float], low: float, high: float) -> float | None:
-    if not np.isfinite(function(low)) or not np.isfinite(function(high)) or function(low) * function(high) > 0:
+    if (
+        not np.isfinite(function(low))
+        or not np.isfinite(function(high))
+        or function(low) * function(high) > 0
+    ):
         return None
     return float(optimize.brentq(function, low, high, xtol=1e-10, rtol=1e-12))

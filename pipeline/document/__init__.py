@@ -1,0 +1,1 @@
+"""A report as one model and two renderers: HTML and PDF."""

@@ -1,0 +1,37 @@
+"""A document as one self-contained HTML file: no script, no network."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+
+import jinja2
+
+from pipeline.document.model import Document, numbered
+
+_HERE = Path(__file__).parent
+
+
+def render(document: Document, figures: Path, path: Path) -> None:
+    """Write the page; `figures` is the folder of the SVG files it shows."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.tests["strong"] = lambda part: not isinstance(part, str)
+    environment.filters["kind"] = lambda block: type(block).__name__
+
+    def picture(name: str) -> str:
+        """An SVG as a data address: as an image of its own, its ids cannot clash with another's."""
+        return "data:image/svg+xml;base64," + base64.b64encode((figures / name).read_bytes()).decode()
+
+    page = environment.get_template("report.html.jinja").render(
+        document=document,
+        names=numbered(document),
+        style=(_HERE / "style.css").read_text(encoding="utf-8"),
+        picture=picture,
+    )
+    path.write_text(page, encoding="utf-8")

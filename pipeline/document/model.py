@@ -1,0 +1,117 @@
+"""What a report is made of. Text is data: only the renderers know markup, and they escape everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Strong:
+    """Words that carry the weight of a sentence."""
+
+    text: str
+
+
+Text = tuple[str | Strong, ...]
+
+
+def plain(text: Text) -> str:
+    """The words alone."""
+    return "".join(part if isinstance(part, str) else part.text for part in text)
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Running text."""
+
+    text: Text
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something to be careful about, set apart."""
+
+    title: str
+    texts: tuple[Text, ...]
+    kind: Literal["care", "information"] = "care"
+
+
+@dataclass(frozen=True)
+class KeyFigure:
+    """A number people look for first, what it is, and its evidence."""
+
+    value: str
+    label: str
+    evidence: str
+
+
+@dataclass(frozen=True)
+class KeyFigures:
+    """A few of them side by side."""
+
+    figures: tuple[KeyFigure, ...]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A table's column; numbers stand to the right."""
+
+    title: str
+    numeric: bool = True
+
+
+@dataclass(frozen=True)
+class Table:
+    """A caption that says what to see, columns, and rows of text; the first cell of a row is its heading."""
+
+    id: str
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture by its file's name in the report's figures, what to see in it, and what it shows for who cannot."""
+
+    id: str
+    file: str
+    caption: str
+    alt: str
+
+
+Block = Paragraph | Notice | KeyFigures | Table | Figure
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what follows."""
+
+    id: str
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole report. `origin` says where the data come from; every page carries it."""
+
+    title: str
+    subtitle: str
+    origin: str
+    sections: tuple[Section, ...]
+
+
+def numbered(document: Document) -> dict[str, str]:
+    """`Table 1`, `Figure 1`, … by id, in the order of the document."""
+    names: dict[str, str] = {}
+    counts = {"Table": 0, "Figure": 0}
+    for section in document.sections:
+        for block in section.blocks:
+            if isinstance(block, Table | Figure):
+                kind = type(block).__name__
+                counts[kind] += 1
+                names[block.id] = f"{kind} {counts[kind]}"
+    return names

@@ -1,0 +1,104 @@
+"""A document as a tagged PDF (PDF/UA-1, PDF/A-2a), set by typst; identical for identical input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pipeline.document.model import (
+    Block,
+    Document,
+    Figure,
+    KeyFigures,
+    Notice,
+    Paragraph,
+    Table,
+    Text,
+    numbered,
+)
+
+_HERE = Path(__file__).parent
+_STANDARDS = ["ua-1", "a-2a"]
+
+
+def render(document: Document, figures: Path, path: Path) -> None:
+    """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
+    import typst
+
+    data = json.dumps(_content(document), ensure_ascii=False)
+    typst.compile(
+        (_HERE / "report.typ").read_bytes(),
+        output=str(path),
+        root=str(figures.resolve()),
+        ignore_system_fonts=True,
+        sys_inputs={"document": data},
+        pdf_standards=_STANDARDS,
+        timestamp=0,
+    )
+
+
+def _content(document: Document) -> dict[str, Any]:
+    """The document as plain data; typst takes it as text, never as markup."""
+    names = numbered(document)
+    return {
+        "title": document.title,
+        "subtitle": document.subtitle,
+        "origin": document.origin,
+        "sections": [
+            {"title": section.title, "blocks": [_block(block, names) for block in section.blocks]}
+            for section in document.sections
+        ],
+    }
+
+
+def _text(text: Text) -> list[dict[str, Any]]:
+    return [
+        {"text": part, "strong": False} if isinstance(part, str) else {"text": part.text, "strong": True}
+        for part in text
+    ]
+
+
+def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
+    match block:
+        case Paragraph():
+            return {"kind": "paragraph", "text": _text(block.text)}
+        case Notice():
+            return {
+                "kind": "notice",
+                "title": block.title,
+                "care": block.kind == "care",
+                "texts": [_text(text) for text in block.texts],
+            }
+        case KeyFigures():
+            return {"kind": "key-figures", "figures": [vars(figure) for figure in block.figures]}
+        case Table():
+            return {
+                "kind": "table",
+                "name": names[block.id],
+                "caption": block.caption,
+                "columns": [vars(column) for column in block.columns],
+                "rows": [list(row) for row in block.rows],
+                "note": block.note,
+                "shares": _shares(block),
+            }
+        case Figure():
+            return {
+                "kind": "figure",
+                "name": names[block.id],
+                "file": block.file,
+                "caption": block.caption,
+                "alt": block.alt,
+            }
+
+
+def _shares(table: Table) -> list[float]:
+    """How wide each column wants to be, from its longest cells: text may wrap, numbers may not."""
+    wanted = []
+    for index, column in enumerate(table.columns):
+        cells = [len(row[index]) for row in table.rows]
+        longest, heading = max(cells, default=1), max((len(word) for word in column.title.split()), default=1)
+        typical = sum(cells) / max(len(cells), 1)
+        width = longest if column.numeric else min(longest, max(12, 1.6 * typical))
+        wanted.append(float(max(width, heading) + 2))
+    return wanted

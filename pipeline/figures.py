@@ -1,0 +1,298 @@
+"""Tables to figures: one function a figure, one look for all. Colours are told apart by the colour-blind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import matplotlib.ticker
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy import stats
+
+from pipeline.wording import MINUS, measure_label, short_label, unit_of
+
+FloatArray = npt.NDArray[np.float64]
+
+# Okabe and Ito (2008), darkest first, so that neighbours also differ in print without colour.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_GREY = "#6b757d"
+_WIDTH = 7.2  # inches: a page's text
+_MARKS_MAX = 2000  # beyond it marks are drawn as an image, or a file grows to megabytes
+
+_STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.4,
+    "figure.constrained_layout.use": True,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "steadyhand",
+    "savefig.dpi": 200,
+}
+
+
+def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:
+    """Draw in the house's style and save as SVG, the same bytes for the same data."""
+    with mpl.rc_context(_STYLE):
+        function(*arguments).savefig(path, format="svg", metadata={"Date": None, "Creator": "Steadyhand"})
+
+
+def _axes(rows: int = 1, columns: int = 1, height: float = 3.0, **options: Any) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=(_WIDTH, height))
+    return figure, list(np.atleast_1d(figure.subplots(rows, columns, **options)).ravel())
+
+
+def _mean_and_interval(values: FloatArray) -> tuple[float, float]:
+    """Mean and half the width of its 95 % t interval; zero width for a single value."""
+    if len(values) < 2:
+        return float(np.mean(values)), 0.0
+    half = stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
+    return float(np.mean(values)), float(half)
+
+
+# Participants and conditions ------------------------------------------------------------------------------------
+
+
+def paired(wide: pd.DataFrame, measure: str) -> Figure:
+    """Each participant in each condition, with means and 95 % intervals; for two conditions the differences too.
+
+    `wide` has a row a participant and a column a condition.
+    """
+    conditions = list(wide.columns)
+    complete = wide.dropna()
+    two = len(conditions) == 2 and len(complete) > 1
+    options: dict[str, Any] = {"gridspec_kw": {"width_ratios": [2.2, 1]}} if two else {}
+    figure, axes = _axes(1, 2 if two else 1, 3.3, **options)
+    values = axes[0]
+    at = np.arange(len(conditions))
+    for _, row in complete.iterrows():
+        values.plot(at, row.to_numpy(np.float64), color=_GREY, alpha=0.45, linewidth=0.8, zorder=1)
+    for index, condition in enumerate(conditions):
+        column = wide[condition].dropna().to_numpy(np.float64)
+        if len(column):
+            values.scatter(
+                np.full(len(column), index), column, s=16, color=COLOURS[index % 7], alpha=0.55, zorder=2
+            )
+            _interval(values, index, column, COLOURS[index % 7], MARKERS[index % 7])
+    values.set_xticks(at, conditions)
+    values.set_xlim(-0.5, len(conditions) - 0.5)
+    values.set_ylabel(measure_label(measure))
+    values.set_title(f"Participants (n = {len(complete)}), mean and 95 % interval")
+    if not np.nanmin(wide.to_numpy(np.float64)) < 0:
+        values.set_ylim(bottom=0)
+    if two:
+        _differences(axes[1], complete, measure)
+    return figure
+
+
+def _interval(axes: Axes, at: float, values: FloatArray, colour: str, marker: str) -> None:
+    mean, half = _mean_and_interval(values)
+    axes.errorbar(
+        [at + 0.13],
+        [mean],
+        yerr=[half],
+        fmt=marker,
+        color=colour,
+        markersize=8,
+        markeredgecolor="white",
+        capsize=4,
+        linewidth=2,
+        zorder=3,
+    )
+
+
+def _differences(axes: Axes, complete: pd.DataFrame, measure: str) -> None:
+    first, second = complete.columns
+    difference = (complete[first] - complete[second]).to_numpy(np.float64)
+    spread = np.linspace(-0.08, 0.08, len(difference))
+    axes.axhline(0, color=_GREY, linewidth=0.8)
+    axes.scatter(spread, np.sort(difference), s=16, color=COLOURS[2], alpha=0.6)
+    _interval(axes, 0.08, difference, COLOURS[2], "D")
+    axes.set_xticks([0], [f"{first} {MINUS} {second}"])
+    axes.set_xlim(-0.5, 0.7)
+    unit = unit_of(measure)
+    axes.set_ylabel(f"Difference ({unit})" if unit else "Difference")
+    axes.set_title("Differences")
+
+
+def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
+    """Box plots of every scale of a questionnaire, a box a condition, with the participants' ratings on them."""
+    figure, (axes,) = _axes(height=3.4)
+    conditions = list(next(iter(wide.values())).columns)
+    width = 0.8 / len(conditions)
+    for index, condition in enumerate(conditions):
+        colour = COLOURS[index % 7]
+        centres = np.arange(len(wide)) + (index - (len(conditions) - 1) / 2) * width
+        ratings = [table[condition].dropna().to_numpy(np.float64) for table in wide.values()]
+        axes.boxplot(
+            ratings,
+            positions=centres,
+            widths=0.75 * width,
+            showfliers=False,
+            patch_artist=True,
+            boxprops={"facecolor": colour, "alpha": 0.3, "edgecolor": colour},
+            medianprops={"color": colour, "linewidth": 2.2},
+            whiskerprops={"color": colour},
+            capprops={"color": colour},
+            manage_ticks=False,
+        )
+        for centre, values in zip(centres, ratings, strict=True):
+            spread = np.linspace(-0.22, 0.22, len(values)) * width
+            axes.scatter(
+                centre + spread, np.sort(values), s=9, color=colour, marker=MARKERS[index % 7], alpha=0.8
+            )
+        axes.plot([], [], color=colour, marker=MARKERS[index % 7], linewidth=5, alpha=0.6, label=condition)
+    axes.set_xticks(np.arange(len(wide)), [short_label(measure) for measure in wide])
+    axes.set_ylabel("Rating")
+    axes.legend(loc="upper left", bbox_to_anchor=(0, 1.12), ncols=min(len(conditions), 6))
+    return figure
+
+
+# Sensors and estimators -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class View:
+    """A stretch of one session along one axis. Each stream is (time in s, value); tracks (time, mean, SD)."""
+
+    axis: str
+    frames: tuple[FloatArray, FloatArray]
+    reference: tuple[FloatArray, FloatArray] | None = None
+    accelerations: tuple[FloatArray, FloatArray] | None = None
+    tracks: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]] = field(default_factory=dict)
+
+
+def streams(view: View) -> Figure:
+    """The tracker's frames as they arrive with the reference, and the accelerations below (paper, Fig. 6)."""
+    rows = 1 if view.accelerations is None else 2
+    figure, axes = _axes(rows, 1, 1.2 + 1.9 * rows, sharex=True)
+    if view.reference is not None:
+        axes[0].plot(*view.reference, color=COLOURS[6], label="reference")
+    axes[0].scatter(*view.frames, s=14, color=COLOURS[1], label="tracker, as it arrives", zorder=3)
+    axes[0].set_ylabel(f"Position, {view.axis} (mm)")
+    axes[0].legend(loc="upper left", bbox_to_anchor=(0, 1.18), ncols=2)
+    if view.accelerations is not None:
+        axes[1].plot(*view.accelerations, color=COLOURS[0], linewidth=1)
+        axes[1].set_ylabel(f"Acceleration, {view.axis} (mm/s²)")
+    axes[-1].set_xlabel("Time since the session's start (s)")
+    return figure
+
+
+def estimates(view: View) -> Figure:
+    """Each estimator's mean and two SDs with the reference and the frames (paper, Figs. 7 and 8)."""
+    names = list(view.tracks)
+    figure, axes = _axes(len(names), 1, 0.7 + 1.65 * len(names), sharex=True, sharey=True)
+    means = np.concatenate([mean for _, mean, _ in view.tracks.values()])
+    seen = np.concatenate(
+        [means, view.frames[1]] + ([view.reference[1]] if view.reference is not None else [])
+    )
+    margin = 0.15 * float(np.ptp(seen)) + 1
+    for index, (panel, name) in enumerate(zip(axes, names, strict=True)):
+        time, mean, sd = view.tracks[name]
+        colour = COLOURS[index % 6]
+        panel.fill_between(
+            time, mean - 2 * sd, mean + 2 * sd, color=colour, alpha=0.2, linewidth=0, label="± 2 SD"
+        )
+        panel.plot(time, mean, color=colour, label="estimate")
+        if view.reference is not None:
+            panel.plot(
+                *view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference"
+            )
+        panel.scatter(*view.frames, s=7, color=_GREY, label="tracker, as it arrives", zorder=3)
+        panel.set_title(name)
+        panel.set_ylabel(f"{view.axis} (mm)")
+    axes[0].set_ylim(float(seen.min()) - margin, float(seen.max()) + margin)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    axes[-1].set_xlabel("Time since the session's start (s)")
+    return figure
+
+
+def lead(curves: Mapping[str, tuple[FloatArray, FloatArray]], peaks: Mapping[str, float]) -> Figure:
+    """Cross-correlation of each estimator with the tracker as it arrived, peaks marked (paper, Fig. 9)."""
+    figure, (axes,) = _axes(height=3.0)
+    for index, (name, (shift, correlation)) in enumerate(curves.items()):
+        inside = np.abs(shift) <= 0.5
+        scaled = correlation[inside] / np.max(np.abs(correlation[inside]))
+        colour = COLOURS[index % 7]
+        axes.plot(1000 * shift[inside], scaled, color=colour, label=name)
+        peak = peaks.get(name)
+        if peak is not None and np.isfinite(peak):
+            height = float(np.interp(peak, shift[inside], scaled))
+            axes.plot(
+                [1000 * peak],
+                [height],
+                MARKERS[index % 7],
+                color=colour,
+                markersize=7,
+                markeredgecolor="white",
+            )
+    axes.axvline(0, color=_GREY, linewidth=0.8)
+    axes.set_xlabel("Lead over the tracker (ms); to the right: ahead of it")
+    axes.set_ylabel("Cross-correlation\n(share of its peak)")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def errors(accuracy: pd.DataFrame) -> Figure:
+    """RMSE and lag of every estimator: a mark a session, and the mean over sessions."""
+    names = list(dict.fromkeys(accuracy["estimator"]))
+    figure, axes = _axes(1, 2, 1.1 + 0.36 * len(names), sharey=True)
+    for index, name in enumerate(names):
+        rows = accuracy[accuracy["estimator"] == name]
+        colour, marker = COLOURS[index % 7], MARKERS[index % 7]
+        for panel, values in ((axes[0], rows["rmse_mm"]), (axes[1], 1000 * rows["lag_s"])):
+            known = values.dropna().to_numpy(np.float64)
+            panel.scatter(known, np.full(len(known), index), s=16, color=colour, alpha=0.5)
+            if len(known):
+                panel.plot(
+                    [known.mean()], [index], marker, color=colour, markersize=9, markeredgecolor="white"
+                )
+    axes[0].set_yticks(range(len(names)), names)
+    axes[0].invert_yaxis()
+    largest, smallest = accuracy["rmse_mm"].max(), accuracy["rmse_mm"].min()
+    if largest > 10 * smallest:
+        axes[0].set_xscale("log")
+        axes[0].xaxis.set_major_formatter(mpl.ticker.ScalarFormatter())
+    else:
+        axes[0].set_xlim(left=0)
+    axes[0].set_xlabel("RMSE against the reference (mm)")
+    axes[1].axvline(0, color=_GREY, linewidth=0.8)
+    axes[1].set_xlabel("Lag behind the reference (ms)")
+    for panel in axes:
+        panel.grid(axis="y", color="#e3e7ea", linewidth=0.8)
+        panel.set_axisbelow(True)
+    return figure
+
+
+def noise(residuals: Sequence[FloatArray], units: Sequence[str], names: Sequence[str]) -> Figure:
+    """Histogram of each sensor's readings in still stretches with the Gaussian of the same SD."""
+    figure, axes = _axes(1, len(names), 2.9)
+    for index, (panel, values, unit, name) in enumerate(zip(axes, residuals, units, names, strict=True)):
+        sd = float(np.sqrt(np.mean(values**2)))
+        reach = 4 * sd
+        bins = int(np.clip(np.sqrt(len(values)), 12, 60))
+        panel.hist(
+            values, bins=bins, range=(-reach, reach), density=True, color=COLOURS[index % 7], alpha=0.35
+        )
+        grid = np.linspace(-reach, reach, 200)
+        panel.plot(grid, stats.norm.pdf(grid, scale=sd), color=COLOURS[index % 7], linewidth=2)
+        panel.set_xlabel(f"Reading {MINUS} slow drift ({unit})")
+        panel.set_title(f"{name}: SD {sd:.3g} {unit}")
+        panel.set_yticks([])
+        panel.spines["left"].set_visible(False)
+    return figure

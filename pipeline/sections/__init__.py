@@ -1,0 +1,23 @@
+"""A report's sections in order: each from a study's tables to a Section, or to None where it has nothing to show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.document.model import Section
+from pipeline.sections import accuracy, comparisons, design, outcomes, overview, printed, provenance, quality
+from pipeline.sections.material import Material
+
+SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
+    overview.section,
+    design.section,
+    quality.section,
+    accuracy.section,
+    outcomes.selection,
+    outcomes.time,
+    outcomes.workload,
+    outcomes.others,
+    comparisons.section,
+    printed.section,
+    provenance.section,
+)

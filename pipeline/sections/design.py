@@ -1,0 +1,52 @@
+"""How the study was done and who took part."""
+
+from __future__ import annotations
+
+from pipeline.document.model import Block, Notice, Paragraph, Section, Strong, Text
+from pipeline.sections.material import ORIGINS, Material, conditions_text
+from pipeline.wording import counted, listing, number
+
+
+def section(material: Material) -> Section:
+    """Design and participants."""
+    study = material.study
+    blocks: list[Block] = [Paragraph(_participants(material))]
+    if len(study.conditions) > 1:
+        text = (
+            f"{conditions_text(study.conditions)}. A difference is the first minus the second in this order."
+        )
+        blocks.append(Paragraph((Strong("Conditions: "), text)))
+    else:
+        blocks.append(Paragraph((Strong("Condition: "), f"{study.conditions[0]}.")))
+    if material.sessions:
+        blocks.append(
+            Paragraph(
+                (Strong("Sessions: "), f"{counted(len(material.sessions), 'log')} of raw sensor streams.")
+            )
+        )
+    if study.shown:
+        shown = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
+        blocks.append(Paragraph((Strong("Display: "), f"{listing(shown)}.")))
+    notes: list[Text] = [(ORIGINS[study.data_origin],)]
+    if study.notes.strip():
+        notes.append((study.notes.strip(),))
+    if study.citation.strip():
+        notes.append((Strong("Source: "), study.citation.strip()))
+    blocks.append(Notice("Where the data come from", tuple(notes), "information"))
+    return Section("design", "Design and participants", tuple(blocks))
+
+
+def _participants(material: Material) -> Text:
+    """Number, sex and age, as far as participants.csv gives them."""
+    facts = material.results["study"]["participants"]
+    text = counted(facts["n"], "participant")
+    if facts.get("sex"):
+        text += f" ({listing([f'{count} {name}' for name, count in facts['sex'].items()])})"
+    if facts.get("age"):
+        age = facts["age"]
+        text += (
+            f", aged {number(age['min'], 0)} to {number(age['max'], 0)} years (mean {number(age['mean'], 1)})"
+        )
+    if material.study.participants is None:
+        text += "; the study has no participants table, so age and sex are not known"
+    return (Strong("Participants: "), text + ".")

@@ -1,0 +1,87 @@
+"""What sections are made from, and what they share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.figure
+import pandas as pd
+
+from pipeline import figures
+from pipeline.document.model import Figure
+from pipeline.study import Session, Study
+
+Row = Mapping[str, Any]
+
+ORIGINS = {
+    "recorded": "Recorded data: measured with people and devices.",
+    "simulated": "Simulated data: made by a model, not measured with people.",
+    "reconstructed": "Reconstructed data: invented to fit printed figures, not anybody's measurements.",
+}
+
+
+@dataclass(frozen=True)
+class Material:
+    """A study's settings, results and tables. `ingested` and `fused` are a folder a session, in their order."""
+
+    name: str
+    study: Study
+    results: Mapping[str, Any]
+    measures: pd.DataFrame
+    sessions: tuple[Session, ...]
+    ingested: tuple[Path, ...]
+    fused: tuple[Path, ...]
+    assessed: tuple[Path, ...]
+    figures: Path
+    inputs: Mapping[str, str]
+
+    def rows(self, table: str) -> list[Row]:
+        """The rows of a table of results.json."""
+        return list(self.results[table])
+
+    def comparisons_of(self, measure: str) -> list[Row]:
+        """The comparisons of one measure."""
+        return [row for row in self.rows("comparisons") if row["measure"] == measure]
+
+    def measured(self) -> list[str]:
+        """Every measure with descriptives, in their order."""
+        return list(dict.fromkeys(row["measure"] for row in self.rows("descriptives")))
+
+    def participant_means(self, measure: str) -> pd.DataFrame:
+        """A row a participant, a column a condition."""
+        rows = self.measures[self.measures["measure"] == measure]
+        wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean")
+        return wide.reindex(columns=list(self.study.conditions)).astype("float64")
+
+    def figure(
+        self,
+        name: str,
+        function: Callable[..., matplotlib.figure.Figure],
+        caption: str,
+        alt: str,
+        *arguments: Any,
+    ) -> Figure:
+        """Draw a figure into the report's figures and name it in the text."""
+        figures.draw(function, self.figures / f"{name}.svg", *arguments)
+        return Figure(f"figure-{name}", f"{name}.svg", caption, alt)
+
+
+def safe_name(text: str) -> str:
+    """A name fit for a file: letters, digits and dashes."""
+    return "-".join(
+        part for part in "".join(c if c.isalnum() and c.isascii() else " " for c in text).split()
+    ).lower()
+
+
+def conditions_text(conditions: Sequence[str]) -> str:
+    """The conditions for a sentence, the baseline named."""
+    from pipeline.wording import listing
+
+    return (
+        f"{listing(list(conditions))} ({conditions[0]} is the baseline)"
+        if len(conditions) > 1
+        else conditions[0]
+    )

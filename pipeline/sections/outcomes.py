@@ -1,0 +1,231 @@
+"""What people did and felt: selection, time, workload and whatever else was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline import figures
+from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table
+from pipeline.sections.material import Material, Row, safe_name
+from pipeline.wording import (
+    comparison_sentence,
+    contrast,
+    counted,
+    effect_size,
+    interval,
+    listing,
+    measure_label,
+    number,
+    p_value,
+    short_label,
+    statistic,
+)
+
+_SELECTION = ("selection_mse_px2", "selection_mse_mm2", "selection_rmse_px", "selection_rmse_mm")
+_TIME = ("completion_time_s", "trial_time_s")
+
+
+def selection(material: Material) -> Section | None:
+    """Accuracy of target selection (the paper's Fig. 12)."""
+    names = [name for name in _SELECTION if name in material.measured()]
+    if not names:
+        return None
+    drawn = next(name for name in names if "mse" in name)
+    text = (
+        "How far from the target people selected. MSE is a participant's mean squared distance over trials; RMSE is the "
+        "square root of the mean of the participants' MSEs, in the unit of the display."
+    )
+    blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-selection", names)]
+    blocks += _measured(material, drawn)
+    if material.rows("shown_at_selection"):
+        blocks.append(_shown(material))
+    return Section("selection", "Target selection", tuple(blocks))
+
+
+def time(material: Material) -> Section | None:
+    """Time (the paper's Fig. 13)."""
+    names = [name for name in _TIME if name in material.measured()]
+    if not names:
+        return None
+    text = (
+        "Completion time runs from the start of a session to its last selection, time per trial from a target's "
+        "appearance to its selection."
+    )
+    blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-time", names)]
+    for name in names:
+        blocks += _measured(material, name)
+    return Section("time", "Time", tuple(blocks))
+
+
+def workload(material: Material) -> Section | None:
+    """Questionnaires (the paper's Table 2 and Fig. 14)."""
+    scales = [name for name in material.measured() if "/" in name]
+    if not scales:
+        return None
+    blocks: list[Block] = []
+    for questionnaire in dict.fromkeys(name.partition("/")[0] for name in scales):
+        mine = [name for name in scales if name.partition("/")[0] == questionnaire]
+        blocks += _questionnaire(material, questionnaire, mine)
+    return Section("workload", "Workload and other ratings", tuple(blocks))
+
+
+def others(material: Material) -> Section | None:
+    """Every measure that has no section of its own."""
+    names = [name for name in material.measured() if name not in (*_SELECTION, *_TIME) and "/" not in name]
+    if not names:
+        return None
+    blocks: list[Block] = [_descriptives(material, "table-others", names)]
+    for name in names:
+        blocks += _measured(material, name)
+    return Section("others", "Further measures", tuple(blocks))
+
+
+def _descriptives(material: Material, id: str, names: Sequence[str]) -> Table:
+    titles = ("Measure", "Condition", "n", "Mean", "SD", "Median", "95 % interval of the mean")
+    rows = [row for name in names for row in material.rows("descriptives") if row["measure"] == name]
+    cells = tuple(
+        (
+            measure_label(row["measure"]),
+            row["condition"],
+            f"{row['n']}",
+            number(row["mean"]),
+            number(row["sd"]),
+            number(row["median"]),
+            interval(row["ci_low"], row["ci_high"]),
+        )
+        for row in rows
+    )
+    caption = "Means over participants, each participant one value in each condition."
+    return Table(id, caption, tuple(Column(title, index > 1) for index, title in enumerate(titles)), cells)
+
+
+def _measured(material: Material, measure: str) -> list[Block]:
+    """A measure's figure and what its tests say."""
+    wide = material.participant_means(measure)
+    if not wide.notna().any().any():
+        return []
+    label, conditions = measure_label(measure), list(material.study.conditions)
+    complete = len(wide.dropna())
+    reading = (
+        "Small marks are participants, lines join the same one; large marks are means with 95 % intervals."
+        if len(conditions) > 1
+        else "Small marks are participants; the large one is their mean with its 95 % interval."
+    )
+    if len(conditions) == 2:
+        reading += (
+            " Right: each participant's difference; an interval that leaves out zero speaks for a real one."
+        )
+    blocks: list[Block] = [
+        material.figure(
+            f"measure-{safe_name(measure)}",
+            figures.paired,
+            f"{label} by condition, {counted(complete, 'participant')} complete. {reading}",
+            f"{label}: values of each participant under {listing(conditions)}, with means and intervals.",
+            wide,
+            measure,
+        )
+    ]
+    for row in material.comparisons_of(measure):
+        blocks.append(Paragraph((Strong(f"{label}: "), f"{comparison_sentence(row)}.")))
+    return blocks
+
+
+def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:
+    scales = [name for name in names if not name.endswith("/total")]
+    title = measure_label(f"{questionnaire}/x").partition(":")[0]
+    wide = {name: material.participant_means(name) for name in scales}
+    conditions = list(material.study.conditions)
+    n = max(len(table.dropna()) for table in wide.values())
+    blocks: list[Block] = [_ratings_table(material, questionnaire, title, names)]
+    tested = [row for name in names for row in material.comparisons_of(name)]
+    if tested:
+        blocks.append(_tests_table(questionnaire, title, tested))
+    blocks.append(
+        material.figure(
+            f"ratings-{safe_name(questionnaire)}",
+            figures.workload,
+            f"{title} ratings by scale and condition (n = {n}): boxes hold the middle half of the participants, the thick "
+            "line is the median, marks are participants. Compare boxes of the same scale.",
+            f"Box plots of the {title} scales {listing([short_label(name) for name in scales])} for {listing(conditions)}.",
+            wide,
+        )
+    )
+    return blocks
+
+
+def _ratings_table(material: Material, questionnaire: str, title: str, names: list[str]) -> Table:
+    """Mean and SD of every scale, conditions side by side (the paper's Table 2)."""
+    conditions = material.study.conditions
+    found = {(row["measure"], row["condition"]): row for row in material.rows("descriptives")}
+    columns = [Column("Scale", False)]
+    for condition in conditions:
+        columns += [Column(f"{condition}: mean"), Column("SD"), Column("n")]
+    rows = []
+    for name in names:
+        cells = [short_label(name)]
+        for condition in conditions:
+            row = found.get((name, condition))
+            cells += (
+                ["–", "–", "0"] if row is None else [number(row["mean"]), number(row["sd"]), f"{row['n']}"]
+            )
+        rows.append(tuple(cells))
+    note = (
+        "Total: a participant's sum over the scales."
+        if any(name.endswith("/total") for name in names)
+        else ""
+    )
+    return Table(
+        f"table-{safe_name(questionnaire)}", f"{title} ratings by scale.", tuple(columns), tuple(rows), note
+    )
+
+
+def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
+    titles = ("Scale", "Comparison", "n", "Statistic", "p", "p adjusted", "Effect size [95 % interval]")
+    cells = tuple(
+        (
+            short_label(row["measure"]),
+            contrast(row),
+            f"{row['n']}",
+            statistic(row),
+            p_value(row["p"]),
+            p_value(row["p_adjusted"]),
+            effect_size(row) if row["status"] == "ok" else row["status"],
+        )
+        for row in rows
+    )
+    methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
+    note = f"Methods: {methods}. Adjusted: {_families(rows)}."
+    caption = f"Tests of the {title} scales. Judge by the adjusted p: with many tests some fall below any level by chance."
+    return Table(
+        f"table-{safe_name(questionnaire)}-tests",
+        caption,
+        tuple(Column(name, index not in (0, 1)) for index, name in enumerate(titles)),
+        cells,
+        note,
+    )
+
+
+def _families(rows: list[Row]) -> str:
+    """How p values were adjusted, and over what."""
+    adjusts = list(dict.fromkeys(row["adjust"] for row in rows))
+    if adjusts == ["none"]:
+        return "no"
+    over = "the pairs within each scale" if len({row["contrast"] for row in rows}) > 2 else "the scales"
+    return f"{', '.join(name.replace('_', ' ').title() for name in adjusts)} over {over}"
+
+
+def _shown(material: Material) -> Table:
+    """What each estimator would have shown when people selected."""
+    titles = ("Condition", "Estimator", "n", "RMSE (mm)")
+    cells = tuple(
+        (row["condition"], row["estimator"], f"{row['n']}", number(row["rmse_mm"]))
+        for row in material.rows("shown_at_selection")
+    )
+    return Table(
+        "table-shown",
+        "What each estimator would have shown at the moments of selection: its distance from the targets. People "
+        "steered by what was displayed, so the displayed estimator has the advantage.",
+        tuple(Column(title, index > 1) for index, title in enumerate(titles)),
+        cells,
+        '"recorded" is where the participants selected.',
+    )

@@ -1,0 +1,43 @@
+"""What the report was made from, and with what."""
+
+from __future__ import annotations
+
+import platform
+
+from pipeline.cache import versions
+from pipeline.document.model import Column, Paragraph, Section, Table
+from pipeline.provenance import LIBRARIES
+from pipeline.sections.material import Material
+from pipeline.wording import counted
+
+_FILES_MAX = 60
+
+
+def section(material: Material) -> Section:
+    """Provenance."""
+    used = {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
+    text = (
+        f"Made by Steadyhand from the study folder “{material.name}”, {counted(len(material.inputs), 'file')}. Every number in this "
+        "report stands in results.json and in the tables folder beside it; provenance.json holds the settings and the command."
+    )
+    listed = sorted(material.inputs.items())[:_FILES_MAX]
+    more = f" The first {_FILES_MAX} of {len(material.inputs)}." if len(material.inputs) > _FILES_MAX else ""
+    return Section(
+        "provenance",
+        "Provenance",
+        (
+            Paragraph((text,)),
+            Table(
+                "table-versions",
+                "Program and libraries.",
+                (Column("Name", False), Column("Version", False)),
+                tuple(used.items()),
+            ),
+            Table(
+                "table-inputs",
+                f"Files that were read, with the beginning of their SHA-256: equal digests are equal files.{more}",
+                (Column("File", False), Column("SHA-256", False)),
+                tuple((name, digest[:16]) for name, digest in listed),
+            ),
+        ),
+    )

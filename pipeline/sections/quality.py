@@ -1,0 +1,195 @@
+"""What the logs were like, and everything that was left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from pipeline import figures, tables
+from pipeline.document.model import Block, Column, Paragraph, Section, Table
+from pipeline.sections.material import Material
+from pipeline.wording import NOTHING, counted, measure_label, number
+
+_ROWS_MAX = 120  # a page stays readable; tables/quality.csv has them all
+
+
+def section(material: Material) -> Section:
+    """Data quality and exclusions."""
+    blocks: list[Block] = []
+    if material.rows("quality"):
+        blocks.append(_quality_table(material))
+        if material.rows("sensor_noise"):
+            blocks += _noise(material)
+        elif material.rows("accuracy"):
+            blocks.append(
+                Paragraph(
+                    (
+                        "No session holds a still stretch of a second or more, so the sensors' noise cannot be told.",
+                    )
+                )
+            )
+    agreement = material.rows("replay_agreement")
+    if agreement:
+        blocks.append(_agreement_table(material))
+    blocks += _exclusions(material)
+    return Section("quality", "Data quality and exclusions", tuple(blocks))
+
+
+def _quality_table(material: Material) -> Table:
+    rows = material.rows("quality")
+    titles = (
+        "Session",
+        "Stream",
+        "Messages",
+        "Lost",
+        "Rate (Hz)",
+        "Longest gap (ms)",
+        "Jitter (ms)",
+        "Out of order",
+        "Delay in log (ms)",
+        "Note",
+    )
+    cells = tuple(
+        (
+            row["session"],
+            row["stream"],
+            f"{row['messages_read']}",
+            "unknown" if row["messages_lost"] is None else f"{row['messages_lost']}",
+            number(row["rate_hz"], 1),
+            _milliseconds(row["gap_max_s"]),
+            number(row["jitter_ms"], 1) if row["jitter_ms"] is None or row["jitter_ms"] >= 0.05 else "0.0",
+            NOTHING if row["out_of_order"] is None else f"{row['out_of_order']}",
+            _milliseconds(row["latency_s"]),
+            row["note"] or "",
+        )
+        for row in rows[:_ROWS_MAX]
+    )
+    more = (
+        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/quality.csv."
+        if len(rows) > _ROWS_MAX
+        else ""
+    )
+    return Table(
+        "table-quality",
+        "Each sensor stream as it was recorded. Look for lost messages, long gaps and rates off their usual value."
+        + more,
+        tuple(Column(title, title not in ("Session", "Stream", "Note")) for title in titles),
+        cells,
+        "Rate: messages a second of the stream's own clock. Jitter: SD of the time between arrivals, gaps left out. "
+        "Delay in log: median of arrival minus stamp; a tracker that stamps on delivery shows none.",
+    )
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return NOTHING if seconds is None else number(1000 * seconds, 0 if seconds >= 0.01 else 1)
+
+
+def _noise(material: Material) -> list[Block]:
+    """The sensors' noise in still stretches, against what study.yaml states."""
+    rows = pd.DataFrame(material.rows("sensor_noise"))
+    residuals = tables.read("noise_residuals", material.assessed)
+    names = [name for name in material.study.streams if name in set(rows["stream"])]
+    units = [str(rows.loc[rows["stream"] == name, "unit"].iloc[0]) for name in names]
+    values = [residuals.loc[residuals["stream"] == name, "residual"].to_numpy(np.float64) for name in names]
+    cells = tuple(
+        (
+            row["session"],
+            row["stream"],
+            row["unit"],
+            f"{number(row['begin_s'], 1)} to {number(row['end_s'], 1)}",
+            f"{row['n']}",
+            number(row["sd"], 1),
+            number(row["stated_sd"], 1),
+        )
+        for row in material.rows("sensor_noise")[:_ROWS_MAX]
+    )
+    titles = (
+        "Session",
+        "Stream",
+        "Unit",
+        "Still from … to (s)",
+        "Readings",
+        "SD measured",
+        "SD in study.yaml",
+    )
+    return [
+        material.figure(
+            "sensor-noise",
+            figures.noise,
+            "Readings in still stretches, slow drift taken off, with the Gaussian of the same SD. The estimators take "
+            "the noise to be Gaussian: look whether the bars follow the curve. A hand is never quite still, so this is "
+            "an upper bound of the sensor's own noise.",
+            "; ".join(f"Histogram for {name} with a Gaussian curve" for name in names) + ".",
+            values,
+            units,
+            names,
+        ),
+        Table(
+            "table-noise",
+            "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",
+            tuple(Column(title, index not in (0, 1, 2)) for index, title in enumerate(titles)),
+            cells,
+            "Still: the reference moves slower than 20 mm/s; without a reference, the accelerations vary little.",
+        ),
+    ]
+
+
+def _agreement_table(material: Material) -> Table:
+    return Table(
+        "table-replay",
+        "How far what was displayed is from what the estimator gives when it is run again over the same log. Zero, up "
+        "to rounding, means that the log shows what it says it showed.",
+        tuple(
+            Column(title, index > 1)
+            for index, title in enumerate(
+                ("Session", "Estimator", "Samples", "Largest (mm)", "Root mean square (mm)")
+            )
+        ),
+        tuple(
+            (
+                row["session"],
+                row["estimator"],
+                f"{row['n']}",
+                number(row["max_mm"], 3),
+                number(row["rms_mm"], 3),
+            )
+            for row in material.rows("replay_agreement")[:_ROWS_MAX]
+        ),
+    )
+
+
+def _exclusions(material: Material) -> list[Block]:
+    rows = material.rows("exclusions")
+    if not rows:
+        return [
+            Paragraph(
+                (
+                    "Nothing was left out: every session, participant and value of the study is in this report.",
+                )
+            )
+        ]
+    titles = ("Participant", "Condition", "Session", "Measure", "What", "Reason")
+    cells = tuple(
+        (
+            row["participant"] or NOTHING,
+            row["condition"] or NOTHING,
+            row["session"] or NOTHING,
+            measure_label(row["measure"]) if row["measure"] else "all",
+            row["what"],
+            row["reason"] or "",
+        )
+        for row in rows[:_ROWS_MAX]
+    )
+    more = (
+        f" The first {_ROWS_MAX} of {len(rows)}; all are in tables/exclusions.csv."
+        if len(rows) > _ROWS_MAX
+        else ""
+    )
+    return [
+        Table(
+            "table-exclusions",
+            f"Everything that is missing or was left out, and why ({counted(len(rows), 'entry', 'entries')}).{more}",
+            tuple(Column(title, False) for title in titles),
+            cells,
+        )
+    ]

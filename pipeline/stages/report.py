@@ -1,0 +1,62 @@
+"""The report: sections from tables, one document, two renderings, tables as CSV and figures as SVG."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pipeline import results, tables
+from pipeline.document import html, pdf
+from pipeline.document.model import Document
+from pipeline.sections import SECTIONS
+from pipeline.sections.material import ORIGINS, Material
+from pipeline.stage import Outcome, Work
+
+_FROM_COMPARE = (
+    "trials",
+    "measures",
+    "descriptives",
+    "comparisons",
+    "accuracy",
+    "replay_agreement",
+    "sensor_noise",
+    "shown_at_selection",
+    "quality",
+    "exclusions",
+    "printed",
+)
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
+
+
+def run(work: Work) -> Outcome:
+    """report.html, report.pdf, tables/*.csv and figures/*.svg."""
+    compared = work.entry("compare")
+    for folder in ("tables", "figures"):
+        (work.out / folder).mkdir()
+    for name in _FROM_COMPARE:
+        _write_csv(name, tables.read(name, compared), work)
+    material = Material(
+        work.study_name,
+        work.study,
+        results.read(compared / "results.json"),
+        tables.read("measures", compared),
+        work.sessions,
+        work.entries["ingest"],
+        work.entries["fuse"],
+        work.entries["assess"],
+        work.out / "figures",
+        work.inputs,
+    )
+    sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
+    subtitle = f"Study “{work.study_name}”"
+    document = Document(work.study.title, subtitle, ORIGINS[work.study.data_origin], sections)
+    html.render(document, work.out / "figures", work.out / "report.html")
+    pdf.render(document, work.out / "figures", work.out / "report.pdf")
+    return Outcome()
+
+
+def _write_csv(name: str, table: pd.DataFrame, work: Work) -> None:
+    """A table as CSV; text that a spreadsheet would run as a formula gets an apostrophe in front."""
+    for column in table.columns[[str(kind) == "string" for kind in table.dtypes]]:
+        risky = table[column].str.startswith(_FORMULA).fillna(False).astype(bool)
+        table[column] = table[column].where(~risky, "'" + table[column])
+    table.to_csv(work.out / "tables" / f"{name}.csv", index=False)
