@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ BoolArray = npt.NDArray[np.bool_]
 GAP_S = 0.05  # a reference is not interpolated over more than this
 LAG_RANGE_S = 0.5
 _LAG_STEP_S = 0.005
-_BLOCK_S = 1.0  # of the bootstrap: longer than the correlation of hand motion at rest
+_BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
 
 
@@ -67,15 +68,16 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     """The shift in s within ±0.5 s that minimises Σ‖estimate(t) − reference(t − lag)‖², positive = late.
 
     Sub-sample by a parabola through the smallest squared distance and its neighbours; the 95 % interval is the
-    2.5 and 97.5 percentile over moving blocks of 1 s. NaN with fewer than 2 s of usable track, or where the
-    smallest distance sits at the edge of the range.
+    2.5 and 97.5 percentile of 1000 resamples of moving blocks of 0.5 s. NaN with less than 1 s of usable track, or
+    where the smallest distance sits at the edge of the range; a resample at the edge counts as the edge, so that an
+    interval that reaches ±0.5 s says the data cannot tell.
     """
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
     distance = np.stack(
         [np.sum((estimate - interpolate(reference, time - shift)) ** 2, axis=1) for shift in shifts], axis=1
     )
     usable = np.isfinite(distance).all(axis=1)
-    if not usable.any() or np.ptp(time[usable]) < 2 * _BLOCK_S:
+    if not usable.any() or np.ptp(time[usable]) < 1.0:
         return NO_INTERVAL
     distance = distance[usable]
     whole = _lowest(shifts, distance.sum(axis=0)[None, :])[0]
@@ -88,9 +90,8 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     resampled = np.zeros((_RESAMPLES, len(shifts)))
     for column in picks.T:
         resampled += sums[column]
-    lows = _lowest(shifts, resampled)
-    if not np.isfinite(lows).all():
-        return Interval(float(whole), np.nan, np.nan)
+    found = _lowest(shifts, resampled)
+    lows = np.where(np.isfinite(found), found, shifts[np.argmin(resampled, axis=1)])
     low, high = np.percentile(lows, [2.5, 97.5])
     return Interval(float(whole), float(low), float(high))
 
@@ -139,9 +140,7 @@ def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: S
     return float(lead[inside][peak])
 
 
-def lead_curve(
-    time: FloatArray, estimate: FloatArray, tracker: Samples
-) -> tuple[FloatArray, FloatArray] | None:
+def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tuple[FloatArray, FloatArray] | None:
     """The curve behind `lead_by_cross_correlation`: leads in s and correlations in mm²; None without overlap."""
     if len(time) < 3 or len(tracker) < 2:
         return None
@@ -154,7 +153,7 @@ def lead_curve(
     track = np.stack([np.interp(grid, time, estimate[:, axis]) for axis in axes], axis=1)
     arrived = np.stack([np.interp(grid, tracker.arrival, tracker.value[:, axis]) for axis in axes], axis=1)
     shifts, correlation = cross_correlation(track, arrived)
-    return shifts * step, correlation
+    return np.asarray(shifts * step, dtype=np.float64), correlation
 
 
 def slow_stretches(
@@ -175,7 +174,7 @@ def stretches(time: FloatArray, holds: BoolArray, shortest_s: float) -> Iterator
         return
     broken = np.flatnonzero(~holds[1:] | ~holds[:-1] | (np.diff(time) > GAP_S))
     edges = np.concatenate([[-1], broken, [len(time) - 1]])
-    for before, last in zip(edges[:-1], edges[1:], strict=True):
+    for before, last in pairwise(edges):
         begin, end = float(time[before + 1]), float(time[last])
         if holds[last] and end - begin >= shortest_s:
             yield begin, end

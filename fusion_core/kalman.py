@@ -105,7 +105,7 @@ class PositionKalman:
         return replay_loop(self, samples, times)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _propagate(
     mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd: float, bias_psd: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -127,7 +127,7 @@ def _propagate(
     return transition @ mean, moved
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _correct(
     mean: FloatArray, covariance: FloatArray, observed: FloatArray, value: FloatArray, noise_variance: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -227,9 +227,7 @@ class FusionKalman:
         entries = list(state.entries[:at])
         for name, reading in [(sensor, sample)] + [(e.sensor, e.sample) for e in state.entries[at:]]:
             entries.append(Entry(name, reading, self._taken_in(entries[-1].moments, name, reading)))
-        keep = bisect_right(
-            entries, entries[-1].sample.time - self.history_s, key=lambda entry: entry.sample.time
-        )
+        keep = bisect_right(entries, entries[-1].sample.time - self.history_s, key=lambda entry: entry.sample.time)
         return Recent(tuple(entries[max(keep - 1, 0) :]), (), state.too_late)
 
     def _first(self, state: Recent, sensor: str, sample: Sample) -> Recent:

@@ -39,13 +39,13 @@ class SquaredExponential:
         sign = np.where(other_order % 2 == 0, 1.0, -1.0)
         w, squared = self.inverse_scale_s2, lag * lag
         factor = np.ones_like(lag)
-        for derivative, value in (
-            (1, lambda: -2 * w * lag),
-            (2, lambda: 4 * w**2 * squared - 2 * w),
-            (3, lambda: (12 * w**2 - 8 * w**3 * squared) * lag),
-            (4, lambda: (16 * w**4 * squared - 48 * w**3) * squared + 12 * w**2),
-        ):
-            if np.any(total == derivative):
-                factor = np.where(total == derivative, value(), factor)
+        if np.any(total == 1):
+            factor = np.where(total == 1, -2 * w * lag, factor)
+        if np.any(total == 2):
+            factor = np.where(total == 2, 4 * w**2 * squared - 2 * w, factor)
+        if np.any(total == 3):
+            factor = np.where(total == 3, (12 * w**2 - 8 * w**3 * squared) * lag, factor)
+        if np.any(total == 4):
+            factor = np.where(total == 4, (16 * w**4 * squared - 48 * w**3) * squared + 12 * w**2, factor)
         covariance: FloatArray = sign * factor * (self.signal_variance_mm2 * np.exp(-w * squared))
         return covariance

@@ -10,6 +10,7 @@ from fusion_core.accuracy import stretches
 from fusion_core.samples import FloatArray, Samples
 
 _SPAN_S = 0.5
+_EDGE_S = 0.1  # a hand that has just stopped, or is about to start, is slow but not unaccelerated
 
 
 def still_by_acceleration(acceleration: Samples, shortest_s: float = 1.0) -> tuple[float, float] | None:
@@ -49,9 +50,10 @@ def _moving_sd(value: FloatArray, span: int) -> FloatArray:
 def residuals(samples: Samples, begin: float, end: float) -> FloatArray:
     """What is left of the readings in a stretch once a slow drift (a parabola an axis) is taken off, (n, d).
 
+    The first and last 0.1 s of the stretch are left out: there the hand is already, or still, accelerating.
     Scaled by √(n / (n − 3)), so that their root mean square estimates the SD. Empty with fewer than 10 readings.
     """
-    inside = (samples.time >= begin) & (samples.time <= end)
+    inside = (samples.time >= begin + _EDGE_S) & (samples.time <= end - _EDGE_S)
     value = samples.value[inside]
     if len(value) < 10:
         return np.empty((0, samples.value.shape[1]))

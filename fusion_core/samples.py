@@ -36,19 +36,12 @@ class Samples:
 
     def __post_init__(self) -> None:
         n = len(self.time)
-        if (
-            self.time.shape != (n,)
-            or self.arrival.shape != (n,)
-            or self.value.ndim != 2
-            or len(self.value) != n
-        ):
+        if self.time.shape != (n,) or self.arrival.shape != (n,) or self.value.ndim != 2 or len(self.value) != n:
             raise ValueError(
                 "Samples need time (n,), arrival (n,) and value (n, d), got "
                 f"{self.time.shape}, {self.arrival.shape} and {self.value.shape}"
             )
-        if not (
-            np.isfinite(self.time).all() and np.isfinite(self.arrival).all() and np.isfinite(self.value).all()
-        ):
+        if not (np.isfinite(self.time).all() and np.isfinite(self.arrival).all() and np.isfinite(self.value).all()):
             raise ValueError("Samples must be finite; leave a reading out rather than pass NaN or infinity")
         if n > 1 and np.any(np.diff(self.arrival) < 0):
             raise ValueError("Samples must be in order of arrival; sort them by `arrival` first")

@@ -56,9 +56,7 @@ class WindowGP:
     def _kernel(self) -> SquaredExponential:
         return SquaredExponential(self.signal_variance_mm2, self.inverse_scale_s2)
 
-    def gains(
-        self, lag: FloatArray, order: IntArray, noise_variance: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def gains(self, lag: FloatArray, order: IntArray, noise_variance: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The weights of the readings in the estimate of "now", and its variance (eqs. 23 and 24).
 
         `lag` (…, m) is each reading's time minus now in s, `order` (m,) its derivative, `noise_variance` (m,).

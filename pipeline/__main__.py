@@ -22,9 +22,7 @@ Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Where to write; with several studies a folder each in it.")
 ]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to compute in. Default: one a processor.")]
-CacheFolder = Annotated[
-    Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")
-]
+CacheFolder = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")]
 
 
 @app.command()
@@ -46,9 +44,7 @@ def compare(studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFo
 @app.command()
 def check(
     studies: Studies,
-    accept: Annotated[
-        bool, typer.Option("--accept", help="Take today's results as the expected ones.")
-    ] = False,
+    accept: Annotated[bool, typer.Option("--accept", help="Take today's results as the expected ones.")] = False,
     jobs: Jobs = None,
     cache: CacheFolder = None,
 ) -> None:

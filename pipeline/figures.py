@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
-from pipeline.wording import MINUS, measure_label, short_label, unit_of
+from pipeline.wording import MINUS, THIN, measure_label, short_label, unit_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _GREY = "#6b757d"
 _WIDTH = 7.2  # inches: a page's text
 _MARKS_MAX = 2000  # beyond it marks are drawn as an image, or a file grows to megabytes
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -76,7 +76,7 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     complete = wide.dropna()
     two = len(conditions) == 2 and len(complete) > 1
     options: dict[str, Any] = {"gridspec_kw": {"width_ratios": [2.2, 1]}} if two else {}
-    figure, axes = _axes(1, 2 if two else 1, 3.3, **options)
+    figure, axes = _axes(1, 2 if two else 1, 2.9, **options)
     values = axes[0]
     at = np.arange(len(conditions))
     for _, row in complete.iterrows():
@@ -84,9 +84,7 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     for index, condition in enumerate(conditions):
         column = wide[condition].dropna().to_numpy(np.float64)
         if len(column):
-            values.scatter(
-                np.full(len(column), index), column, s=16, color=COLOURS[index % 7], alpha=0.55, zorder=2
-            )
+            values.scatter(np.full(len(column), index), column, s=16, color=COLOURS[index % 7], alpha=0.55, zorder=2)
             _interval(values, index, column, COLOURS[index % 7], MARKERS[index % 7])
     values.set_xticks(at, conditions)
     values.set_xlim(-0.5, len(conditions) - 0.5)
@@ -94,9 +92,17 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     values.set_title(f"Participants (n = {len(complete)}), mean and 95 % interval")
     if not np.nanmin(wide.to_numpy(np.float64)) < 0:
         values.set_ylim(bottom=0)
+    _grouped(values)
     if two:
         _differences(axes[1], complete, measure)
     return figure
+
+
+def _grouped(axes: Axes) -> None:
+    """Thousands set apart on the value axis."""
+    axes.yaxis.set_major_formatter(
+        mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", THIN).replace("-", MINUS))
+    )
 
 
 def _interval(axes: Axes, at: float, values: FloatArray, colour: str, marker: str) -> None:
@@ -127,6 +133,7 @@ def _differences(axes: Axes, complete: pd.DataFrame, measure: str) -> None:
     unit = unit_of(measure)
     axes.set_ylabel(f"Difference ({unit})" if unit else "Difference")
     axes.set_title("Differences")
+    _grouped(axes)
 
 
 def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
@@ -152,9 +159,7 @@ def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
         )
         for centre, values in zip(centres, ratings, strict=True):
             spread = np.linspace(-0.22, 0.22, len(values)) * width
-            axes.scatter(
-                centre + spread, np.sort(values), s=9, color=colour, marker=MARKERS[index % 7], alpha=0.8
-            )
+            axes.scatter(centre + spread, np.sort(values), s=9, color=colour, marker=MARKERS[index % 7], alpha=0.8)
         axes.plot([], [], color=colour, marker=MARKERS[index % 7], linewidth=5, alpha=0.6, label=condition)
     axes.set_xticks(np.arange(len(wide)), [short_label(measure) for measure in wide])
     axes.set_ylabel("Rating")
@@ -197,21 +202,15 @@ def estimates(view: View) -> Figure:
     names = list(view.tracks)
     figure, axes = _axes(len(names), 1, 0.7 + 1.65 * len(names), sharex=True, sharey=True)
     means = np.concatenate([mean for _, mean, _ in view.tracks.values()])
-    seen = np.concatenate(
-        [means, view.frames[1]] + ([view.reference[1]] if view.reference is not None else [])
-    )
+    seen = np.concatenate([means, view.frames[1]] + ([view.reference[1]] if view.reference is not None else []))
     margin = 0.15 * float(np.ptp(seen)) + 1
     for index, (panel, name) in enumerate(zip(axes, names, strict=True)):
         time, mean, sd = view.tracks[name]
         colour = COLOURS[index % 6]
-        panel.fill_between(
-            time, mean - 2 * sd, mean + 2 * sd, color=colour, alpha=0.2, linewidth=0, label="± 2 SD"
-        )
+        panel.fill_between(time, mean - 2 * sd, mean + 2 * sd, color=colour, alpha=0.2, linewidth=0, label="± 2 SD")
         panel.plot(time, mean, color=colour, label="estimate")
         if view.reference is not None:
-            panel.plot(
-                *view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference"
-            )
+            panel.plot(*view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
         panel.scatter(*view.frames, s=7, color=_GREY, label="tracker, as it arrives", zorder=3)
         panel.set_title(name)
         panel.set_ylabel(f"{view.axis} (mm)")
@@ -259,15 +258,14 @@ def errors(accuracy: pd.DataFrame) -> Figure:
             known = values.dropna().to_numpy(np.float64)
             panel.scatter(known, np.full(len(known), index), s=16, color=colour, alpha=0.5)
             if len(known):
-                panel.plot(
-                    [known.mean()], [index], marker, color=colour, markersize=9, markeredgecolor="white"
-                )
+                panel.plot([known.mean()], [index], marker, color=colour, markersize=9, markeredgecolor="white")
     axes[0].set_yticks(range(len(names)), names)
     axes[0].invert_yaxis()
-    largest, smallest = accuracy["rmse_mm"].max(), accuracy["rmse_mm"].min()
-    if largest > 10 * smallest:
+    if accuracy["rmse_mm"].max() > 15 * accuracy["rmse_mm"].min():
         axes[0].set_xscale("log")
-        axes[0].xaxis.set_major_formatter(mpl.ticker.ScalarFormatter())
+        axes[0].xaxis.set_major_locator(mpl.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes[0].xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+        axes[0].xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
     else:
         axes[0].set_xlim(left=0)
     axes[0].set_xlabel("RMSE against the reference (mm)")
@@ -286,9 +284,7 @@ def noise(residuals: Sequence[FloatArray], units: Sequence[str], names: Sequence
         sd = float(np.sqrt(np.mean(values**2)))
         reach = 4 * sd
         bins = int(np.clip(np.sqrt(len(values)), 12, 60))
-        panel.hist(
-            values, bins=bins, range=(-reach, reach), density=True, color=COLOURS[index % 7], alpha=0.35
-        )
+        panel.hist(values, bins=bins, range=(-reach, reach), density=True, color=COLOURS[index % 7], alpha=0.35)
         grid = np.linspace(-reach, reach, 200)
         panel.plot(grid, stats.norm.pdf(grid, scale=sd), color=COLOURS[index % 7], linewidth=2)
         panel.set_xlabel(f"Reading {MINUS} slow drift ({unit})")

@@ -55,9 +55,7 @@ class Printed(Frozen):
     claims: tuple[Claim, ...] = ()
 
 
-def compare_printed(
-    path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame, alpha: float
-) -> pd.DataFrame:
+def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame, alpha: float) -> pd.DataFrame:
     """The table `printed`: each figure with its computed value, then each total and claim by itself.
 
     Verdicts: agrees, differs, undefined; contradiction or consistent where printed figures are held against
@@ -75,9 +73,7 @@ def _decimal(path: Path, text: str) -> Decimal:
     try:
         return Decimal(text)
     except InvalidOperation:
-        raise PipelineError(
-            f'{path}: "{text}" should be a number, in quotes and with the digits as printed'
-        ) from None
+        raise PipelineError(f'{path}: "{text}" should be a number, in quotes and with the digits as printed') from None
 
 
 def _half_unit(value: Decimal) -> Decimal:
@@ -143,7 +139,9 @@ def _total(path: Path, total: Total) -> Row:
         "computed": allowed,
         "computed_value": float(low) if low == high else None,
         "verdict": "consistent" if fits else "contradiction",
-        "explanation": f"the printed means of {len(total.means)} scales over {total.n} participants add up to {allowed}",
+        "explanation": (
+            f"the printed means of {len(total.means)} scales add up to {allowed} over {total.n} participants"
+        ),
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.formats.log import IntArray, Readings
+from pipeline.formats.log import FloatArray, IntArray, Readings
 
 _SECONDS = 1e-9
 _STEP_BACK_MIN = 10  # messages: a clock that went back stays back; a late message comes alone
@@ -29,7 +29,7 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
         remarks.append("how many messages the log lost cannot be known")
     if np.any(np.diff(readings.arrival_ns) < 0):
         remarks.append("messages are not in order of arrival in the file; sorted")
-    steps = np.diff(np.unique(stamp)) * _SECONDS
+    steps: FloatArray = np.diff(np.unique(stamp)).astype(np.float64) * _SECONDS
     if len(steps):
         usual = float(np.median(steps))
         missing = int(np.sum(np.round(steps[steps > 1.5 * usual] / usual) - 1))

@@ -70,9 +70,7 @@ def _samples(rows: pd.DataFrame, value: FloatArray, origin_ns: int, latency_s: f
     return tables.samples(time_ns - round(latency_s / tables.NANOSECONDS), arrival_ns, value, origin_ns)
 
 
-def _accelerations(
-    rows: pd.DataFrame, stream: AccelerationStream, origin_ns: int, axes: list[int]
-) -> Samples:
+def _accelerations(rows: pd.DataFrame, stream: AccelerationStream, origin_ns: int, axes: list[int]) -> Samples:
     """In the tracker frame; those of unknown orientation are left out (the table `quality` counts them)."""
     known = rows[rows["qw"].notna()]
     force = known[["ax_mm_s2", "ay_mm_s2", "az_mm_s2"]].to_numpy(np.float64)
@@ -108,9 +106,7 @@ def build_estimator(study: Study, name: str) -> Estimator:
     settings = study.estimators[name]
     where = f"study.yaml: estimators.{name}"
     if settings.type not in ESTIMATORS:
-        raise PipelineError(
-            f'{where}: type "{settings.type}" is not known{did_you_mean(settings.type, ESTIMATORS)}'
-        )
+        raise PipelineError(f'{where}: type "{settings.type}" is not known{did_you_mean(settings.type, ESTIMATORS)}')
     kind = ESTIMATORS[settings.type]
     types = {field.name: field.type for field in fields(kind) if field.name != "sensors"}
     used = {n: s for n, s in sensors(study).items() if settings.use is None or n in settings.use}
@@ -133,9 +129,7 @@ def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
     strict = ConfigDict(allow_inf_nan=False)
     hints = get_type_hints(kind)
     return {
-        field.name: TypeAdapter(hints[field.name], config=strict)
-        for field in fields(kind)
-        if field.name != "sensors"
+        field.name: TypeAdapter(hints[field.name], config=strict) for field in fields(kind) if field.name != "sensors"
     }
 
 

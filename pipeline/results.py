@@ -26,9 +26,7 @@ LISTS = (
 )
 
 
-def write(
-    path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]
-) -> None:
+def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
     """The file; `details` of a comparison as an object, what does not apply as null."""
     content: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -45,9 +43,7 @@ def write(
         content[table] = tables.records(table, found[table]) if table in found else []
     for row in content["comparisons"]:
         row["details"] = None if row["details"] is None else json.loads(row["details"])
-    path.write_text(
-        json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
+    path.write_text(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def read(path: Path) -> dict[str, Any]:

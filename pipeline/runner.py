@@ -44,15 +44,23 @@ class InThisProcess(Executor):
 
 @dataclass
 class Result:
-    """A study brought up to date: the entries of each stage and what happened to the sessions."""
+    """A study brought up to date: what each stage gave, by session, and what happened to the sessions.
 
-    name: str
+    The entry of a stage of scope "study" stands under an empty name.
+    """
+
+    folder: Path
     study: Study
-    entries: dict[str, list[Entry]] = field(default_factory=dict)
+    entries: dict[str, dict[str, Entry]] = field(default_factory=dict)
     computed: dict[str, int] = field(default_factory=dict)
     set_aside: list[tuple[Session, str]] = field(default_factory=list)
     in_part: list[tuple[Session, str]] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The study's name: its folder's."""
+        return self.folder.name
 
     @property
     def exit_code(self) -> int:
@@ -61,40 +69,39 @@ class Result:
 
     def entry(self, stage: str) -> Path:
         """The folder of a stage of scope "study"."""
-        (entry,) = self.entries[stage]
-        return entry.folder
+        return self.entries[stage][""].folder
 
 
-def bring_up_to_date(
-    folder: Path, stages: Sequence[Stage], cache: Cache, executor: Executor, progress: Progress
-) -> Result:
+@dataclass(frozen=True)
+class Means:
+    """Where results are kept, where they are computed, and who is told."""
+
+    cache: Cache
+    executor: Executor
+    progress: Progress
+
+
+def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Result:
     """Run the stages over a study; what the cache holds is not computed again.
 
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
     study = load_study(folder)
     sessions = find_sessions(folder, study)
-    result = Result(folder.resolve().name, study)
-    result.inputs = _input_digests(folder, study, sessions)
-    entries: dict[str, dict[str, Entry]] = {}
+    result = Result(folder.resolve(), study)
+    result.inputs = _input_digests(result.folder, study, sessions)
     for stage in stages:
         if stage.scope == "session":
-            entries[stage.name] = _run_sessions(
-                stage, folder, result, sessions, entries, cache, executor, progress
-            )
-            sessions = _still_usable(result, sessions, entries[stage.name])
-            _require_something(folder, study, sessions, result)
-            result.entries[stage.name] = list(entries[stage.name].values())
+            result.entries[stage.name] = _run_sessions(stage, result, sessions, means)
+            sessions = _still_usable(result, sessions, result.entries[stage.name])
+            _require_something(folder, result, sessions)
         else:
-            entry = _run_study(stage, folder, result, sessions, entries, cache, executor, progress)
-            entries[stage.name] = {"": entry}
-            result.entries[stage.name] = [entry]
+            result.entries[stage.name] = {"": _run_study(stage, result, sessions, means)}
     return result
 
 
-def _input_digests(folder: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
+def _input_digests(root: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
     """SHA-256 of every file of the study that is read, by its path in the study."""
-    root = folder.resolve()
     paths = [root / "study.yaml", *(session.path for session in sessions)]
     for field_name in ("participants", "trials", "questionnaires", "measures", "printed"):
         name = getattr(study, field_name)
@@ -118,19 +125,13 @@ def _settings(study: Study, stage: Stage) -> Any:
     )
 
 
-def _work(
-    stage: Stage,
-    folder: Path,
-    result: Result,
-    sessions: Sequence[Session],
-    entries: dict[str, dict[str, Entry]],
-) -> tuple[Work, str]:
+def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
     """A piece of work without its folder, and the key of its result."""
-    read = {name: _entries_for(entries[name], sessions) for name in stage.reads}
+    read = {name: _entries_for(result.entries[name], sessions) for name in stage.reads}
     names = [getattr(result.study, field_name) for field_name in stage.files]
     inputs = {name: result.inputs[Path(name).as_posix()] for name in names if name is not None}
     if stage.reads_log:
-        path = sessions[0].path.relative_to(folder.resolve()).as_posix()
+        path = sessions[0].path.relative_to(result.folder).as_posix()
         inputs[path] = result.inputs[path]
     if stage.names_inputs:
         inputs = dict(result.inputs)
@@ -138,7 +139,7 @@ def _work(
     work = Work(
         result.name,
         _declared(result.study, stage),
-        folder.resolve(),
+        result.folder,
         Path(),
         tuple(sessions),
         {name: tuple(entry.folder for entry in found) for name, found in read.items()},
@@ -165,61 +166,44 @@ def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[E
     return [found[""]] if "" in found else [found[session.id] for session in sessions if session.id in found]
 
 
-def _run_sessions(
-    stage: Stage,
-    folder: Path,
-    result: Result,
-    sessions: Sequence[Session],
-    entries: dict[str, dict[str, Entry]],
-    cache: Cache,
-    executor: Executor,
-    progress: Progress,
-) -> dict[str, Entry]:
+def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> dict[str, Entry]:
     """The stage's entry for each session, computed where the cache has none."""
     found: dict[str, Entry] = {}
     missing: list[tuple[Session, Work, str]] = []
     for session in sessions:
-        work, key = _work(stage, folder, result, [session], entries)
-        entry = cache.get(stage.name, key)
+        work, key = _work(stage, result, [session])
+        entry = means.cache.get(stage.name, key)
         if entry is None:
             missing.append((session, work, key))
         else:
             found[session.id] = entry
     result.computed[stage.name] = len(missing)
     if missing:
-        progress.begin(stage.name, len(missing))
+        means.progress.begin(stage.name, len(missing))
         waiting = {
-            executor.submit(compute, stage, work, key, cache.root): session for session, work, key in missing
+            means.executor.submit(compute, stage, work, key, means.cache.root): session
+            for session, work, key in missing
         }
         try:
             for future in as_completed(waiting):
                 found[waiting[future].id] = future.result()
-                progress.advance()
+                means.progress.advance()
         finally:
             for future in waiting:
                 future.cancel()
-        progress.end()
+        means.progress.end()
     return {session.id: found[session.id] for session in sessions}
 
 
-def _run_study(
-    stage: Stage,
-    folder: Path,
-    result: Result,
-    sessions: Sequence[Session],
-    entries: dict[str, dict[str, Entry]],
-    cache: Cache,
-    executor: Executor,
-    progress: Progress,
-) -> Entry:
-    work, key = _work(stage, folder, result, sessions, entries)
-    entry = cache.get(stage.name, key)
+def _run_study(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> Entry:
+    work, key = _work(stage, result, sessions)
+    entry = means.cache.get(stage.name, key)
     result.computed[stage.name] = int(entry is None)
     if entry is None:
-        progress.begin(stage.name, 1)
-        entry = compute(stage, work, key, cache.root)
-        progress.advance()
-        progress.end()
+        means.progress.begin(stage.name, 1)
+        entry = compute(stage, work, key, means.cache.root)
+        means.progress.advance()
+        means.progress.end()
     return entry
 
 
@@ -242,9 +226,7 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
             if stage.scope != "session":
                 raise
             fault = f"{type(error).__name__}: {error}"
-            outcome = Outcome(
-                set_aside=f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}"
-            )
+            outcome = Outcome(set_aside=f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}")
             key = digest_of([key, fault])
         return cache.keep(stage.name, key, out, asdict(outcome))
 
@@ -268,8 +250,9 @@ def _still_usable(result: Result, sessions: Sequence[Session], entries: dict[str
     return usable
 
 
-def _require_something(folder: Path, study: Study, sessions: Sequence[Session], result: Result) -> None:
+def _require_something(folder: Path, result: Result, sessions: Sequence[Session]) -> None:
     """A study without tables needs one usable session."""
+    study = result.study
     if sessions or study.trials or study.questionnaires or study.measures:
         return
     if result.set_aside:

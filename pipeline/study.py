@@ -74,9 +74,7 @@ class DisplayStream(_Stream):
     kind: Literal["display"]
 
 
-Stream = Annotated[
-    PositionStream | AccelerationStream | ReferenceStream | DisplayStream, Field(discriminator="kind")
-]
+Stream = Annotated[PositionStream | AccelerationStream | ReferenceStream | DisplayStream, Field(discriminator="kind")]
 
 
 class Events(Frozen):
@@ -132,9 +130,9 @@ class ReachSimulation(Frozen):
     seed: int
     recordings: Annotated[int, Field(ge=1, le=999)]
     distance_mm: Positive = 200.0
-    still_before_s: NotNegative = 1.6
+    still_before_s: NotNegative = 2.1
     reach_s: Positive = 0.9
-    still_after_s: NotNegative = 1.1
+    still_after_s: NotNegative = 2.1
     tracker_rate_hz: Positive = 30.0
     imu_rate_hz: Positive = 90.0
     reference_rate_hz: Positive = 90.0
@@ -180,13 +178,9 @@ class Study(Frozen):
                 _known(f"estimators.{name}.use", stream, self.sensor_streams)
         for comparison in self.comparisons:
             if "condition" not in comparison.within or len(set(comparison.within)) < len(comparison.within):
-                raise ValueError(
-                    f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice'
-                )
+                raise ValueError(f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice')
             if len(comparison.within) > 3 or (len(comparison.within) > 1 and comparison.test != "rm_anova"):
-                raise ValueError(
-                    f"comparisons: {comparison.test} does not take within: {list(comparison.within)}"
-                )
+                raise ValueError(f"comparisons: {comparison.test} does not take within: {list(comparison.within)}")
         if self.sessions is not None:
             _check_pattern(self.sessions)
         if not (self.sessions or self.trials or self.questionnaires or self.measures):
@@ -222,9 +216,7 @@ def _check_pattern(pattern: str) -> None:
     names = _PLACEHOLDER.findall(pattern)
     for name in names:
         if name not in _PLACEHOLDERS:
-            raise ValueError(
-                f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, _PLACEHOLDERS)}'
-            )
+            raise ValueError(f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, _PLACEHOLDERS)}')
     _unique("sessions: placeholder", tuple(names))
     if not names:
         raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
@@ -249,9 +241,7 @@ def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, o
     for key, _ in node.value:
         if isinstance(key, yaml.ScalarNode):
             if key.value in seen:
-                raise yaml.MarkedYAMLError(
-                    problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark
-                )
+                raise yaml.MarkedYAMLError(problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark)
             seen.add(key.value)
     return dict(loader.construct_mapping(node, deep=True))
 
@@ -280,9 +270,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 def load_study(folder: Path) -> Study:
     """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy."""
     if not folder.is_dir():
-        raise PipelineError(
-            f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it"
-        )
+        raise PipelineError(f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it")
     path = folder / SETTINGS_FILE
     if not path.is_file():
         raise PipelineError(f"{folder}: holds no {SETTINGS_FILE}; studies/README.md shows what goes into one")
@@ -303,9 +291,7 @@ def parse(model: type[_Model], content: dict[str, Any], path: Path) -> _Model:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise PipelineError(
-            "\n".join(f"{path}: {_explained(fault, model)}" for fault in error.errors())
-        ) from None
+        raise PipelineError("\n".join(f"{path}: {_explained(fault, model)}" for fault in error.errors())) from None
 
 
 def _explained(fault: Any, model: type[BaseModel]) -> str:
@@ -313,8 +299,7 @@ def _explained(fault: Any, model: type[BaseModel]) -> str:
     location = [
         part
         for part in fault["loc"]
-        if part not in ("position", "acceleration", "reference", "display", "reach")
-        or part is fault["loc"][0]
+        if part not in ("position", "acceleration", "reference", "display", "reach") or part is fault["loc"][0]
     ]
     field = ".".join(str(part) for part in location)
     if fault["type"] == "extra_forbidden":

@@ -42,7 +42,21 @@ def _read(path: Path, required: Sequence[str], optional: Sequence[str] | None) -
         raise PipelineError(f"{path}: cannot be read as CSV in UTF-8: {error}") from None
     if not numbered:
         raise PipelineError(f"{path}: is empty; its first line must name the columns {', '.join(required)}")
-    header = [name.strip() for name in numbered[0][1]]
+    header = _header(path, numbered[0][1], required, optional)
+    for line, row in numbered[1:]:
+        if len(row) != len(header):
+            raise PipelineError(f"{path}, row {line}: has {len(row)} cells, the first line {len(header)}")
+    cells = [[cell.strip() for cell in row] for _, row in numbered[1:]]
+    table = pd.DataFrame(cells, columns=header, dtype=object)
+    for name in header:
+        table[name] = table[name].map(identifier)
+    table.index = pd.Index([line for line, _ in numbered[1:]])  # the file's own line numbers
+    return table
+
+
+def _header(path: Path, first: Sequence[str], required: Sequence[str], optional: Sequence[str] | None) -> list[str]:
+    """The names of the columns, checked."""
+    header = [name.strip() for name in first]
     for name in header:
         if header.count(name) > 1:
             raise PipelineError(f'{path}: the column "{name}" stands there twice')
@@ -56,15 +70,7 @@ def _read(path: Path, required: Sequence[str], optional: Sequence[str] | None) -
             if name not in required and name not in optional:
                 hint = did_you_mean(name, [*required, *optional])
                 raise PipelineError(f'{path}: the column "{name}" is not known{hint}')
-    for line, row in numbered[1:]:
-        if len(row) != len(header):
-            raise PipelineError(f"{path}, row {line}: has {len(row)} cells, the first line {len(header)}")
-    cells = [[cell.strip() for cell in row] for _, row in numbered[1:]]
-    table = pd.DataFrame(cells, columns=header, dtype=object)
-    for name in header:
-        table[name] = table[name].map(identifier)
-    table.index = pd.Index([line for line, _ in numbered[1:]])  # the file's own line numbers
-    return table
+    return header
 
 
 def _required_text(path: Path, table: pd.DataFrame, columns: Iterable[str]) -> None:
@@ -83,11 +89,7 @@ def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
             faults.append(f'row {line}: "{column}" should be a number, found "{text}"')
     if faults:
         more = f"; and {len(faults) - _SHOWN_FAULTS} more" if len(faults) > _SHOWN_FAULTS else ""
-        hint = (
-            " (a decimal comma? use a point)"
-            if any('"' in f and "," in f.split("found")[1] for f in faults)
-            else ""
-        )
+        hint = " (a decimal comma? use a point)" if any('"' in f and "," in f.split("found")[1] for f in faults) else ""
         raise PipelineError(f"{path}, {'; '.join(faults[:_SHOWN_FAULTS])}{more}{hint}")
     return pd.Series(values, index=table.index, dtype=np.float64)
 
@@ -96,9 +98,8 @@ def _whole_numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
     values = _numbers(path, table, column)
     for line, value in values.items():
         if not (np.isfinite(value) and value == round(value)):
-            raise PipelineError(
-                f'{path}, row {line}: "{column}" should be a whole number, found "{table.at[line, column]}"'
-            )
+            found = str(table.at[line, column])
+            raise PipelineError(f'{path}, row {line}: "{column}" should be a whole number, found "{found}"')
     return values.astype(np.int64)
 
 
@@ -155,7 +156,7 @@ def read_questionnaires(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
 def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
     """A row a value, NaN where missing, and the names of the further within-factors, each a column of text."""
     table = _read(path, MEASURE_REQUIRED, None)
-    factors = [name for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]
+    factors = [str(name) for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]
     _required_text(path, table, [*MEASURE_REQUIRED[:3], *factors])
     _check_conditions(path, table, conditions)
     table["value"] = _numbers(path, table, "value")
@@ -167,7 +168,7 @@ def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, 
 def participant_facts(table: pd.DataFrame) -> dict[str, Any]:
     """How many, of which sex and age, for the report; what the file does not say is left out."""
     facts: dict[str, Any] = {"n": len(table)}
-    columns = {name.lower(): name for name in table}
+    columns = {str(name).lower(): str(name) for name in table}
     for name in ("sex", "gender"):
         if name in columns:
             facts["sex"] = {str(k): int(v) for k, v in table[columns[name]].value_counts().items() if k}

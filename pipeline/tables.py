@@ -22,9 +22,7 @@ def _schema(*columns: tuple[str, pa.DataType]) -> pa.Schema:
 
 
 TABLES: Mapping[str, pa.Schema] = {
-    "positions": _schema(
-        ("session", _TEXT), ("stream", _TEXT), ("time_ns", _TIME), ("arrival_ns", _TIME), *_POSITION
-    ),
+    "positions": _schema(("session", _TEXT), ("stream", _TEXT), ("time_ns", _TIME), ("arrival_ns", _TIME), *_POSITION),
     "imu": _schema(
         ("session", _TEXT),
         ("stream", _TEXT),
@@ -141,9 +139,7 @@ TABLES: Mapping[str, pa.Schema] = {
         ("stated_sd", _FLOAT),
     ),
     "noise_residuals": _schema(("session", _TEXT), ("stream", _TEXT), ("axis", _TEXT), ("residual", _FLOAT)),
-    "shown_at_selection": _schema(
-        ("condition", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("rmse_mm", _FLOAT)
-    ),
+    "shown_at_selection": _schema(("condition", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("rmse_mm", _FLOAT)),
     "exclusions": _schema(
         ("participant", _TEXT),
         ("condition", _TEXT),
@@ -175,9 +171,7 @@ def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
         unknown = set(row) - set(columns)
         if unknown:
             raise KeyError(f"table {name} has no column {', '.join(sorted(unknown))}")
-    return as_table(
-        name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns)
-    )
+    return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
 
 
 def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:

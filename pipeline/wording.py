@@ -38,12 +38,10 @@ _EFFECT_SIZES = {
     "matched-pairs rank-biserial": "r_rb",
     "Kendall's W": "W",
 }
-TESTS = {
-    "rm_anova": "repeated-measures ANOVA",
-    "t_paired": "paired t test",
-    "wilcoxon": "Wilcoxon signed-rank test",
-    "friedman": "Friedman test",
+_SCALES = {
+    "nasa_tlx": ("mental", "physical", "temporal", "performance", "effort", "frustration"),
 }
+TESTS = {"rm_anova": "rm ANOVA", "t_paired": "paired t", "wilcoxon": "Wilcoxon", "friedman": "Friedman"}
 
 
 def measure_label(measure: str) -> str:
@@ -57,6 +55,15 @@ def measure_label(measure: str) -> str:
         if measure.endswith(suffix):
             return _spaced(measure.removesuffix(suffix)) + unit
     return _spaced(measure)
+
+
+def measure_order(measure: str) -> tuple[str, int, str]:
+    """What to sort measures by: a questionnaire's scales stand in their own order, its total last."""
+    questionnaire, _, scale = measure.partition("/")
+    scales = _SCALES.get(questionnaire, ())
+    if scale == "total":
+        return questionnaire, 1000, scale
+    return questionnaire, scales.index(scale) if scale in scales else len(scales), scale
 
 
 def short_label(measure: str) -> str:
@@ -92,11 +99,7 @@ def number(value: float | None, digits: int = 2) -> str:
 
 def percent(value: float | None, digits: int = 1) -> str:
     """A share as percent."""
-    return (
-        NOTHING
-        if value is None or not math.isfinite(value)
-        else f"{100 * value:.{digits}f} %".replace("-", MINUS)
-    )
+    return NOTHING if value is None or not math.isfinite(value) else f"{100 * value:.{digits}f} %".replace("-", MINUS)
 
 
 def seconds(value: float | None) -> str:
@@ -128,10 +131,18 @@ def p_phrase(p: float | None, symbol: str = "p") -> str:
 
 
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:
-    """`[low, high]`, or nothing."""
+    """`[low, high]` with as many decimals in both, or nothing."""
     if low is None or high is None:
         return NOTHING
+    if max(abs(low), abs(high)) >= 0.1:
+        return f"[{_fixed(low, digits)}, {_fixed(high, digits)}]"
     return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def _fixed(value: float, digits: int) -> str:
+    """With `digits` decimals, however small."""
+    text = number(value, digits) if abs(value) >= 0.1 else f"{value:.{digits}f}".replace("-", MINUS)
+    return text.removeprefix(MINUS) if float(text.replace(MINUS, "-").replace(THIN, "")) == 0 else text
 
 
 def degrees(value: float | None) -> str:
@@ -147,7 +158,7 @@ def statistic(row: Row) -> str:
         return NOTHING
     value = number(row["statistic"])
     freedom = ", ".join(text for text in (degrees(row["df1"]), degrees(row["df2"])) if text)
-    name = {"W+": "W₊", "chi2": "χ²"}.get(row["statistic_name"], row["statistic_name"])
+    name = {"chi2": "χ²"}.get(row["statistic_name"], row["statistic_name"])
     return f"{name}({freedom}) = {value}" if freedom else f"{name} = {value}"
 
 
@@ -157,7 +168,7 @@ def effect_size(row: Row) -> str:
         return NOTHING
     name = _EFFECT_SIZES.get(row["effect_size_name"], row["effect_size_name"])
     bounds = interval(row["ci_low"], row["ci_high"])
-    return f"{name} = {number(row['effect_size'])}" + ("" if bounds == NOTHING else f" {bounds}")
+    return f"{name} = {_fixed(row['effect_size'], 2)}" + ("" if bounds == NOTHING else f" {bounds}")
 
 
 def contrast(row: Row) -> str:
@@ -183,21 +194,19 @@ def decisive_p(row: Row) -> float | None:
     return details.get("p_gg") if details.get("p_gg") is not None else row["p"]
 
 
-def comparison_sentence(row: Row) -> str:
+def comparison_sentence(row: Row, with_reduction: bool = True) -> str:
     """One row in APA's manner, without the measure's name."""
     head = contrast(row) + ", " if row["contrast"] is not None or ":" in row["effect"] else ""
     if row["status"] != "ok":
-        return f"{head}{TESTS[row['test']]} {row['status']} (n = {row['n']})"
+        return f"{head}{TESTS[row['test']]}: {row['status']} (n = {row['n']})"
     parts = [f"{head}{statistic(row)}", p_phrase(row["p"])]
     if corrected(row):
         parts.append(corrected(row) or "")
     if row["p_adjusted"] is not None:
-        parts.append(
-            p_phrase(row["p_adjusted"], f"{row['adjust'].capitalize().replace('_', ' ')}-adjusted p")
-        )
+        parts.append(p_phrase(row["p_adjusted"], f"{row['adjust'].capitalize().replace('_', ' ')}-adjusted p"))
     parts.append(effect_size(row))
     parts.append(f"n = {row['n']}")
-    if row["reduction"] is not None:
+    if row["reduction"] is not None and with_reduction:
         parts.append(reduction_phrase(row["reduction"]))
     return ", ".join(parts)
 

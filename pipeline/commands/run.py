@@ -16,7 +16,7 @@ from pipeline.commands import console
 from pipeline.commands.publish import publish, publish_results
 from pipeline.commands.summary import summary
 from pipeline.errors import PipelineError
-from pipeline.runner import InThisProcess, Result, bring_up_to_date
+from pipeline.runner import InThisProcess, Means, Result, bring_up_to_date
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, STAGES
 
@@ -54,7 +54,7 @@ def results_of(
     with executor_of(jobs) as executor:
         for folder in studies:
             with console.progress() as progress:
-                result = bring_up_to_date(folder, stages, cache_in(cache), executor, progress)
+                result = bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
             yield result
 
 
@@ -65,9 +65,7 @@ def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:
     names = [study.resolve().name for study in studies]
     for name in names:
         if names.count(name) > 1:
-            raise PipelineError(
-                f'two studies are called "{name}", and their reports would be one; rename a folder'
-            )
+            raise PipelineError(f'two studies are called "{name}", and their reports would be one; rename a folder')
     return [(out or reports_folder()) / name for name in names]
 
 

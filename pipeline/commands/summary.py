@@ -14,8 +14,13 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
     """Title and origin, then every comparison, and each estimator's mean error."""
     study = results["study"]
     yield f"{study['title']} (data: {study['data_origin']})"
-    for row in results["comparisons"]:
+    rows = results["comparisons"]
+    if len(study["conditions"]) > 2:  # pairs are many; the page lists them
+        rows = [row for row in rows if row["contrast"] is None]
+    for row in rows:
         yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
+    if len(rows) < len(results["comparisons"]):
+        yield f"  {len(results['comparisons']) - len(rows)} pairwise comparisons: see the report"
     errors: dict[str, list[float]] = {}
     for row in results["accuracy"]:
         errors.setdefault(row["estimator"], []).append(row["rmse_mm"])

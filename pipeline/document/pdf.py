@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pipeline.document.model import (
     Block,
@@ -19,7 +19,7 @@ from pipeline.document.model import (
 )
 
 _HERE = Path(__file__).parent
-_STANDARDS = ["ua-1", "a-2a"]
+_STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
 
 def render(document: Document, figures: Path, path: Path) -> None:
@@ -27,15 +27,15 @@ def render(document: Document, figures: Path, path: Path) -> None:
     import typst
 
     data = json.dumps(_content(document), ensure_ascii=False)
-    typst.compile(
+    compiler = typst.Compiler(
         (_HERE / "report.typ").read_bytes(),
-        output=str(path),
-        root=str(figures.resolve()),
+        root=figures.resolve(),
         ignore_system_fonts=True,
         sys_inputs={"document": data},
-        pdf_standards=_STANDARDS,
-        timestamp=0,
     )
+    pdf = compiler.compile(format="pdf", pdf_standards=[*_STANDARDS], timestamp=0)
+    assert isinstance(pdf, bytes)  # noqa: S101 - one document gives one PDF
+    path.write_bytes(pdf)
 
 
 def _content(document: Document) -> dict[str, Any]:

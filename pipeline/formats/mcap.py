@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 import lz4.frame
 import numpy as np
@@ -27,6 +27,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.errors import SessionError
 from pipeline.formats.log import Content, FloatArray, Log, Readings, Wanted
+
+_Record = TypeVar("_Record", bound=McapRecord)
 
 MAGIC = b"\x89MCAP0\r\n"
 SCHEMAS: Mapping[str, str] = {
@@ -46,9 +48,7 @@ _PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond i
 class _Topic:
     """What is gathered of one topic while the file is walked."""
 
-    messages: list[tuple[int, int, int, bytes]] = field(
-        default_factory=list
-    )  # log, publish time, channel, payload
+    messages: list[tuple[int, int, int, bytes]] = field(default_factory=list)  # log, publish time, channel, payload
     in_damaged_chunks: int = 0
 
 
@@ -61,9 +61,7 @@ class _Walk:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     topics: dict[str, _Topic] = field(default_factory=dict)
-    orphans: list[tuple[int, int, int, bytes]] = field(
-        default_factory=list
-    )  # their channel is named later, or never
+    orphans: list[tuple[int, int, int, bytes]] = field(default_factory=list)  # their channel is named later, or never
     facts: dict[str, str] = field(default_factory=dict)
     stated: dict[int, int] | None = None
     faults: list[str] = field(default_factory=list)
@@ -85,10 +83,13 @@ def read(path: Path, wanted: Iterable[Wanted]) -> Log:
     with path.open("rb") as file:
         _walk_file(walk, file, size)
     _adopt_orphans(walk)
+    if not any(topic.messages for topic in walk.topics.values()):
+        raise SessionError("; ".join(["it holds no message that can be read", *walk.faults]))
     topics = {}
+    content: Content
     for topic, content in (asked or dict.fromkeys(walk.topics, "anything")).items():
         if topic in walk.topics:
-            topics[topic] = _decode(walk, topic, content)  # type: ignore[arg-type]
+            topics[topic] = _decode(walk, topic, content)
     return Log(walk.facts, topics, tuple(walk.faults))
 
 
@@ -102,17 +103,13 @@ def _walk_file(walk: _Walk, file: BinaryIO, size: int) -> None:
     while not walk.complete:
         head = file.read(_RECORD_HEAD.size)
         if len(head) < _RECORD_HEAD.size:
-            walk.faults.append(
-                "the log ends without its summary: it was cut off, or its recorder was stopped"
-            )
+            walk.faults.append("the log ends without its summary: it was cut off, or its recorder was stopped")
             walk.unknown_loss = True
             return
         opcode, length = _RECORD_HEAD.unpack(head)
         if length > size - file.tell():
             what = "a chunk of messages" if opcode == Opcode.CHUNK else "a record"
-            walk.faults.append(
-                f"the log is cut off, or damaged, {file.tell()} bytes in: {what} is not all there"
-            )
+            walk.faults.append(f"the log is cut off, or damaged, {file.tell()} bytes in: {what} is not all there")
             walk.unknown_loss = True
             return
         body = file.read(length)
@@ -132,14 +129,12 @@ def _adopt_orphans(walk: _Walk) -> None:
             walk.topics[channel.topic].messages.append(message)
     nameless = sum(message[2] not in walk.channels for message in walk.orphans)
     if nameless:
-        walk.faults.append(
-            f"{nameless} messages are left out: the log does not say what topic they belong to"
-        )
+        walk.faults.append(f"{nameless} messages are left out: the log does not say what topic they belong to")
         walk.unknown_loss = True
 
 
-def _parsed(kind: type[McapRecord], body: bytes) -> McapRecord:
-    record: McapRecord = kind.read(ReadDataStream(io.BytesIO(body)))  # type: ignore[attr-defined]
+def _parsed(kind: type[_Record], body: bytes) -> _Record:
+    record: _Record = kind.read(ReadDataStream(io.BytesIO(body)))  # type: ignore[attr-defined]
     return record
 
 
@@ -161,18 +156,15 @@ def _take_record(walk: _Walk, opcode: int, body: bytes) -> None:
             _take_chunk(walk, body)
         elif opcode == Opcode.MESSAGE_INDEX and walk.last_chunk_damaged:
             index = _parsed(MessageIndex, body)
-            assert isinstance(index, MessageIndex)  # noqa: S101 - tells the type checker
             channel = walk.channels.get(index.channel_id)
             if channel is not None:
                 walk.topics.setdefault(channel.topic, _Topic()).in_damaged_chunks += len(index.records)
         elif opcode == Opcode.METADATA:
             metadata = _parsed(Metadata, body)
-            assert isinstance(metadata, Metadata)  # noqa: S101
             if metadata.name == "session":
                 walk.facts.update(metadata.metadata)
         elif opcode == Opcode.STATISTICS:
             statistics = _parsed(Statistics, body)
-            assert isinstance(statistics, Statistics)  # noqa: S101
             walk.stated = dict(statistics.channel_message_counts)
         else:
             _take_message_record(walk, opcode, body)
@@ -196,34 +188,29 @@ def _take_message_record(walk: _Walk, opcode: int, body: bytes) -> None:
             kept = payload if channel.topic in walk.wanted else b""
             walk.topics[channel.topic].messages.append((log_time, publish_time, channel_id, kept))
     elif opcode == Opcode.CHANNEL:
-        channel = _parsed(Channel, body)
-        assert isinstance(channel, Channel)  # noqa: S101
-        known = walk.channels.setdefault(channel.id, channel)
+        named = _parsed(Channel, body)
+        known = walk.channels.setdefault(named.id, named)
         if (known.topic, known.schema_id, known.message_encoding) != (
-            channel.topic,
-            channel.schema_id,
-            channel.message_encoding,
+            named.topic,
+            named.schema_id,
+            named.message_encoding,
         ):
             raise SessionError(
-                f'channel {channel.id} is defined twice, as "{known.topic}" and as "{channel.topic}": which '
+                f'channel {named.id} is defined twice, as "{known.topic}" and as "{named.topic}": which '
                 "messages belong to which cannot be told"
             )
-        walk.topics.setdefault(channel.topic, _Topic())
+        walk.topics.setdefault(named.topic, _Topic())
     elif opcode == Opcode.SCHEMA:
         schema = _parsed(Schema, body)
-        assert isinstance(schema, Schema)  # noqa: S101
         before = walk.schemas.setdefault(schema.id, schema)
         if (before.name, before.encoding, before.data) != (schema.name, schema.encoding, schema.data):
-            raise SessionError(
-                f'schema {schema.id} is defined twice, as "{before.name}" and as "{schema.name}"'
-            )
+            raise SessionError(f'schema {schema.id} is defined twice, as "{before.name}" and as "{schema.name}"')
 
 
 def _take_chunk(walk: _Walk, body: bytes) -> None:
     walk.chunks += 1
     walk.last_chunk_damaged = False
     chunk = _parsed(Chunk, body)
-    assert isinstance(chunk, Chunk)  # noqa: S101
     try:
         data = _inflate(walk, chunk)
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
@@ -282,7 +269,7 @@ def _decode(walk: _Walk, topic: str, content: Content) -> Readings:
         channel = walk.channels[channel_id]
         try:
             stamp, row, event = decode(factory, channel, walk.schemas.get(channel.schema_id), payload)
-        except _BROKEN + (AttributeError, TypeError, IndexError, KeyError, OverflowError) as error:
+        except (*_BROKEN, AttributeError, TypeError, IndexError, KeyError, OverflowError) as error:
             reason = str(error) or type(error).__name__
             failures[reason] = failures.get(reason, 0) + 1
             continue
@@ -307,9 +294,7 @@ def _lost(walk: _Walk, topic: str, undecodable: int) -> int | None:
     """How many messages the log says it held and that are not there; None where it does not say."""
     gathered = walk.topics[topic]
     if walk.stated is not None:
-        stated = sum(
-            walk.stated.get(key, 0) for key, channel in walk.channels.items() if channel.topic == topic
-        )
+        stated = sum(walk.stated.get(key, 0) for key, channel in walk.channels.items() if channel.topic == topic)
         return max(stated - len(gathered.messages), gathered.in_damaged_chunks) + undecodable
     if walk.unknown_loss:
         return None
@@ -324,9 +309,7 @@ def _counted(factory: DecoderFactory, channel: Channel, schema: Schema | None, p
     return None, [], None
 
 
-def _ros(
-    factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes, content: str
-) -> object:
+def _ros(factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes, content: str) -> object:
     """A CDR message by the stock decoder, once its type and length are what they must be."""
     needed = SCHEMAS[content]
     if schema is None or schema.name != needed:
@@ -353,9 +336,7 @@ def _position(factory: DecoderFactory, channel: Channel, schema: Schema | None, 
     return _stamp(message), _plausible([point.x, point.y, point.z], "position"), None
 
 
-def _acceleration(
-    factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes
-) -> Decoded:
+def _acceleration(factory: DecoderFactory, channel: Channel, schema: Schema | None, payload: bytes) -> Decoded:
     message = _ros(factory, channel, schema, payload, "acceleration")
     force, rate, turn = message.linear_acceleration, message.angular_velocity, message.orientation  # type: ignore[attr-defined]
     motion = _plausible([force.x, force.y, force.z, rate.x, rate.y, rate.z], "acceleration")
@@ -412,7 +393,7 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-_THREE = "================================================================================\nMSG: {name}\nfloat64 x\nfloat64 y\nfloat64 z\n"
+_THREE = "=" * 80 + "\nMSG: {name}\nfloat64 x\nfloat64 y\nfloat64 z\n"
 _POINT_STAMPED = _HEADER.format(body="geometry_msgs/Point point") + _THREE.format(name="geometry_msgs/Point")
 _IMU = (
     _HEADER.format(
@@ -461,22 +442,16 @@ def write(path: Path, facts: Mapping[str, str], messages: Iterable[Message]) -> 
         schemas = {
             "position": writer.register_schema(SCHEMAS["position"], "ros2msg", _POINT_STAMPED.encode()),
             "acceleration": writer.register_schema(SCHEMAS["acceleration"], "ros2msg", _IMU.encode()),
-            "events": writer.register_schema(
-                "steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA).encode()
-            ),
+            "events": writer.register_schema("steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA).encode()),
         }
         channels: dict[str, int] = {}
         encode = _Encoder()
         for sequence, message in enumerate(messages):
             if message.topic not in channels:
                 encoding = "json" if message.content == "events" else "cdr"
-                channels[message.topic] = writer.register_channel(
-                    message.topic, encoding, schemas[message.content]
-                )
-            writer.add_message(
-                channels[message.topic], message.arrival_ns, encode(message), message.stamp_ns, sequence
-            )
-        writer.finish()
+                channels[message.topic] = writer.register_channel(message.topic, encoding, schemas[message.content])
+            writer.add_message(channels[message.topic], message.arrival_ns, encode(message), message.stamp_ns, sequence)
+        writer.finish()  # type: ignore[no-untyped-call]
     partial.replace(path)
 
 
@@ -493,9 +468,7 @@ class _Encoder:
         if message.event is not None:
             return json.dumps(message.event, allow_nan=False).encode()
         assert message.values is not None  # noqa: S101
-        header = {
-            "stamp": dict(zip(("sec", "nanosec"), divmod(message.stamp_ns, 1_000_000_000), strict=True))
-        }
+        header = {"stamp": dict(zip(("sec", "nanosec"), divmod(message.stamp_ns, 1_000_000_000), strict=True))}
         values = [float(value) for value in message.values]
         if message.content == "position":
             return bytes(self._position({"header": {**header, "frame_id": "tracker"}, "point": _xyz(values)}))

@@ -40,8 +40,10 @@ def section(material: Material) -> Section | None:
 def _method(material: Material) -> tuple[str | Strong, ...]:
     listed = [f"{name} ({settings.type})" for name, settings in material.study.estimators.items()]
     return (
-        "Every estimator was run over the same raw streams and asked, at the arrival of each acceleration, where the "
-        "hand is at that instant, from what had arrived by then. Estimators: ",
+        (
+            "Every estimator was run over the same raw streams and asked, at the arrival of each acceleration, where"
+            " the hand is at that instant, from what had arrived by then. Estimators: "
+        ),
         Strong("; ".join(listed)),
         ".",
     )
@@ -85,8 +87,8 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
     where = f"{axes} axes together" if axes > 1 else f"along {material.study.axes[0]}"
     return Table(
         "table-accuracy",
-        f"Accuracy of each estimator against the reference, means over {counted(n, 'session')} ({where}). Lower is better in all "
-        "columns but the third, which should be near 95 %.",
+        f"Accuracy of each estimator against the reference, means over {counted(n, 'session')} ({where}). Lower is"
+        " better in all columns but the third, which should be near 95 %.",
         tuple(Column(title, index > 0) for index, title in enumerate(titles)),
         cells,
         "RMSE: root mean square distance to the reference. Stated SD: the error the estimator says it makes. In 95 % "
@@ -116,24 +118,20 @@ def _session_table(rows: list[Row]) -> Table:
             number(row["sd_mm"], 2),
             percent(row["coverage_95"], 0),
             seconds(row["lag_s"]),
-            NOTHING
-            if row["lag_low_s"] is None
-            else f"[{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]",
+            NOTHING if row["lag_low_s"] is None else f"[{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]",
             number(row["jitter_mm"], 2),
         )
         for row in rows[:_ROWS_MAX]
     )
     more = (
-        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/accuracy.csv."
-        if len(rows) > _ROWS_MAX
-        else ""
+        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/accuracy.csv." if len(rows) > _ROWS_MAX else ""
     )
     return Table(
         "table-accuracy-sessions",
         f"The same for each session, the lag with its 95 % interval.{more}",
         tuple(Column(title, index > 1) for index, title in enumerate(titles)),
         cells,
-        "Intervals of the lag: moving-block bootstrap over blocks of 1 s.",
+        "Intervals of the lag: moving-block bootstrap, blocks of 0.5 s.",
     )
 
 
@@ -205,9 +203,7 @@ def _view(material: Material, loaded: Recording, tracks: pd.DataFrame) -> View:
         if study.estimators[str(name)].type != "raw" and len(part[0]):
             shown[str(name)] = part
     pair: Mapping[str, Any] = {
-        "reference": None
-        if loaded.reference is None
-        else cut(loaded.reference.time, loaded.reference.value[:, axis]),
+        "reference": None if loaded.reference is None else cut(loaded.reference.time, loaded.reference.value[:, axis]),
         "accelerations": None if felt is None or len(felt) == 0 else cut(felt.time, felt.value[:, axis]),
     }
     frames = cut(tracker.arrival, tracker.value[:, axis])
@@ -217,9 +213,7 @@ def _view(material: Material, loaded: Recording, tracks: pd.DataFrame) -> View:
 def _liveliest(tracker: Samples) -> tuple[int, float]:
     """Axis, and beginning of the stretch, in which the tracker covers most ground."""
     best = (-1.0, 0, float(tracker.arrival[0]))
-    for begin in np.arange(
-        tracker.arrival[0], max(tracker.arrival[-1] - _VIEW_S, tracker.arrival[0]) + 1e-9, 0.5
-    ):
+    for begin in np.arange(tracker.arrival[0], max(tracker.arrival[-1] - _VIEW_S, tracker.arrival[0]) + 1e-9, 0.5):
         inside = (tracker.arrival >= begin) & (tracker.arrival <= begin + _VIEW_S)
         if inside.sum() < 2:
             continue

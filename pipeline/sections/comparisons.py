@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from pipeline.document.model import Column, Paragraph, Section, Table
 from pipeline.sections.material import Material, Row
 from pipeline.wording import (
+    NOTHING,
     TESTS,
     contrast,
     counted,
@@ -16,26 +19,24 @@ from pipeline.wording import (
     statistic,
 )
 
-_TITLES = (
-    "Measure",
-    "Test",
-    "Comparison",
-    "n",
-    "Statistic",
-    "p",
-    "p corrected",
-    "p adjusted",
-    "Effect size [95 %]",
-    "Mean difference",
-    "Reduction",
-)
 _EXPLAINED = {
-    "rm_anova": "Repeated-measures ANOVA asks whether the means of the conditions differ more than chance would have it; "
-    "p corrected is Greenhouse and Geisser's, for conditions that vary unequally; η²G is the share of variance that goes with the condition.",
-    "t_paired": "The paired t test asks the same of two conditions; d_z is the mean difference in units of the differences' SD.",
-    "wilcoxon": "Wilcoxon's signed-rank test compares two conditions by the ranks of the differences, exactly, with ties "
-    "and without those that are zero; r_rb runs from −1 to 1.",
-    "friedman": "Friedman's test compares conditions by each participant's ranking; W runs from 0 (no agreement among participants) to 1.",
+    "rm_anova": (
+        "Repeated-measures ANOVA (rm ANOVA) asks whether the means of the conditions differ more than chance would have"
+        " it; p corrected is Greenhouse and Geisser's, for conditions that vary unequally; η²G is the share of variance"
+        " that goes with the condition."
+    ),
+    "t_paired": (
+        "The paired t test asks the same of two conditions; d_z is the mean difference in units of the differences' SD."
+    ),
+    "wilcoxon": (
+        "Wilcoxon's signed-rank test compares two conditions by the ranks of the differences, exactly, with ties "
+        "at their mean rank; W+ is the sum of the ranks in favour of the first condition, and r_rb (rank-biserial "
+        "correlation) runs from −1 to 1."
+    ),
+    "friedman": (
+        "Friedman's test compares conditions by each participant's ranking; W runs from 0 (no agreement among "
+        "participants) to 1."
+    ),
 }
 
 
@@ -45,33 +46,35 @@ def section(material: Material) -> Section | None:
     if not rows:
         return None
     tests = list(dict.fromkeys(row["test"] for row in rows))
-    cells = tuple(_cells(row) for row in rows)
+    columns = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NOTHING, "") for row in rows)]
     table = Table(
         "table-comparisons",
-        f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large if "
-        f"there were none; the study's level is {100 * material.study.alpha:g} %.",
-        tuple(Column(title, index > 2) for index, title in enumerate(_TITLES)),
-        cells,
-        "Only participants with a value in every condition count (n). Mean difference: first minus second condition; "
-        "reduction: relative to the first.",
+        f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
+        f" if there were none; the study's level is {100 * material.study.alpha:g} %.",
+        tuple(Column(title, index > 2) for index, (title, _) in enumerate(columns)),
+        tuple(tuple(cell(row) for _, cell in columns) for row in rows),
+        "Only participants with a value in every condition count (n). Difference: first minus second condition, of the "
+        "means; reduction: relative to the first.",
     )
-    return Section(
-        "comparisons", "All comparisons", (Paragraph((" ".join(_EXPLAINED[test] for test in tests),)), table)
-    )
+    explained = Paragraph((" ".join(_EXPLAINED[test] for test in tests),))
+    return Section("comparisons", "All comparisons", (explained, table))
 
 
-def _cells(row: Row) -> tuple[str, ...]:
-    details = row["details"] or {}
-    return (
-        measure_label(row["measure"]),
-        TESTS[row["test"]],
-        contrast(row),
-        f"{row['n']}",
-        statistic(row) if row["status"] == "ok" else row["status"],
-        p_value(row["p"]),
-        p_value(details.get("p_gg")),
-        p_value(row["p_adjusted"]),
-        effect_size(row),
-        number(row["mean_difference"]),
-        percent(row["reduction"]),
-    )
+def _corrected_p(row: Row) -> str:
+    return p_value((row["details"] or {}).get("p_gg"))
+
+
+_COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
+    ("Measure", lambda row: measure_label(row["measure"])),
+    ("Test", lambda row: TESTS[row["test"]]),
+    ("Compared", contrast),
+    ("n", lambda row: f"{row['n']}"),
+    ("Statistic", lambda row: statistic(row) if row["status"] == "ok" else row["status"]),
+    ("p", lambda row: p_value(row["p"])),
+    ("p corrected", _corrected_p),
+    ("p adjusted", lambda row: p_value(row["p_adjusted"])),
+    ("Effect size [95 %]", effect_size),
+    ("Difference", lambda row: number(row["mean_difference"])),
+    ("Reduction", lambda row: percent(row["reduction"])),
+)
+"""The table's columns; one that no row fills is left out."""

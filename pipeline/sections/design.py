@@ -12,17 +12,13 @@ def section(material: Material) -> Section:
     study = material.study
     blocks: list[Block] = [Paragraph(_participants(material))]
     if len(study.conditions) > 1:
-        text = (
-            f"{conditions_text(study.conditions)}. A difference is the first minus the second in this order."
-        )
+        text = f"{conditions_text(study.conditions)}. A difference is the first minus the second in this order."
         blocks.append(Paragraph((Strong("Conditions: "), text)))
     else:
         blocks.append(Paragraph((Strong("Condition: "), f"{study.conditions[0]}.")))
     if material.sessions:
         blocks.append(
-            Paragraph(
-                (Strong("Sessions: "), f"{counted(len(material.sessions), 'log')} of raw sensor streams.")
-            )
+            Paragraph((Strong("Sessions: "), f"{counted(len(material.sessions), 'log')} of raw sensor streams."))
         )
     if study.shown:
         shown = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
@@ -44,9 +40,7 @@ def _participants(material: Material) -> Text:
         text += f" ({listing([f'{count} {name}' for name, count in facts['sex'].items()])})"
     if facts.get("age"):
         age = facts["age"]
-        text += (
-            f", aged {number(age['min'], 0)} to {number(age['max'], 0)} years (mean {number(age['mean'], 1)})"
-        )
+        text += f", aged {number(age['min'], 0)} to {number(age['max'], 0)} years (mean {number(age['mean'], 1)})"
     if material.study.participants is None:
         text += "; the study has no participants table, so age and sex are not known"
     return (Strong("Participants: "), text + ".")

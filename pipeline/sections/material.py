@@ -71,17 +71,11 @@ class Material:
 
 def safe_name(text: str) -> str:
     """A name fit for a file: letters, digits and dashes."""
-    return "-".join(
-        part for part in "".join(c if c.isalnum() and c.isascii() else " " for c in text).split()
-    ).lower()
+    return "-".join(part for part in "".join(c if c.isalnum() and c.isascii() else " " for c in text).split()).lower()
 
 
 def conditions_text(conditions: Sequence[str]) -> str:
     """The conditions for a sentence, the baseline named."""
     from pipeline.wording import listing
 
-    return (
-        f"{listing(list(conditions))} ({conditions[0]} is the baseline)"
-        if len(conditions) > 1
-        else conditions[0]
-    )
+    return f"{listing(list(conditions))} ({conditions[0]} is the baseline)" if len(conditions) > 1 else conditions[0]

@@ -32,8 +32,8 @@ def selection(material: Material) -> Section | None:
         return None
     drawn = next(name for name in names if "mse" in name)
     text = (
-        "How far from the target people selected. MSE is a participant's mean squared distance over trials; RMSE is the "
-        "square root of the mean of the participants' MSEs, in the unit of the display."
+        "How far from the target people selected. MSE is a participant's mean squared distance over trials; RMSE is the"
+        " square root of the mean of the participants' MSEs, in the unit of the display."
     )
     blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-selection", names)]
     blocks += _measured(material, drawn)
@@ -80,7 +80,7 @@ def others(material: Material) -> Section | None:
     return Section("others", "Further measures", tuple(blocks))
 
 
-def _descriptives(material: Material, id: str, names: Sequence[str]) -> Table:
+def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Table:
     titles = ("Measure", "Condition", "n", "Mean", "SD", "Median", "95 % interval of the mean")
     rows = [row for name in names for row in material.rows("descriptives") if row["measure"] == name]
     cells = tuple(
@@ -96,7 +96,7 @@ def _descriptives(material: Material, id: str, names: Sequence[str]) -> Table:
         for row in rows
     )
     caption = "Means over participants, each participant one value in each condition."
-    return Table(id, caption, tuple(Column(title, index > 1) for index, title in enumerate(titles)), cells)
+    return Table(table_id, caption, tuple(Column(title, index > 1) for index, title in enumerate(titles)), cells)
 
 
 def _measured(material: Material, measure: str) -> list[Block]:
@@ -112,9 +112,7 @@ def _measured(material: Material, measure: str) -> list[Block]:
         else "Small marks are participants; the large one is their mean with its 95 % interval."
     )
     if len(conditions) == 2:
-        reading += (
-            " Right: each participant's difference; an interval that leaves out zero speaks for a real one."
-        )
+        reading += " Right: each participant's difference; an interval that leaves out zero speaks for a real one."
     blocks: list[Block] = [
         material.figure(
             f"measure-{safe_name(measure)}",
@@ -144,9 +142,10 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
         material.figure(
             f"ratings-{safe_name(questionnaire)}",
             figures.workload,
-            f"{title} ratings by scale and condition (n = {n}): boxes hold the middle half of the participants, the thick "
-            "line is the median, marks are participants. Compare boxes of the same scale.",
-            f"Box plots of the {title} scales {listing([short_label(name) for name in scales])} for {listing(conditions)}.",
+            f"{title} ratings by scale and condition (n = {n}): boxes hold the middle half of the participants, the"
+            " thick line is the median, marks are participants. Compare boxes of the same scale.",
+            f"Box plots of the {title} scales {listing([short_label(name) for name in scales])} for"
+            f" {listing(conditions)}.",
             wide,
         )
     )
@@ -165,18 +164,10 @@ def _ratings_table(material: Material, questionnaire: str, title: str, names: li
         cells = [short_label(name)]
         for condition in conditions:
             row = found.get((name, condition))
-            cells += (
-                ["–", "–", "0"] if row is None else [number(row["mean"]), number(row["sd"]), f"{row['n']}"]
-            )
+            cells += ["–", "–", "0"] if row is None else [number(row["mean"]), number(row["sd"]), f"{row['n']}"]
         rows.append(tuple(cells))
-    note = (
-        "Total: a participant's sum over the scales."
-        if any(name.endswith("/total") for name in names)
-        else ""
-    )
-    return Table(
-        f"table-{safe_name(questionnaire)}", f"{title} ratings by scale.", tuple(columns), tuple(rows), note
-    )
+    note = "Total: a participant's sum over the scales." if any(name.endswith("/total") for name in names) else ""
+    return Table(f"table-{safe_name(questionnaire)}", f"{title} ratings by scale.", tuple(columns), tuple(rows), note)
 
 
 def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
@@ -195,7 +186,9 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     )
     methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
     note = f"Methods: {methods}. Adjusted: {_families(rows)}."
-    caption = f"Tests of the {title} scales. Judge by the adjusted p: with many tests some fall below any level by chance."
+    caption = (
+        f"Tests of the {title} scales. Judge by the adjusted p: with many tests some fall below any level by chance."
+    )
     return Table(
         f"table-{safe_name(questionnaire)}-tests",
         caption,
@@ -207,11 +200,14 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
 
 def _families(rows: list[Row]) -> str:
     """How p values were adjusted, and over what."""
-    adjusts = list(dict.fromkeys(row["adjust"] for row in rows))
-    if adjusts == ["none"]:
+    methods = [
+        name.replace("_", " ").title() for name in dict.fromkeys(row["adjust"] for row in rows) if name != "none"
+    ]
+    if not methods:
         return "no"
-    over = "the pairs within each scale" if len({row["contrast"] for row in rows}) > 2 else "the scales"
-    return f"{', '.join(name.replace('_', ' ').title() for name in adjusts)} over {over}"
+    pairs = len({row["contrast"] for row in rows if row["contrast"] is not None}) > 1
+    over = "the scales, pairs over those of their scale" if pairs else "the scales"
+    return f"{', '.join(methods)} over {over}"
 
 
 def _shown(material: Material) -> Table:

@@ -38,14 +38,12 @@ def section(material: Material) -> Section:
 def _question(material: Material) -> Text:
     conditions = material.study.conditions
     compared = (
-        ""
-        if len(conditions) == 1
-        else f" under {counted(len(conditions), 'condition')}, {listing(list(conditions))}"
+        "" if len(conditions) == 1 else f" under {counted(len(conditions), 'condition')}, {listing(list(conditions))}"
     )
     people = counted(material.results["study"]["participants"]["n"], "participant")
     if material.rows("comparisons"):
         return (
-            Strong(f"Does it make a difference to people which system they use? "),
+            Strong("Does it make a difference to people which system they use? "),
             f"{people}{compared}.",
         )
     return (Strong("How accurately does each estimator follow the hand? "), f"{people}{compared}.")
@@ -53,11 +51,7 @@ def _question(material: Material) -> Text:
 
 def _headline_rows(material: Material) -> list[Row]:
     """One omnibus row a measure that is no questionnaire's, the well-known measures first."""
-    rows = [
-        row
-        for row in material.rows("comparisons")
-        if "/" not in row["measure"] and row["effect"] == "condition"
-    ]
+    rows = [row for row in material.rows("comparisons") if "/" not in row["measure"] and row["effect"] == "condition"]
     if len(material.study.conditions) > 2:
         rows = [row for row in rows if row["contrast"] is None]
     first = {row["measure"]: row for row in reversed(rows)}
@@ -111,7 +105,7 @@ def _answers(material: Material) -> list[Text]:
         if row["reduction"] is not None:
             first, second = material.study.conditions
             change = f"{reduction_phrase(row['reduction'])} with {second} relative to {first}; "
-        answers.append((Strong(f"{label}: "), f"{change}{verdict} ({comparison_sentence(row)})."))
+        answers.append((Strong(f"{label}: "), f"{change}{verdict} ({comparison_sentence(row, with_reduction=False)})."))
     answers += _ratings(material)
     means = _means(material)
     if means:
@@ -121,8 +115,10 @@ def _answers(material: Material) -> list[Text]:
         answers.append(
             (
                 Strong("Accuracy: "),
-                f"{best} comes closest to the reference, with a root mean square error (RMSE) of {number(lowest, 1)} mm "
-                f"on average over {counted(n, 'session')}.{tail}",
+                (
+                    f"{best} comes closest to the reference, with a root mean square error (RMSE) of"
+                    f" {number(lowest, 1)} mm on average over {counted(n, 'session')}.{tail}"
+                ),
             )
         )
     return answers
@@ -167,9 +163,7 @@ def _cautions(material: Material) -> list[Text]:
             )
         )
     if study.data_origin == "simulated":
-        cautions.append(
-            (Strong("The data are simulated: "), "they show what a model does, not what people do.")
-        )
+        cautions.append((Strong("The data are simulated: "), "they show what a model does, not what people do."))
     n = material.results["study"]["participants"]["n"]
     if material.rows("comparisons") and n < 8:
         cautions.append(
@@ -193,44 +187,38 @@ def _cautions(material: Material) -> list[Text]:
         )
     undefined = sum(row["status"] != "ok" for row in material.rows("comparisons"))
     if undefined:
-        cautions.append(
-            (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
-        )
+        cautions.append((f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",))
     contradictions = [row for row in material.rows("printed") if row["verdict"] == "contradiction"]
     if contradictions:
         verb = "contradicts" if len(contradictions) == 1 else "contradict"
         cautions.append(
-            (
-                f"{counted(len(contradictions), 'printed figure')} {verb} others in the same publication; see there.",
-            )
+            (f"{counted(len(contradictions), 'printed figure')} {verb} others in the same publication; see there.",)
         )
-    lost = [
-        row
-        for row in material.rows("exclusions")
-        if row["what"] in ("session set aside", "session read in part")
-    ]
+    lost = [row for row in material.rows("exclusions") if row["what"] in ("session set aside", "session read in part")]
     if lost:
-        cautions.append(
-            (f"{counted(len(lost), 'session')} could not be used, or only in part; see data quality.",)
-        )
+        cautions.append((f"{counted(len(lost), 'session')} could not be used, or only in part; see data quality.",))
     others = len(material.rows("exclusions")) - len(lost)
     if others:
         cautions.append(
             (
-                f"{counted(others, 'further exclusion or gap', 'further exclusions or gaps')} in the data; see data quality.",
+                (
+                    f"{counted(others, 'further exclusion or gap', 'further exclusions or gaps')} in the data; see data"
+                    " quality."
+                ),
             )
         )
     honest = [
-        row["estimator"]
-        for row in material.rows("accuracy")
-        if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
+        row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
     ]
     if honest:
         names = listing(list(dict.fromkeys(honest)))
         cautions.append(
             (
                 Strong("Stated uncertainty too small "),
-                f"in at least one session for {names}: the 95 % intervals hold the reference in less than 90 % of instants.",
+                (
+                    f"in at least one session for {names}: the 95 % intervals hold the reference in less than 90 % of"
+                    " instants."
+                ),
             )
         )
     return cautions

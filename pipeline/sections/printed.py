@@ -18,7 +18,10 @@ def section(material: Material) -> Section | None:
     text: Text = (
         f"{rows[0]['source']} prints {counted(len(figures), 'figure')} of this study. ",
         Strong(f"{agreeing} of them come out to the last printed digit"),
-        f", {len(figures) - agreeing} not. Printed figures were also held against each other, in the room that rounding leaves.",
+        (
+            f", {len(figures) - agreeing} not. Printed figures were also held against each other, in the room that"
+            " rounding leaves."
+        ),
     )
     blocks: list[Block] = [Paragraph(text)]
     contradictions: list[Text] = [
@@ -31,8 +34,8 @@ def section(material: Material) -> Section | None:
     blocks.append(
         Table(
             "table-printed",
-            "Each printed figure with the computed one at as many digits. “Differs” names what no data can give together "
-            "with the rest, or what these data do not give.",
+            "Each printed figure with the computed one at as many digits. “Differs” names what no data can give"
+            " together with the rest, or what these data do not give.",
             (Column("Figure", False), Column("Printed"), Column("Computed"), Column("Verdict", False)),
             tuple((row["what"], row["printed"], row["computed"], row["verdict"]) for row in figures),
         )

@@ -17,8 +17,9 @@ def section(material: Material) -> Section:
     """Provenance."""
     used = {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
     text = (
-        f"Made by Steadyhand from the study folder “{material.name}”, {counted(len(material.inputs), 'file')}. Every number in this "
-        "report stands in results.json and in the tables folder beside it; provenance.json holds the settings and the command."
+        f"Made by Steadyhand from the study folder “{material.name}”, {counted(len(material.inputs), 'file')}. Every"
+        " number in this report stands in results.json and in the tables folder beside it; provenance.json holds the"
+        " settings and the command."
     )
     listed = sorted(material.inputs.items())[:_FILES_MAX]
     more = f" The first {_FILES_MAX} of {len(material.inputs)}." if len(material.inputs) > _FILES_MAX else ""

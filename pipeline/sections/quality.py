@@ -23,9 +23,7 @@ def section(material: Material) -> Section:
         elif material.rows("accuracy"):
             blocks.append(
                 Paragraph(
-                    (
-                        "No session holds a still stretch of a second or more, so the sensors' noise cannot be told.",
-                    )
+                    ("No session holds a still stretch of a second or more, so the sensors' noise cannot be told.",)
                 )
             )
     agreement = material.rows("replay_agreement")
@@ -65,9 +63,7 @@ def _quality_table(material: Material) -> Table:
         for row in rows[:_ROWS_MAX]
     )
     more = (
-        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/quality.csv."
-        if len(rows) > _ROWS_MAX
-        else ""
+        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/quality.csv." if len(rows) > _ROWS_MAX else ""
     )
     return Table(
         "table-quality",
@@ -141,9 +137,7 @@ def _agreement_table(material: Material) -> Table:
         "to rounding, means that the log shows what it says it showed.",
         tuple(
             Column(title, index > 1)
-            for index, title in enumerate(
-                ("Session", "Estimator", "Samples", "Largest (mm)", "Root mean square (mm)")
-            )
+            for index, title in enumerate(("Session", "Estimator", "Samples", "Largest (mm)", "Root mean square (mm)"))
         ),
         tuple(
             (
@@ -162,11 +156,7 @@ def _exclusions(material: Material) -> list[Block]:
     rows = material.rows("exclusions")
     if not rows:
         return [
-            Paragraph(
-                (
-                    "Nothing was left out: every session, participant and value of the study is in this report.",
-                )
-            )
+            Paragraph(("Nothing was left out: every session, participant and value of the study is in this report.",))
         ]
     titles = ("Participant", "Condition", "Session", "Measure", "What", "Reason")
     cells = tuple(
@@ -180,11 +170,7 @@ def _exclusions(material: Material) -> list[Block]:
         )
         for row in rows[:_ROWS_MAX]
     )
-    more = (
-        f" The first {_ROWS_MAX} of {len(rows)}; all are in tables/exclusions.csv."
-        if len(rows) > _ROWS_MAX
-        else ""
-    )
+    more = f" The first {_ROWS_MAX} of {len(rows)}; all are in tables/exclusions.csv." if len(rows) > _ROWS_MAX else ""
     return [
         Table(
             "table-exclusions",

@@ -23,10 +23,9 @@ def run(work: Work) -> Outcome:
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
-    tracks = {
-        name: rows
-        for name, rows in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False)
-    }
+    tracks: dict[str, pd.DataFrame] = {}
+    for name, part in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False):
+        tracks[str(name)] = part
     rows = [_accuracy(work, loaded, name, rows) for name, rows in tracks.items()]
     tables.write("accuracy", tables.frame("accuracy", [row for row in rows if row]), work.out)
     tables.write("replay_agreement", tables.frame("replay_agreement", _agreement(work, loaded)), work.out)
@@ -125,13 +124,12 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
     return noise.still_by_acceleration(samples) if samples is not None else None
 
 
-def _trials(work: Work, events: pd.DataFrame, tracks: dict[Any, pd.DataFrame]) -> Iterator[Row]:
+def _trials(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
     starts = events[events["type"] == "trial_start"]
     selections = events[events["type"] == "selection"]
-    for index, (start, following) in enumerate(
-        zip(starts.itertuples(), starts["time_ns"].shift(-1), strict=True)
-    ):
+    start: Any
+    for index, (start, following) in enumerate(zip(starts.itertuples(), starts["time_ns"].shift(-1), strict=True)):
         after = selections[selections["time_ns"] >= start.time_ns]
         if not pd.isna(following):
             after = after[after["time_ns"] < following]
@@ -145,17 +143,14 @@ def _trials(work: Work, events: pd.DataFrame, tracks: dict[Any, pd.DataFrame]) -
             yield trial | {"estimator": "recorded"}
             continue
         selection = after.iloc[0]
-        target = {
-            axis: _first(selection[f"target_{axis}_mm"], getattr(start, f"target_{axis}_mm"))
-            for axis in "xyz"
-        }
+        target = {axis: _first(selection[f"target_{axis}_mm"], getattr(start, f"target_{axis}_mm")) for axis in "xyz"}
         axes = [axis for axis in "xyz" if target[axis] is not None]
         duration_s = float(selection["time_ns"] - start.time_ns) * tables.NANOSECONDS
         shown: dict[str, pd.Series] = {"recorded": selection}
         for name, rows in tracks.items():
             before = rows[rows["time_ns"] <= selection["time_ns"]]
             if len(before):
-                shown[str(name)] = before.iloc[-1]
+                shown[name] = before.iloc[-1]
         for name, where in shown.items():
             squared = _squared_error(where, target, axes if name == "recorded" else list(work.study.axes))
             error = None if squared is None else float(np.sqrt(squared))

@@ -22,6 +22,7 @@ from pipeline.statistics.paired import t_paired
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import FloatArray, Result
 from pipeline.study import Comparison, Study
+from pipeline.wording import measure_order
 
 Row = dict[str, Any]
 PAIRWISE = ("t_paired", "wilcoxon")
@@ -50,9 +51,7 @@ def run(work: Work) -> Outcome:
     for name in _SESSION_TABLES:
         entries = work.entries["ingest" if name == "quality" else "assess"]
         found[name] = _without_excluded(study, work, tables.read(name, entries))
-    found["shown_at_selection"] = tables.frame(
-        "shown_at_selection", shown_at_selection(study, found["trials"])
-    )
+    found["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, found["trials"]))
     if study.printed is not None:
         found["printed"] = compare_printed(
             work.folder / study.printed, found["descriptives"], found["comparisons"], study.alpha
@@ -66,9 +65,7 @@ def run(work: Work) -> Outcome:
 def _people(work: Work, measures: pd.DataFrame) -> Row:
     """How many took part, and what participants.csv says of them."""
     if work.study.participants is not None:
-        return study_tables.participant_facts(
-            study_tables.read_participants(work.folder / work.study.participants)
-        )
+        return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants))
     people = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     return {"n": len(people)}
 
@@ -107,16 +104,14 @@ def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataF
 def participant_means(study: Study, measures: pd.DataFrame, measure: str) -> pd.DataFrame:
     """A row a participant, a column a condition in the study's order: means over everything else, NaN if missing."""
     rows = measures[measures["measure"] == measure]
-    wide = rows.pivot_table(
-        index="participant", columns="condition", values="value", aggfunc="mean", sort=True
-    )
+    wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean", sort=True)
     return wide.reindex(columns=list(study.conditions))
 
 
 def descriptives(study: Study, measures: pd.DataFrame) -> list[Row]:
     """n, mean, SD, median and the t interval of the mean, a row a measure and condition."""
     rows: list[Row] = []
-    for measure in sorted(set(measures["measure"])):
+    for measure in sorted(set(measures["measure"]), key=measure_order):
         wide = participant_means(study, measures, measure)
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
@@ -173,7 +168,7 @@ def comparisons(study: Study, measures: pd.DataFrame) -> tuple[list[Row], list[R
     left_out: list[Row] = []
     for entry in study.comparisons:
         family: list[list[Row]] = []
-        for measure in _matching(entry, sorted(set(measures["measure"]))):
+        for measure in _matching(entry, sorted(set(measures["measure"]), key=measure_order)):
             family.append(_compare(study, entry, measure, measures, left_out))
         if entry.test in PAIRWISE and len(study.conditions) > 2:
             for pairs in family:
@@ -193,14 +188,13 @@ def _matching(entry: Comparison, known: Sequence[str]) -> list[str]:
         found = [name for name in known if name == entry.measure]
     if not found:
         raise PipelineError(
-            f'study.yaml: comparisons: there is no measure "{entry.measure}" in the data{did_you_mean(entry.measure, known)}'
+            f'study.yaml: comparisons: there is no measure "{entry.measure}" in the'
+            f" data{did_you_mean(entry.measure, known)}"
         )
     return found
 
 
-def _compare(
-    study: Study, entry: Comparison, measure: str, measures: pd.DataFrame, left_out: list[Row]
-) -> list[Row]:
+def _compare(study: Study, entry: Comparison, measure: str, measures: pd.DataFrame, left_out: list[Row]) -> list[Row]:
     if len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons: need two conditions or more, and conditions lists one")
     if len(entry.within) > 1:

@@ -36,7 +36,9 @@ def run(work: Work) -> Outcome:
     log = read_log(session.path, wanted)
     participant, condition = _who(session, log, study)
     in_part = list(log.faults)
-    quality, positions, imu = [], [], []
+    quality: list[dict[str, Any]] = []
+    positions: list[pd.DataFrame] = []
+    imu: list[pd.DataFrame] = []
     for name, stream in study.streams.items():
         readings = _stream(log, name, stream, in_part)
         if readings is None:
@@ -50,9 +52,7 @@ def run(work: Work) -> Outcome:
             tables.write(name, pd.concat(parts), work.out)
     tables.write("events", events, work.out)
     tables.write("quality", tables.frame("quality", quality), work.out)
-    in_part += [
-        f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]
-    ]
+    in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
 
@@ -63,9 +63,7 @@ def _who(session: Session, log: Log, study: Study) -> tuple[str, str]:
         fact = log.facts.get(what)
         by_fact = unicodedata.normalize("NFC", fact) if fact else None
         if by_name and by_fact and by_name != by_fact:
-            raise SessionError(
-                f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them'
-            )
+            raise SessionError(f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them')
         found = by_name or by_fact
         if not found:
             raise SessionError(f"neither its name nor its metadata says which {what} it is")
@@ -137,9 +135,7 @@ def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.Da
     return tables.as_table("positions", pd.DataFrame(columns))
 
 
-def _events(
-    log: Log, study: Study, session: str, in_part: list[str], quality: list[dict[str, Any]]
-) -> pd.DataFrame:
+def _events(log: Log, study: Study, session: str, in_part: list[str], quality: list[dict[str, Any]]) -> pd.DataFrame:
     """The session's events by arrival."""
     if study.events is None:
         return tables.frame("events", [])

@@ -141,9 +141,7 @@ def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
     return hit.astype(bool)
 
 
-def _without_excluded(
-    study: Study, values: pd.DataFrame, trials: pd.DataFrame, exclusions: list[Row]
-) -> pd.DataFrame:
+def _without_excluded(study: Study, values: pd.DataFrame, trials: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
     """The values that stay; an exclusion that fits nothing in the data is an error, for it is likely misspelt."""
     values = values.reset_index(drop=True)
     for excluded in study.exclusions:
@@ -153,9 +151,7 @@ def _without_excluded(
                 known |= set(trials[column].dropna())
             if wanted is not None and wanted not in known:
                 hint = did_you_mean(wanted, sorted(known))
-                raise PipelineError(
-                    f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}'
-                )
+                raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
         values = values[~_matches(excluded, values)]
         exclusions.append(
             {
@@ -184,9 +180,9 @@ def _unselected(trials: pd.DataFrame) -> list[Row]:
     recorded = trials[trials["estimator"] == "recorded"]
     missing = recorded[recorded["squared_error_mm2"].isna()]
     rows = []
-    for (participant, condition, session), found in missing.groupby(
-        [*CELL, "session"], dropna=False, sort=True
-    ):
+    cell: Any
+    for cell, found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
+        participant, condition, session = cell
         named = ", ".join(str(trial) for trial in found["trial"][:10]) + (", …" if len(found) > 10 else "")
         rows.append(
             {
@@ -216,13 +212,14 @@ def _finite(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
                 "reason": f"the cell is empty or not a finite number{at}",
             }
         )
-    return values[np.isfinite(values["value"])]
+    return values.loc[np.isfinite(values["value"])]
 
 
 def _cells(values: pd.DataFrame) -> pd.DataFrame:
     """A participant's mean in each condition and further factor: one row a cell and measure."""
     keys = [*CELL, "factors", "measure"]
-    return values.groupby(keys, dropna=False, sort=False)["value"].mean().reset_index()
+    means: Any = values.groupby(keys, dropna=False, sort=False)["value"].mean().reset_index()
+    return pd.DataFrame(means)
 
 
 def _totals(cells: pd.DataFrame) -> pd.DataFrame:
@@ -235,9 +232,7 @@ def _totals(cells: pd.DataFrame) -> pd.DataFrame:
         scales = set(answered["scale"])
         if "total" in scales:
             continue
-        for (participant, condition, factors), cell in answered.groupby(
-            [*CELL, "factors"], dropna=False, sort=False
-        ):
+        for (participant, condition, factors), cell in answered.groupby([*CELL, "factors"], dropna=False, sort=False):
             if set(cell["scale"]) == scales and len(scales) > 1:
                 rows.append((participant, condition, factors, f"{questionnaire}/total", cell["value"].sum()))
     return pd.DataFrame(rows, columns=[*CELL, "factors", "measure", "value"])
@@ -248,9 +243,7 @@ def _check_sources(values: pd.DataFrame) -> None:
     sources = values.groupby("measure")["source"].unique()
     for measure, found in sources.items():
         if len(found) > 1:
-            raise PipelineError(
-                f'"{measure}" stands both in {found[0]} and in {found[1]}; rename one of them'
-            )
+            raise PipelineError(f'"{measure}" stands both in {found[0]} and in {found[1]}; rename one of them')
 
 
 def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
@@ -270,9 +263,7 @@ def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
                 }
             )
         listed |= set(named)
-    excluded = {
-        e.participant for e in work.study.exclusions if e.participant and not (e.measure or e.session)
-    }
+    excluded = {e.participant for e in work.study.exclusions if e.participant and not (e.measure or e.session)}
     seen = set(zip(measures["participant"], measures["condition"], strict=True))
     seen |= {(session.participant, session.condition) for session in work.sessions}
     for participant in sorted(listed):

@@ -60,9 +60,7 @@ def _result(effect: str, n: int, **known: Any) -> Result:
     )
 
 
-def _tested(
-    effect: str, scores: FloatArray, error: float, other_variation: float, values: FloatArray
-) -> Result:
+def _tested(effect: str, scores: FloatArray, error: float, other_variation: float, values: FloatArray) -> Result:
     n, contrasts = scores.shape
     explained = float(n * np.sum(scores.mean(axis=0) ** 2))
     df1, df2 = float(contrasts), float(contrasts * (n - 1))
@@ -86,9 +84,7 @@ def _tested(
     )
 
 
-def _sphericity(
-    scores: FloatArray, cells: int, statistic: float, df1: float, df2: float
-) -> dict[str, float | None]:
+def _sphericity(scores: FloatArray, cells: int, statistic: float, df1: float, df2: float) -> dict[str, float | None]:
     """Mauchly's test and the corrected p values; nothing of it applies to a single contrast."""
     n, d = scores.shape
     names = ("p_gg", "p_hf", "epsilon_gg", "epsilon_hf", "mauchly_w", "mauchly_p")

@@ -20,12 +20,12 @@ def dz_interval(dz: float, n: int, level: float = 0.95) -> tuple[float | None, f
     """Interval of d_z from the noncentral t distribution."""
     t, tail = dz * np.sqrt(n), (1 - level) / 2
     width = 10 + abs(t)
-    bounds = (
-        _solve(lambda shift: noncentral_t_cdf(t, n - 1, shift) - target, t - width, t + width)
-        for target in (1 - tail, tail)
-    )
-    low, high = (None if bound is None else float(bound / np.sqrt(n)) for bound in bounds)
-    return low, high
+
+    def bound(target: float) -> float | None:
+        found = _solve(lambda shift: noncentral_t_cdf(t, n - 1, shift) - target, t - width, t + width)
+        return None if found is None else float(found / np.sqrt(n))
+
+    return bound(1 - tail), bound(tail)
 
 
 def noncentral_t_cdf(t: float, df: int, noncentrality: float) -> float:
@@ -57,7 +57,7 @@ def partial_eta_squared_interval(
             return float(stats.f.cdf(statistic, df1, df2))
         return float(stats.ncf.cdf(statistic, df1, df2, noncentrality))
 
-    bounds = []
+    bounds: list[float | None] = []
     for target in (1 - tail, tail):
         if below(0.0) < target:
             bounds.append(0.0)
@@ -71,10 +71,6 @@ def partial_eta_squared_interval(
 
 
 def _solve(function: Callable[[float], float], low: float, high: float) -> float | None:
-    if (
-        not np.isfinite(function(low))
-        or not np.isfinite(function(high))
-        or function(low) * function(high) > 0
-    ):
+    if not np.isfinite(function(low)) or not np.isfinite(function(high)) or function(low) * function(high) > 0:
         return None
     return float(optimize.brentq(function, low, high, xtol=1e-10, rtol=1e-12))

@@ -98,9 +98,7 @@ def hodges_lehmann(differences: FloatArray, level: float = 0.95) -> tuple[float,
 def friedman(values: FloatArray, effect: str = "condition") -> Result:
     """Friedman's test of values (n, k) with ties corrected; effect size Kendall's W; Iman and Davenport's F beside."""
     n, k = values.shape
-    blank = Result(
-        effect, "chi2", "Friedman, chi-squared approximation, ties corrected", "Kendall's W", n, df1=k - 1
-    )
+    blank = Result(effect, "chi2", "Friedman, chi-squared approximation, ties corrected", "Kendall's W", n, df1=k - 1)
     status = too_few(n) or degenerate(values)
     if status is not None:
         return Result(**{**vars(blank), "status": status})

@@ -1,0 +1,97 @@
+"""Small studies and logs, made when a test needs them."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.formats.mcap import Message, in_order, write
+
+EPOCH_NS = 1_700_000_000_000_000_000
+CLONE = Path(__file__).resolve().parents[1]
+
+STREAMS = """
+streams:
+  tracker:   {topic: /tracker/position, kind: position, stamp: arrival, latency_s: 0.1, noise_sd_mm: 8}
+  imu:       {topic: /phone/imu, kind: acceleration, gravity_mm_s2: [0, -9806.65, 0], noise_sd_mm_s2: 100}
+  reference: {topic: /reference/position, kind: reference}
+events: {topic: /events}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Callable[..., Path]:
+    """Write a study folder: `folder(study_yaml, **{"trials.csv": text})`."""
+
+    def make(settings: str, name: str = "study", **files: str) -> Path:
+        root = tmp_path / name
+        root.mkdir(exist_ok=True)
+        (root / "study.yaml").write_text(textwrap.dedent(settings), encoding="utf-8")
+        for file, text in files.items():
+            (root / file.replace("__", ".")).write_text(textwrap.dedent(text).lstrip(), encoding="utf-8")
+        return root
+
+    return make
+
+
+def hand_mm(time: np.ndarray) -> np.ndarray:
+    """Where the simulated hand is at `time` (s): a slow sine on x, still on y and z."""
+    return np.column_stack([100 * np.sin(2 * time), np.full_like(time, 500.0), np.zeros_like(time)])
+
+
+def session_messages(seconds: float = 4.0, seed: int = 0, bias_mm: float = 0.0) -> list[Message]:
+    """Tracker, IMU, reference and two trials of a session, ids of trials 1 and 2."""
+    random = np.random.default_rng(seed)
+
+    def stream(
+        topic: str, content: str, rate_hz: float, values: Callable[[np.ndarray], np.ndarray], late_s: float
+    ) -> Iterator[Message]:
+        time = np.arange(0, seconds, 1 / rate_hz)
+        for instant, value in zip(time, values(time), strict=True):
+            arrival = EPOCH_NS + round((instant + late_s) * 1e9)
+            yield Message(topic, content, arrival, arrival, value)  # type: ignore[arg-type]
+
+    def imu(time: np.ndarray) -> np.ndarray:
+        acceleration = np.column_stack([-0.4 * np.sin(2 * time), np.zeros((len(time), 2))])
+        force = acceleration + np.array([0, 9.80665, 0]) + random.normal(0, 0.1, (len(time), 3))
+        return np.hstack([force, np.zeros((len(time), 3)), np.tile([0, 0, 0, 1.0], (len(time), 1))])
+
+    messages = list(stream("/reference/position", "position", 90, lambda t: hand_mm(t) / 1000, 0))
+    messages += stream(
+        "/tracker/position", "position", 30, lambda t: (hand_mm(t) + random.normal(0, 8, (len(t), 3))) / 1000, 0.1
+    )
+    messages += stream("/phone/imu", "acceleration", 90, imu, 0)
+    events: list[tuple[float, dict[str, object]]] = [
+        (0.5, {"type": "session_start"}),
+        (1.0, {"type": "trial_start", "trial": 1, "target_x": 0.1, "target_y": 0.5}),
+        (1.8, {"type": "selection", "trial": 1, "x": 0.1 + (3 + bias_mm) / 1000, "y": 0.504, "z": 0.9}),
+        (2.0, {"type": "trial_start", "trial": 2, "target_x": -0.05, "target_y": 0.5}),
+        (3.2, {"type": "selection", "trial": 2, "x": -0.05, "y": 0.5 - (12 + bias_mm) / 1000, "z": 0.9}),
+        (3.4, {"type": "selection", "trial": 2, "x": 9.0, "y": 9.0}),
+        (3.5, {"type": "session_end"}),
+    ]
+    for seconds_in, event in events:
+        at = EPOCH_NS + round(seconds_in * 1e9)
+        messages.append(Message("/events", "events", at, at, event=event))
+    return messages
+
+
+def write_session(path: Path, messages: list[Message] | None = None, **facts: str) -> Path:
+    """A log of `messages` (those of `session_messages()` by default), in order of arrival."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write(path, facts, in_order(session_messages() if messages is None else messages))
+    return path
+
+
+def real(name: str) -> Path:
+    """A folder of real recordings, or of others' test files; the test is skipped where it is not at hand."""
+    studies = Path(os.environ.get("STEADYHAND_STUDIES", CLONE.parent / "shared" / "studies"))
+    path = studies / name
+    if not path.exists():
+        pytest.skip(f"{name} is not in STEADYHAND_STUDIES ({studies})")
+    return path

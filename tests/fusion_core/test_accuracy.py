@@ -1,0 +1,135 @@
+"""Accuracy by its formulas, on signals whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fusion_core import Samples, accuracy, noise
+from fusion_core.alignment import rotate, tracker_acceleration
+from fusion_core.samples import FloatArray
+
+
+def moving(time: FloatArray) -> FloatArray:
+    return np.column_stack([100 * np.sin(3 * time) + 20 * np.sin(11 * time), 50 * np.cos(4 * time)])
+
+
+def of(time: FloatArray, value: FloatArray) -> Samples:
+    return Samples(time, time, value)
+
+
+def test_rmse_and_stated_sd_are_euclidean() -> None:
+    assert accuracy.rmse(np.array([[3.0, 4.0], [0.0, 0.0]]), np.zeros((2, 2))) == pytest.approx(np.sqrt(12.5))
+    assert accuracy.stated_sd(np.full((4, 3), 2.0)) == pytest.approx(2 * np.sqrt(3))
+
+
+def test_coverage_counts_instants_and_axes() -> None:
+    estimate = np.array([[0.0, 0.0], [1.9, 2.0]])
+    assert accuracy.coverage_95(estimate, np.ones((2, 2)), np.zeros((2, 2))) == pytest.approx(0.75)
+
+
+def test_a_gaussian_error_is_covered_95_percent_of_the_time() -> None:
+    error = np.random.default_rng(0).normal(0, 3.0, (20_000, 3))
+    assert accuracy.coverage_95(error, np.full_like(error, 3.0), np.zeros_like(error)) == pytest.approx(0.95, abs=0.005)
+
+
+@pytest.mark.parametrize("late_s", [0.1234, 0.0, -0.057])
+def test_lag_is_found_to_a_fraction_of_a_sample(late_s: float) -> None:
+    fine = np.arange(-1, 21, 1 / 200)
+    time = np.arange(0, 20, 1 / 90)
+    estimate = moving(time - late_s) + np.random.default_rng(1).normal(0, 2, (len(time), 2))
+    found = accuracy.lag(time, estimate, of(fine, moving(fine)), np.random.default_rng(2))
+    assert found.value == pytest.approx(late_s, abs=0.001)
+    assert found.low <= late_s <= found.high
+    assert found.high - found.low < 0.005
+
+
+def test_lag_of_a_hand_that_never_moves_is_not_claimed() -> None:
+    time = np.arange(0, 10, 1 / 90)
+    still = np.zeros((len(time), 2))
+    found = accuracy.lag(time, still, of(time, still), np.random.default_rng(0))
+    assert np.isnan(found.value)
+
+
+@pytest.mark.parametrize("ahead_s", [0.11, -0.05])
+def test_lead_by_cross_correlation_is_positive_ahead_of_the_tracker(ahead_s: float) -> None:
+    time = np.arange(0, 40, 1 / 90)
+    frames = np.arange(0, 40, 1 / 30)
+    tracker = Samples(frames - 0.1, frames, moving(frames - 0.1))
+    estimate = moving(time - 0.1 + ahead_s)
+    assert accuracy.lead_by_cross_correlation(time, estimate, tracker) == pytest.approx(ahead_s, abs=0.012)
+
+
+def test_unbiased_cross_correlation_by_its_definition() -> None:
+    random = np.random.default_rng(3)
+    a, b = random.normal(size=(30, 2)), random.normal(size=(30, 2))
+    shifts, found = accuracy.cross_correlation(a, b)
+    ca, cb = a - a.mean(axis=0), b - b.mean(axis=0)
+    for shift, value in zip(shifts, found, strict=True):
+        pairs = [(t, t + shift) for t in range(30) if 0 <= t + shift < 30]
+        assert value == pytest.approx(np.mean([ca[t] @ cb[u] for t, u in pairs]), abs=1e-12)
+
+
+def test_the_reference_is_not_interpolated_over_gaps_or_beyond_its_ends() -> None:
+    reference = of(np.array([0.0, 0.04, 0.14, 0.18]), np.array([[0.0], [4.0], [14.0], [18.0]]))
+    found = accuracy.interpolate(reference, np.array([-0.01, 0.02, 0.04, 0.09, 0.14, 0.16, 0.2]))[:, 0]
+    np.testing.assert_allclose(found, [np.nan, 2, 4, np.nan, 14, 16, np.nan])
+
+
+def test_jitter_is_the_sd_while_the_hand_is_slow() -> None:
+    time = np.arange(0, 10, 1 / 100)
+    slow = np.where(time < 5, 0.0, (time - 5) * 100)[:, None]
+    track = slow + np.random.default_rng(4).normal(0, 3, (len(time), 1))
+    assert accuracy.jitter(time, track, of(time, slow)) == pytest.approx(3.0, rel=0.1)
+    fast = (time * 100)[:, None]
+    assert np.isnan(accuracy.jitter(time, fast, of(time, fast)))
+
+
+def test_noise_is_found_in_a_still_stretch_and_drift_is_not_noise() -> None:
+    time = np.arange(0, 10, 1 / 100)
+    drift = 3 * (time - 5) ** 2
+    value = (drift + np.random.default_rng(5).normal(0, 2.5, len(time)))[:, None]
+    left = noise.residuals(of(time, value), 0, 10)
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(2.5, rel=0.06)
+
+
+def test_still_stretch_by_accelerations_alone() -> None:
+    time = np.arange(0, 30, 1 / 90)
+    shaking = np.where((time > 8) & (time < 14), 0.0, 1500.0)
+    value = (np.random.default_rng(6).normal(0, 50, len(time)) + shaking * np.sin(9 * time))[:, None]
+    found = noise.still_by_acceleration(of(time, value))
+    assert found is not None
+    assert 7.8 < found[0] < found[1] < 14.3
+
+
+def test_gravity_at_rest_leaves_no_acceleration_whatever_the_orientation() -> None:
+    """a = R f + g: at rest the specific force points up."""
+    random = np.random.default_rng(7)
+    turn = random.normal(size=(50, 4))
+    gravity = np.array([0.0, -9806.65, 0.0])
+    back = turn * np.array([-1, -1, -1, 1])
+    force = rotate(back, np.tile(-gravity, (50, 1)))
+    np.testing.assert_allclose(tracker_acceleration(force, turn, gravity), 0, atol=1e-8)
+
+
+def test_a_quarter_turn_about_z() -> None:
+    quarter = np.array([0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)])
+    np.testing.assert_allclose(rotate(quarter, np.array([[1.0, 0, 0]])), [[0, 1, 0]], atol=1e-12)
+
+
+def test_a_quaternion_of_length_zero_is_refused() -> None:
+    with pytest.raises(ValueError, match="length above 0"):
+        rotate(np.zeros(4), np.ones((2, 3)))
+
+
+@pytest.mark.parametrize(
+    ("time", "value", "message"),
+    [
+        ([0.0, 1.0], [[1.0]], r"got \(2,\), \(2,\) and \(1, 1\)"),
+        ([0.0, np.nan], [[1.0], [2.0]], "must be finite"),
+        ([1.0, 0.0], [[1.0], [2.0]], "in order of arrival"),
+    ],
+)
+def test_samples_that_cannot_be_are_refused(time: list[float], value: list[list[float]], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Samples(np.array(time), np.array(time), np.array(value))

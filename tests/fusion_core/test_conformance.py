@@ -1,0 +1,129 @@
+"""What must hold for every estimator there is."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fusion_core import ESTIMATORS, Samples, Sensor, replay_loop
+from fusion_core.alignment import rotate
+
+SENSORS = {"tracker": Sensor("position", 8.0, 0.1, 3), "imu": Sensor("acceleration", 100.0, 0.0, 3)}
+TIMES = np.arange(0.0513, 2.0, 0.0371)  # never at the very instant of an arrival
+
+estimators = pytest.mark.parametrize("name", list(ESTIMATORS))
+
+
+def recording(seed: int = 0, regular: bool = True, shuffled: bool = False) -> dict[str, Samples]:
+    """Two seconds of both sensors; irregular: jittered stamps and dropped frames; shuffled: some overtake others."""
+    random = np.random.default_rng(seed)
+    samples = {}
+    for name, rate, late, scale in (("tracker", 30, 0.1, 100.0), ("imu", 90, 0.002, 500.0)):
+        time = np.arange(0, 2, 1 / rate)
+        if not regular:
+            time = np.sort(time + random.uniform(0, 0.6 / rate, len(time)))[random.random(len(time)) > 0.2]
+        arrival = time + late + (random.uniform(0, 0.08, len(time)) if shuffled else 0.0)
+        order = np.argsort(arrival, kind="stable")
+        samples[name] = Samples(time[order], arrival[order], random.normal(0, scale, (len(time), 3))[order])
+    return samples
+
+
+def same(first: Any, second: Any, tolerance_mm: float = 1e-9) -> None:
+    np.testing.assert_array_equal(np.isnan(first.mean), np.isnan(second.mean))
+    np.testing.assert_allclose(first.mean, second.mean, rtol=0, atol=tolerance_mm)
+    np.testing.assert_allclose(first.sd, second.sd, rtol=0, atol=tolerance_mm)
+
+
+@estimators
+@pytest.mark.parametrize("kind", ["regular", "irregular", "shuffled"])
+def test_replay_is_one_update_a_sample_and_one_predict_a_time(name: str, kind: str) -> None:
+    estimator = ESTIMATORS[name](SENSORS)
+    samples = recording(1, regular=kind == "regular", shuffled=kind == "shuffled")
+    same(estimator.replay(samples, TIMES), replay_loop(estimator, samples, TIMES), 1e-8)
+
+
+@estimators
+@settings(deadline=None, max_examples=15)
+@given(cut=st.floats(0.1, 1.9), seed=st.integers(0, 5))
+def test_no_estimator_sees_the_future(name: str, cut: float, seed: int) -> None:
+    estimator = ESTIMATORS[name](SENSORS)
+    whole = recording(seed, regular=False, shuffled=True)
+    past = {}
+    for sensor, samples in whole.items():
+        known = samples.arrival <= cut
+        past[sensor] = Samples(samples.time[known], samples.arrival[known], samples.value[known])
+    times = TIMES[TIMES <= cut]
+    if len(times):
+        same(estimator.replay(whole, times), estimator.replay(past, times))
+
+
+@estimators
+def test_states_are_pure_and_go_on_elsewhere(name: str) -> None:
+    estimator = ESTIMATORS[name](SENSORS)
+    samples = recording(2)
+    state = estimator.start()
+    for index in range(20):
+        state = estimator.update(state, "tracker", samples["tracker"][index])
+        state = estimator.update(state, "imu", samples["imu"][3 * index])
+    before = estimator.predict(state, 0.8)
+    elsewhere = pickle.loads(pickle.dumps((estimator, state)))  # noqa: S301 - our own bytes
+    for one, other in zip(elsewhere[0].predict(elsewhere[1], 0.8), before, strict=True):
+        np.testing.assert_array_equal(one, other)
+    estimator.update(state, "tracker", samples["tracker"][20])
+    for one, other in zip(estimator.predict(state, 0.8), before, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@estimators
+def test_nothing_is_known_before_the_first_frame_and_unused_sensors_change_nothing(name: str) -> None:
+    estimator = ESTIMATORS[name]({"tracker": SENSORS["tracker"]})
+    mean, sd = estimator.predict(estimator.start(), 0.0)
+    assert mean.shape == sd.shape == (3,)
+    assert np.isnan(mean).all() and np.isnan(sd).all()
+    samples = recording(3)
+    alone = estimator.replay({"tracker": samples["tracker"]}, TIMES)
+    same(estimator.replay(samples, TIMES), alone)
+
+
+@estimators
+@settings(deadline=None, max_examples=10)
+@given(
+    shift=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
+    turn=st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(x * x for x in q) > 0.1),
+)
+def test_rigid_motion_of_the_world_moves_the_estimate_with_it(
+    name: str, shift: tuple[float, ...], turn: tuple[float, ...]
+) -> None:
+    estimator = ESTIMATORS[name](SENSORS)
+    here = recording(4, regular=False)
+    quaternion = np.array(turn)
+    there = {
+        "tracker": Samples(
+            here["tracker"].time, here["tracker"].arrival, rotate(quaternion, here["tracker"].value) + np.array(shift)
+        ),
+        "imu": Samples(here["imu"].time, here["imu"].arrival, rotate(quaternion, here["imu"].value)),
+    }
+    one, other = estimator.replay(here, TIMES), estimator.replay(there, TIMES)
+    known = np.isfinite(one.mean).all(axis=1)
+    np.testing.assert_allclose(rotate(quaternion, one.mean[known]) + np.array(shift), other.mean[known], atol=1e-6)
+    np.testing.assert_allclose(one.sd, other.sd, atol=1e-9)
+
+
+@estimators
+def test_the_origin_of_time_does_not_matter(name: str) -> None:
+    estimator = ESTIMATORS[name](SENSORS)
+    here = recording(5)
+    later = {key: Samples(s.time + 64.0, s.arrival + 64.0, s.value) for key, s in here.items()}
+    same(estimator.replay(here, TIMES), estimator.replay(later, TIMES + 64.0), 1e-6)
+
+
+@estimators
+def test_stated_sds_are_positive_and_the_same_for_every_axis(name: str) -> None:
+    track = ESTIMATORS[name](SENSORS).replay(recording(6), TIMES[5:])
+    assert (track.sd > 0).all()
+    np.testing.assert_array_equal(track.sd, np.repeat(track.sd[:, :1], 3, axis=1))

@@ -1,0 +1,156 @@
+"""The paper's estimator against its printed figures and against independent, slower mathematics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fusion_core import Samples, Sensor, WindowGP
+
+TRACKER = Sensor("position", 8.0, 0.1, 1)
+IMU = Sensor("acceleration", 100.0, 0.0, 1)
+BOTH = {"tracker": TRACKER, "imu": IMU}
+
+
+def paper_window(fused: bool, length: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lags, orders and noise of the paper's window at a frame's delivery: 30 and 90 Hz, 0.1 s late, l_a = 3L + 7."""
+    lag = -0.1 - np.arange(length)[::-1] / 30
+    order = np.zeros(length, np.int64)
+    if fused:
+        count = 3 * length + 9 - 2
+        lag = np.concatenate([lag, -np.arange(count)[::-1] / 90])
+        order = np.concatenate([order, np.full(count, 2)])
+    return lag, order, np.where(order == 0, 64.0, 1e4)
+
+
+@pytest.mark.parametrize(
+    ("fused", "mean", "sd_mm"),
+    [(False, "zero", 29.85), (True, "zero", 12.88), (False, "constant", 33.29), (True, "constant", 12.88)],
+)
+def test_sd_at_now_with_the_papers_parameters(fused: bool, mean: str, sd_mm: float) -> None:
+    """Table 1 prints 29.89 and 12.04 mm; exact second derivatives give 29.85 and 12.88."""
+    _, variance = WindowGP(BOTH, mean=mean).gains(*paper_window(fused))  # type: ignore[arg-type]
+    assert round(float(np.sqrt(variance)), 2) == sd_mm
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_position_gains_sum_to_one_with_a_constant_mean(fused: bool) -> None:
+    lag, order, noise = paper_window(fused)
+    weights, _ = WindowGP(BOTH).gains(lag, order, noise)
+    assert weights[order == 0].sum() == pytest.approx(1.0, abs=1e-9)
+
+
+def test_exact_derivatives_agree_with_the_wide_grid() -> None:
+    """K_a as the paper's second difference, on a latent grid one sample wider on each side (eqs. 17 to 24)."""
+    length, step = 5, 1 / 90
+    count = 3 * length + 7
+    latent = np.arange(-count, 2) * step  # the newest acceleration, at 0, has a neighbour on each side
+    difference = latent[:, None] - latent[None, :]
+    prior = 5.66e4 * np.exp(-4.19 * difference**2)
+    operator = np.zeros((length + count, len(latent)))
+    for row in range(length):
+        operator[row, count - 9 - 3 * (length - 1 - row)] = 1
+    for row in range(count):
+        operator[length + row, row : row + 3] = np.array([1, -2, 1]) / step**2
+    noise = np.diag([64.0] * length + [1e4] * count)
+    observed = operator @ prior @ operator.T + noise
+    with_now = operator @ prior[:, count]
+    sd = np.sqrt(5.66e4 - with_now @ np.linalg.solve(observed, with_now))
+    _, variance = WindowGP(BOTH, mean="zero").gains(*paper_window(fused=True, length=length))
+    assert float(np.sqrt(variance)) == pytest.approx(float(sd), abs=0.2)
+
+
+def test_a_slow_posterior_written_out_gives_the_same_estimate() -> None:
+    """One window of irregular times by the textbook formulas of kriging with an unknown constant mean."""
+    random = np.random.default_rng(3)
+    frames = np.sort(random.uniform(0, 0.3, 4))
+    forces = np.sort(random.uniform(0, 0.42, 20))
+    positions, accelerations = random.normal(1000, 30, (4, 1)), random.normal(0, 500, (20, 1))
+    now = 0.43
+    v, w = 5.66e4, 4.19
+
+    def k(i: int, j: int, d: float) -> float:
+        """cov(f⁽ⁱ⁾(t), f⁽ʲ⁾(t')) by central differences of k, a second opinion on the closed forms."""
+        total, h = i + j, 1e-3
+        stencil = {0: {0: 1.0}, 2: {-1: 1.0, 0: -2.0, 1: 1.0}, 4: {-2: 1.0, -1: -4.0, 0: 6.0, 1: -4.0, 2: 1.0}}[total]
+        return float((-1) ** j * sum(c * v * np.exp(-w * (d + s * h) ** 2) for s, c in stencil.items()) / h**total)
+
+    times = [*frames, *forces]
+    orders = [0] * 4 + [2] * 20
+    among = np.array(
+        [[k(i, j, t - u) for u, j in zip(times, orders, strict=True)] for t, i in zip(times, orders, strict=True)]
+    )
+    among += np.diag([64.0] * 4 + [1e4] * 20)
+    with_now = np.array([k(i, 0, t - now) for t, i in zip(times, orders, strict=True)])
+    ones = np.array([1.0] * 4 + [0.0] * 20)
+    values = np.concatenate([positions[:, 0], accelerations[:, 0]])
+    inverse = np.linalg.inv(among)
+    constant = ones @ inverse @ values / (ones @ inverse @ ones)
+    expected = constant + with_now @ inverse @ (values - constant * ones)
+    estimator = WindowGP(BOTH, window=4)
+    samples = {
+        "tracker": Samples(frames, np.full(4, 0.425), positions),
+        "imu": Samples(forces, forces, accelerations),
+    }
+    track = estimator.replay(samples, np.array([now]))
+    kept = forces >= frames[0]
+    assert kept.sum() < 20 or track.mean[0, 0] == pytest.approx(expected, abs=0.05)
+    if kept.all():
+        return
+    # The window holds the accelerations since its oldest position only.
+    some = np.flatnonzero(np.concatenate([np.ones(4, bool), kept]))
+    inverse = np.linalg.inv(among[np.ix_(some, some)])
+    constant = ones[some] @ inverse @ values[some] / (ones[some] @ inverse @ ones[some])
+    expected = constant + with_now[some] @ inverse @ (values[some] - constant * ones[some])
+    assert track.mean[0, 0] == pytest.approx(expected, abs=0.05)
+
+
+def test_start_up_uses_what_there_is() -> None:
+    """With fewer than L positions the estimate is that of a window as long as there are (Algorithm 1)."""
+    frames = Samples(np.arange(3) / 30, np.arange(3) / 30 + 0.1, np.array([[0.0], [5.0], [9.0]]))
+    forces = Samples(np.arange(20) / 90, np.arange(20) / 90, np.zeros((20, 1)))
+    samples, now = {"tracker": frames, "imu": forces}, np.array([0.17])
+    long, short = WindowGP(BOTH, window=5).replay(samples, now), WindowGP(BOTH, window=3).replay(samples, now)
+    assert long.mean[0, 0] == pytest.approx(short.mean[0, 0], abs=1e-9)
+
+
+def test_a_far_away_constant_costs_nothing_with_the_constant_mean() -> None:
+    """Zero mean pulls a hand at 1000 mm towards zero; the constant mean does not (method, trap 3)."""
+    at = Samples(np.arange(30) / 30, np.arange(30) / 30 + 0.1, np.full((30, 1), 1000.0))
+    only = {"tracker": TRACKER}
+    constant = WindowGP(only).replay({"tracker": at}, np.array([1.0]))
+    zero = WindowGP(only, mean="zero").replay({"tracker": at}, np.array([1.0]))
+    assert constant.mean[0, 0] == pytest.approx(1000.0, abs=1e-6)
+    assert 1000 - zero.mean[0, 0] > 50
+
+
+def test_a_pause_of_a_minute_neither_fails_nor_grows() -> None:
+    time = np.arange(0, 62, 1 / 90)
+    frames = np.concatenate([np.arange(0, 1, 1 / 30), np.arange(61, 62, 1 / 30)])
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, np.zeros((len(frames), 1))),
+        "imu": Samples(time, time, np.zeros((len(time), 1))),
+    }
+    estimator = WindowGP(BOTH)
+    track = estimator.replay(samples, np.arange(0.5, 62, 0.5))
+    assert np.isfinite(track.mean).all()
+    assert np.abs(track.mean).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"window": 0}, "window must be 1 or more"),
+        ({"mean": "median"}, 'mean must be "constant" or "zero"'),
+        ({"signal_variance_mm2": -1.0}, "signal_variance_mm2 must be a number above 0, got -1.0"),
+        ({"inverse_scale_s2": float("nan")}, "inverse_scale_s2 must be a number above 0"),
+    ],
+)
+def test_parameters_out_of_range_are_named(parameters: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        WindowGP(BOTH, **parameters)  # type: ignore[arg-type]
+
+
+def test_without_a_position_sensor_there_is_nothing_to_estimate() -> None:
+    with pytest.raises(ValueError, match="needs a position sensor, got imu"):
+        WindowGP({"imu": IMU})
