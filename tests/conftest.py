@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.formats.mcap import Message, in_order, write
+from tests.pipeline.helpers import Steadyhand
 
 EPOCH_NS = 1_700_000_000_000_000_000
 CLONE = Path(__file__).resolve().parents[1]
@@ -95,3 +96,9 @@ def real(name: str) -> Path:
     if not path.exists():
         pytest.skip(f"{name} is not in STEADYHAND_STUDIES ({studies})")
     return path
+
+
+@pytest.fixture
+def steadyhand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Steadyhand:
+    """The command, with its own cache and output folder."""
+    return Steadyhand(capsys, monkeypatch, tmp_path)

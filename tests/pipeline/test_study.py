@@ -1,0 +1,144 @@
+"""study.yaml: what is understood, and what a user is told when it is not."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import PipelineError
+from pipeline.study import find_sessions, load_study
+from tests.conftest import STREAMS
+from tests.pipeline.helpers import Steadyhand
+
+Folder = Callable[..., Path]
+MINIMAL = """
+title: T
+conditions: [a, b]
+measures: measures.csv
+"""
+MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\nP2,a,m,2\nP2,b,m,1\n"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("titel: T\nconditions: [a]\nmeasures: measures.csv\n", 'unknown key "titel"; did you mean "title"?'),
+        ("measures: measures.csv\n", '"conditions" is missing'),
+        ("conditions: [a, a]\nmeasures: measures.csv\n", 'conditions: "a" stands there twice'),
+        ("conditions: [yes, b]\nmeasures: measures.csv\n", "is read as true/false; put it in quotes"),
+        ("conditions: [a]\n", "names no data; give sessions, trials, questionnaires or measures"),
+        ("conditions: [a]\nconditions: [b]\n", 'line 2: not valid YAML: "conditions" stands there twice'),
+        ("conditions: [a\n", "not valid YAML"),
+        ("just a line\n", "holds no settings; it needs lines like"),
+        (MINIMAL + "alpha: 5\n", '"alpha": input should be less than 1 (found 5)'),
+        (MINIMAL + "data_origin: invented\n", "input should be 'recorded', 'simulated' or 'reconstructed'"),
+        (MINIMAL + "comparisons: [{measure: m, test: anova}]\n", "comparisons.0.test"),
+        (
+            MINIMAL + "comparisons: [{measure: m, tset: wilcoxon}]\n",
+            'unknown key "comparisons.0.tset"; did you mean "test"?',
+        ),
+        (MINIMAL + "exclusions: [{reason: gone}]\n", "names neither a participant nor a session"),
+        (MINIMAL + "exclusions: [{participant: P1}]\n", '"exclusions.0.reason" is missing'),
+        (MINIMAL + "shown: {c: x}\n", 'shown: "c" is not known'),
+        ("conditions: [a]\nsessions: data/{subject}.mcap\n", 'placeholder "{subject}" is not known'),
+        ("conditions: [a]\nsessions: data/log.mcap\n", "needs a placeholder"),
+        (
+            MINIMAL + "streams: {t: {topic: /t, kind: position, latncy_s: 1}}\n",
+            'unknown key "streams.t.latncy_s"; did you mean "latency_s"?',
+        ),
+        (MINIMAL + "streams: {t: {topic: /t, kind: velocity}}\n", '"streams.t" needs a kind: position'),
+        (MINIMAL + "streams: {i: {topic: /i, kind: acceleration}}\n", '"streams.i.gravity_mm_s2" is missing'),
+        (
+            MINIMAL + STREAMS + "estimators: {e: {type: raw, use: [trakcer]}}\n",
+            'estimators.e.use: "trakcer" is not known; did you mean "tracker"?',
+        ),
+    ],
+)
+def test_a_fault_in_the_settings_is_named_with_its_remedy(folder: Folder, settings: str, message: str) -> None:
+    root = folder(settings, **{"measures.csv": MEASURES})
+    with pytest.raises(PipelineError) as error:
+        load_study(root)
+    assert message in str(error.value)
+    assert "study.yaml" in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["../measures.csv", "/etc/passwd", "a/../../measures.csv"])
+def test_a_path_out_of_the_folder_is_refused(folder: Folder, name: str, steadyhand: Steadyhand) -> None:
+    root = folder(MINIMAL.replace("measures.csv", name))
+    ran = steadyhand("compare", root)
+    assert ran.code == 2
+    assert f'measures: "{name}" leads out of the study folder' in ran.err
+
+
+def test_a_link_out_of_the_folder_is_refused(folder: Folder, tmp_path: Path) -> None:
+    (tmp_path / "secret.csv").write_text(MEASURES)
+    root = folder(MINIMAL)
+    (root / "measures.csv").symlink_to(tmp_path / "secret.csv")
+    with pytest.raises(PipelineError, match="leads out of the study folder"):
+        load_study(root)
+
+
+def test_no_study_yaml(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("report", tmp_path)
+    assert ran.code == 2
+    assert f"{tmp_path}: holds no study.yaml" in ran.err
+    ran = steadyhand("report", tmp_path / "nowhere")
+    assert ran.code == 2
+    assert "there is no such folder" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("estimators", "message"),
+    [
+        ("{e: {type: windowgp}}", 'estimators.e: type "windowgp" is not known; did you mean "window_gp"?'),
+        ("{e: {type: window_gp, windw: 3}}", 'estimators.e: unknown key "windw"; did you mean "window"?'),
+        ("{e: {type: window_gp, window: many}}", 'estimators.e: "window": input should be a valid integer'),
+        ("{e: {type: window_gp, window: -1}}", "estimators.e: window must be 1 or more"),
+        ("{e: {type: window_gp, use: [imu]}}", "estimators.e: an estimator needs a position sensor, got imu"),
+    ],
+)
+def test_a_fault_in_an_estimator_is_named(
+    folder: Folder, steadyhand: Steadyhand, estimators: str, message: str
+) -> None:
+    from tests.conftest import write_session
+
+    root = folder(
+        "conditions: [a]\nsessions: '{participant}_{condition}.mcap'\n" + STREAMS + f"estimators: {estimators}\n"
+    )
+    write_session(root / "P1_a.mcap")
+    ran = steadyhand("compare", root)
+    assert ran.code == 2
+    assert message in ran.err
+
+
+def test_sessions_are_found_by_pattern_and_ids_compared_after_nfc(folder: Folder) -> None:
+    root = folder("conditions: [café]\nsessions: data/{participant}_{condition}.mcap\n" + STREAMS)
+    (root / "data").mkdir()
+    for name in (unicodedata.normalize("NFD", "P1_café"), "P2_other", "notes", "P_1_2"):
+        (root / "data" / f"{name}.mcap").touch()
+    study = load_study(root)
+    sessions = find_sessions(root, study)
+    assert [(session.id, session.condition) for session in sessions] == [
+        ("P1_café", "café"),
+        ("P2_other", "other"),
+    ]
+    assert sessions[0].condition in study.conditions
+
+
+def test_two_equal_ids_are_an_error(folder: Folder) -> None:
+    root = folder("conditions: [a]\nsessions: '{condition}/{participant}.mcap'\n" + STREAMS)
+    for name in ("a", "b"):
+        (root / name).mkdir()
+        (root / name / "P1.mcap").touch()
+    with pytest.raises(PipelineError, match='are both session "P1"'):
+        find_sessions(root, load_study(root))
+
+
+def test_a_minimal_study_needs_no_title(folder: Folder) -> None:
+    root = folder("conditions: [1, 2]\nmeasures: measures.csv\n", name="pilot", **{"measures.csv": MEASURES})
+    study = load_study(root)
+    assert study.title == "pilot"
+    assert study.conditions == ("1", "2")
