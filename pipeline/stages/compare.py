@@ -149,17 +149,21 @@ def shown_at_selection(study: Study, trials: pd.DataFrame) -> list[Row]:
     """What each estimator would have shown when people selected: √(mean over participants of their MSEs)."""
     if set(trials["estimator"]) <= {"recorded"}:
         return []
-    rows = []
     known = trials[trials["squared_error_mm2"].notna()]
-    squared = known.groupby(["condition", "estimator", "participant"], sort=False)["squared_error_mm2"].mean()
-    for condition in study.conditions:
-        for estimator in dict.fromkeys(known["estimator"]):
-            if (condition, estimator) in squared.index:
-                people = squared.loc[(condition, estimator)]
-                rmse_mm = float(np.sqrt(people.mean()))
-                row = {"condition": condition, "estimator": estimator, "n": len(people), "rmse_mm": rmse_mm}
-                rows.append(row)
-    return rows
+    cell = ["condition", "estimator"]
+    per_person = known.groupby([*cell, "participant"])["squared_error_mm2"].mean().reset_index()
+    found = {key: rows["squared_error_mm2"] for key, rows in per_person.groupby(cell)}
+    return [
+        {
+            "condition": condition,
+            "estimator": estimator,
+            "n": len(found[condition, estimator]),
+            "rmse_mm": float(np.sqrt(found[condition, estimator].mean())),
+        }
+        for condition in study.conditions
+        for estimator in dict.fromkeys(known["estimator"])
+        if (condition, estimator) in found
+    ]
 
 
 def comparisons(study: Study, measures: pd.DataFrame) -> tuple[list[Row], list[Row]]:

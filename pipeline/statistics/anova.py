@@ -23,7 +23,7 @@ def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
     generalized η² with every factor manipulated (Olejnik and Algina 2003).
     """
     n, levels = values.shape[0], values.shape[1:]
-    flat = values.reshape(n, -1)
+    flat = values.reshape(n, int(np.prod(levels)))
     effects = [c for size in range(1, len(levels) + 1) for c in combinations(range(len(levels)), size)]
     if too_few(n) or degenerate(flat):
         status = too_few(n) or degenerate(flat) or ""

@@ -1,0 +1,262 @@
+"""Sessions from log to measures: what comes out, and what one bad session does to the others (nothing)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fusion_core import replay_loop
+from pipeline import recording, tables
+from pipeline.formats.mcap import Message
+from pipeline.stage import Work
+from pipeline.stages import ingest
+from pipeline.study import find_sessions, load_study
+from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
+from tests.pipeline.helpers import Steadyhand
+
+Folder = Callable[..., Path]
+SETTINGS = (
+    """
+title: T
+conditions: [a, b]
+sessions: data/{participant}_{condition}.mcap
+display: {px_per_mm: 10, unit: px}
+estimators:
+  raw: {type: raw}
+  fusion: {type: fusion_kalman}
+comparisons: [{measure: selection_mse_mm2, test: wilcoxon}]
+"""
+    + STREAMS
+)
+
+
+@pytest.fixture
+def study(folder: Folder) -> Path:
+    """Two participants in two conditions; condition b errs 4 mm more."""
+    root = folder(SETTINGS)
+    for participant in ("P1", "P2"):
+        for condition, bias_mm in (("a", 0.0), ("b", 4.0)):
+            path = root / "data" / f"{participant}_{condition}.mcap"
+            messages = session_messages(bias_mm=bias_mm)
+            write_session(path, messages, participant=participant, condition=condition)
+    return root
+
+
+def test_measures_by_their_definitions(study: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", study)
+    assert ran.code == 0, ran.err
+    found = {(row["measure"], row["condition"]): row["mean"] for row in steadyhand.results()["descriptives"]}
+    # Errors over the axes the target has: trial 1 is (3, 4) mm off, trial 2 (0, 12); 4 mm more on one axis in b.
+    mse = {"a": (9 + 16 + 144) / 2, "b": (49 + 16 + 256) / 2}
+    for condition, expected in mse.items():
+        assert found["selection_mse_mm2", condition] == pytest.approx(expected)
+        assert found["selection_mse_px2", condition] == pytest.approx(100 * expected)
+        assert found["selection_rmse_mm", condition] == pytest.approx(np.sqrt(expected))
+        assert found["selection_rmse_px", condition] == pytest.approx(10 * np.sqrt(expected))
+        assert found["trial_time_s", condition] == pytest.approx((0.8 + 1.2) / 2)
+        assert found["completion_time_s", condition] == pytest.approx(3.4 - 0.5)
+
+
+def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, steadyhand: Steadyhand) -> None:
+    assert steadyhand("report", study).code == 0
+    trials = (steadyhand.out / "tables" / "trials.csv").read_text().splitlines()
+    row = next(line.split(",") for line in trials if line.startswith("P1,a,P1_a,1,fusion,"))
+    loaded_study = load_study(study)
+    session = next(s for s in find_sessions(study, loaded_study) if s.id == "P1_a")
+    out = study.parent / "ingested"
+    out.mkdir()
+    ingest.run(Work("t", loaded_study, study, out, (session,)))
+    loaded = recording.load(loaded_study, out)
+    selected = (EPOCH_NS + 1_800_000_000 - loaded.origin_ns) * tables.NANOSECONDS
+    emitted = loaded.times[loaded.times <= selected + 1e-9].max()
+    track = replay_loop(recording.build_estimator(loaded_study, "fusion"), loaded.samples, np.array([emitted]))
+    expected = np.hypot(track.mean[0, 0] - 100, track.mean[0, 1] - 500)
+    assert float(row[5]) == pytest.approx(expected, abs=1e-6)
+
+
+def test_replay_agreement_is_zero_where_the_log_shows_what_it_says(folder: Folder, steadyhand: Steadyhand) -> None:
+    extra = "  display: {topic: /display/position, kind: display}\nevents:"
+    root = folder(SETTINGS.replace("events:", extra) + "shown: {a: fusion}\n")
+    messages = session_messages()
+    write_session(root / "data" / "P1_a.mcap", messages)
+    study = load_study(root)
+    out = root / "ingested"
+    out.mkdir()
+    ingest.run(Work("t", study, root, out, tuple(find_sessions(root, study))))
+    loaded = recording.load(study, out)
+    track = recording.build_estimator(study, "fusion").replay(loaded.samples, loaded.times)
+    for time, mean in zip(track.time, track.mean, strict=True):
+        if np.isfinite(mean).all():
+            at = loaded.origin_ns + round(time * 1e9)
+            messages.append(Message("/display/position", "position", at, at, mean / 1000))
+    write_session(root / "data" / "P1_a.mcap", messages)
+    steadyhand("compare", root)
+    (row,) = steadyhand.results()["replay_agreement"]
+    assert row["estimator"] == "fusion"
+    assert row["n"] > 300
+    assert row["max_mm"] < 1e-9
+
+
+def moved(messages: list[Message], topic: str, change: Callable[[int, Message], Message | None]) -> list[Message]:
+    """Messages with those of one topic changed, or left out where the change gives None."""
+    result = []
+    for index, message in enumerate(messages):
+        new = change(index, message) if message.topic == topic else message
+        if new is not None:
+            result.append(new)
+    return result
+
+
+def set_back(messages: list[Message]) -> list[Message]:
+    """The phone's clock goes back by half a second in mid-session."""
+    middle = EPOCH_NS + 2_000_000_000
+    return moved(
+        messages,
+        "/phone/imu",
+        lambda _, m: replace(m, stamp_ns=m.stamp_ns - 500_000_000) if m.stamp_ns > middle else m,
+    )
+
+
+def with_values(value: float, every: int) -> Callable[[list[Message]], list[Message]]:
+    return lambda messages: moved(
+        messages,
+        "/tracker/position",
+        lambda index, m: replace(m, values=np.array([value, 0, 0])) if index % every == 0 else m,
+    )
+
+
+def without(topic: str) -> Callable[[list[Message]], list[Message]]:
+    return lambda messages: moved(messages, topic, lambda _, m: None)
+
+
+BAD_SESSIONS: dict[str, tuple[Callable[[list[Message]], list[Message]], str]] = {
+    "missing topic": (without("/tracker/position"), 'stream "tracker": topic /tracker/position is not in the log'),
+    "clock backwards": (set_back, 'stream "imu": the clock went backwards by 0.489 s'),
+    "all NaN": (with_values(np.nan, 1), "topic /tracker/position holds no finite sample"),
+    "no reference": (without("/reference/position"), 'stream "reference": topic /reference/position is not in the log'),
+}
+
+
+@pytest.mark.parametrize("name", list(BAD_SESSIONS))
+def test_one_bad_session_does_not_stop_the_others(study: Path, steadyhand: Steadyhand, name: str) -> None:
+    change, reason = BAD_SESSIONS[name]
+    write_session(study / "data" / "P1_a.mcap", change(session_messages()))
+    ran = steadyhand("compare", study)
+    assert ran.code == 1
+    assert reason in ran.err
+    listed = {row["session"]: row for row in steadyhand.results()["exclusions"] if row["session"]}
+    assert reason in listed["P1_a"]["reason"]
+    usable = name == "no reference"
+    assert listed["P1_a"]["what"] == ("session read in part" if usable else "session set aside")
+    assert {row["session"] for row in steadyhand.results()["quality"]} == {"P1_b", "P2_a", "P2_b"} | (
+        {"P1_a"} if usable else set()
+    )
+    assert steadyhand.results()["comparisons"][0]["n"] == (2 if usable else 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("P3_a.mcap", b"not a log", "not an MCAP file"),
+        ("P3_a.mcap", b"", "the file is empty"),
+        ("P3_c.mcap", None, 'condition "c" is not in study.yaml'),
+    ],
+)
+def test_a_file_that_cannot_be_a_session_is_set_aside(
+    study: Path, steadyhand: Steadyhand, name: str, content: bytes | None, reason: str
+) -> None:
+    path = study / "data" / name
+    if content is None:
+        write_session(path)
+    else:
+        path.write_bytes(content)
+    ran = steadyhand("compare", study)
+    assert ran.code == 1
+    assert reason in ran.err
+    assert len(steadyhand.results()["quality"]) == 4 * 4
+
+
+def test_a_log_cut_in_the_middle_is_used_as_far_as_it_goes(study: Path, steadyhand: Steadyhand) -> None:
+    path = study / "data" / "P2_b.mcap"
+    path.write_bytes(path.read_bytes()[:-20_000])
+    ran = steadyhand("compare", study)
+    assert ran.code == 1
+    assert "session P2_b read in part: the log is cut off" in ran.err
+    rows = [row for row in steadyhand.results()["quality"] if row["session"] == "P2_b"]
+    assert rows[0]["messages_lost"] is None
+    assert 0 < rows[0]["messages_read"] < 120
+
+
+def test_metadata_and_name_that_disagree_set_the_session_aside(study: Path, steadyhand: Steadyhand) -> None:
+    write_session(study / "data" / "P1_a.mcap", participant="P7")
+    ran = steadyhand("compare", study)
+    assert ran.code == 1
+    assert 'its name says participant "P1", its metadata "P7"' in ran.err
+
+
+def test_some_samples_that_are_not_finite_are_left_out_and_said(study: Path, steadyhand: Steadyhand) -> None:
+    write_session(study / "data" / "P1_a.mcap", with_values(np.inf, 10)(session_messages()))
+    assert steadyhand("compare", study).code == 0
+    row = next(r for r in steadyhand.results()["quality"] if r["session"] == "P1_a" and r["stream"] == "tracker")
+    assert "12 samples left out: NaN or infinite" in row["note"]
+    assert row["messages_read"] == 120
+
+
+def test_no_usable_session_and_no_tables_is_an_error(folder: Folder, steadyhand: Steadyhand) -> None:
+    root = folder(SETTINGS)
+    ran = steadyhand("report", root)
+    assert ran.code == 2
+    assert "no file matches sessions" in ran.err
+    (root / "data").mkdir()
+    (root / "data" / "P1_a.mcap").write_bytes(b"x")
+    ran = steadyhand("report", root)
+    assert ran.code == 2
+    assert "no session can be used:\n  P1_a: not an MCAP file" in ran.err
+
+
+def test_accelerations_of_unknown_orientation_are_left_out_and_counted(study: Path, steadyhand: Steadyhand) -> None:
+    def forget(index: int, message: Message) -> Message:
+        assert message.values is not None
+        unknown = np.concatenate([message.values[:6], [np.nan] * 4])
+        return replace(message, values=unknown) if index % 4 == 0 else message
+
+    write_session(study / "data" / "P1_a.mcap", moved(session_messages(), "/phone/imu", forget))
+    assert steadyhand("compare", study).code == 0
+    row = next(r for r in steadyhand.results()["quality"] if r["session"] == "P1_a" and r["stream"] == "imu")
+    assert "90 samples of unknown orientation, not fused" in row["note"]
+
+
+def test_quality_of_a_known_stream(study: Path, steadyhand: Steadyhand) -> None:
+    messages = session_messages()
+    kept = [m for index, m in enumerate(messages) if not (m.topic == "/tracker/position" and index % 10 == 0)]
+    twice = next(m for m in kept if m.topic == "/tracker/position")
+    write_session(study / "data" / "P1_a.mcap", [*kept, twice])
+    steadyhand("compare", study)
+    row = next(r for r in steadyhand.results()["quality"] if r["session"] == "P1_a" and r["stream"] == "tracker")
+    assert row["messages_read"] == 109
+    assert row["duplicates"] == 1
+    assert row["gap_max_s"] == pytest.approx(2 / 30, abs=1e-6)
+    assert "samples missing" in row["note"]
+
+
+def test_a_session_found_by_its_metadata_alone(folder: Folder, steadyhand: Steadyhand) -> None:
+    root = folder(SETTINGS.replace("{participant}_{condition}", "{session}"))
+    for session, participant, condition in (("x1", "P1", "a"), ("x2", "P1", "b"), ("x3", "P2", "a"), ("x4", "P2", "b")):
+        write_session(root / "data" / f"{session}.mcap", participant=participant, condition=condition)
+    assert steadyhand("compare", root).code == 0
+    assert steadyhand.results()["comparisons"][0]["n"] == 2
+
+
+def test_a_trial_without_a_selection_is_counted_not_lost(study: Path, steadyhand: Steadyhand) -> None:
+    def drop(_: int, message: Message) -> Message | None:
+        event = message.event or {}
+        return None if event.get("type") == "selection" and event.get("trial") == 2 else message
+
+    write_session(study / "data" / "P1_a.mcap", moved(session_messages(), "/events", drop))
+    assert steadyhand("compare", study).code == 0
+    row = next(r for r in steadyhand.results()["exclusions"] if "selection" in r["what"])
+    assert (row["participant"], row["session"], row["reason"]) == ("P1", "P1_a", "1 of the cell's trials: 2")
