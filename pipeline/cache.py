@@ -21,6 +21,7 @@ _ROOT = Path(__file__).resolve().parent.parent
 _OURS = ("pipeline", "fusion_core")
 _MODULE_TEXT = re.compile(rf"(?:{'|'.join(_OURS)})(?:\.\w+)+")
 _DISTRIBUTIONS = {"yaml": "PyYAML", "mcap_ros2": "mcap-ros2-support"}
+_DATA_FILES = (".css", ".jinja", ".typ")
 _MANIFEST = "entry.json"
 
 
@@ -40,20 +41,25 @@ def code_digest(module: str) -> str:
     """Digest of a module, of all our modules it reaches, their data files, and the libraries they import."""
     sources: dict[str, str] = {}
     libraries: set[str] = set()
+    followed: set[Path] = set()
     pending = [module]
     while pending:
-        path = _source(pending.pop())
-        name = "" if path is None else path.relative_to(_ROOT).as_posix()
-        if path is None or name in sources:
+        reached_module = pending.pop()
+        # A package is run on the way to its modules, but what else it imports for its users is not used here.
+        for package in map(_source, _parents(reached_module)):
+            if package is not None:
+                sources[package.relative_to(_ROOT).as_posix()] = file_digest(package)
+        path = _source(reached_module)
+        if path is None or path in followed:
             continue
-        sources[name] = file_digest(path)
-        if path.name == "__init__.py":
-            for beside in sorted(path.parent.iterdir()):
-                if beside.is_file() and beside.suffix not in (".py", ".pyc"):
-                    sources[beside.relative_to(_ROOT).as_posix()] = file_digest(beside)
+        followed.add(path)
+        sources[path.relative_to(_ROOT).as_posix()] = file_digest(path)
+        for beside in sorted(path.parent.iterdir()):
+            if beside.is_file() and beside.suffix in _DATA_FILES:
+                sources[beside.relative_to(_ROOT).as_posix()] = file_digest(beside)
         for reached in _imports(path):
             if reached.split(".")[0] in _OURS:
-                pending += [reached, *_parents(reached)]
+                pending.append(reached)
             else:
                 libraries.add(reached.split(".")[0])
     return digest_of([sources, versions(libraries), sys.version_info[:2]])

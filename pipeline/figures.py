@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
+from pipeline.typeface import showable
 from pipeline.wording import MINUS, THIN, measure_label, short_label, unit_of
 
 FloatArray = npt.NDArray[np.float64]
@@ -39,6 +40,7 @@ _STYLE: dict[Any, Any] = {
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.4,
     "figure.constrained_layout.use": True,
+    "text.parse_math": False,  # a name with two dollar signs is a name
     "svg.fonttype": "path",
     "svg.hashsalt": "steadyhand",
     "savefig.dpi": 200,
@@ -86,9 +88,9 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
         if len(column):
             values.scatter(np.full(len(column), index), column, s=16, color=COLOURS[index % 7], alpha=0.55, zorder=2)
             _interval(values, index, column, COLOURS[index % 7], MARKERS[index % 7])
-    values.set_xticks(at, conditions)
+    values.set_xticks(at, [showable(condition) for condition in conditions])
     values.set_xlim(-0.5, len(conditions) - 0.5)
-    values.set_ylabel(measure_label(measure))
+    values.set_ylabel(showable(measure_label(measure)))
     values.set_title(f"Participants (n = {len(complete)}), mean and 95 % interval")
     if not np.nanmin(wide.to_numpy(np.float64)) < 0:
         values.set_ylim(bottom=0)
@@ -128,10 +130,10 @@ def _differences(axes: Axes, complete: pd.DataFrame, measure: str) -> None:
     axes.axhline(0, color=_GREY, linewidth=0.8)
     axes.scatter(spread, np.sort(difference), s=16, color=COLOURS[2], alpha=0.6)
     _interval(axes, 0.08, difference, COLOURS[2], "D")
-    axes.set_xticks([0], [f"{first} {MINUS} {second}"])
+    axes.set_xticks([0], [showable(f"{first} {MINUS} {second}")])
     axes.set_xlim(-0.5, 0.7)
     unit = unit_of(measure)
-    axes.set_ylabel(f"Difference ({unit})" if unit else "Difference")
+    axes.set_ylabel(showable(f"Difference ({unit})") if unit else "Difference")
     axes.set_title("Differences")
     _grouped(axes)
 
@@ -160,8 +162,8 @@ def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
         for centre, values in zip(centres, ratings, strict=True):
             spread = np.linspace(-0.22, 0.22, len(values)) * width
             axes.scatter(centre + spread, np.sort(values), s=9, color=colour, marker=MARKERS[index % 7], alpha=0.8)
-        axes.plot([], [], color=colour, marker=MARKERS[index % 7], linewidth=5, alpha=0.6, label=condition)
-    axes.set_xticks(np.arange(len(wide)), [short_label(measure) for measure in wide])
+        axes.plot([], [], color=colour, marker=MARKERS[index % 7], linewidth=5, alpha=0.6, label=showable(condition))
+    axes.set_xticks(np.arange(len(wide)), [showable(short_label(measure)) for measure in wide])
     axes.set_ylabel("Rating")
     axes.legend(loc="upper left", bbox_to_anchor=(0, 1.12), ncols=min(len(conditions), 6))
     return figure
@@ -212,7 +214,7 @@ def estimates(view: View) -> Figure:
         if view.reference is not None:
             panel.plot(*view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
         panel.scatter(*view.frames, s=7, color=_GREY, label="tracker, as it arrives", zorder=3)
-        panel.set_title(name)
+        panel.set_title(showable(name))
         panel.set_ylabel(f"{view.axis} (mm)")
     axes[0].set_ylim(float(seen.min()) - margin, float(seen.max()) + margin)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -228,7 +230,7 @@ def lead(curves: Mapping[str, tuple[FloatArray, FloatArray]], peaks: Mapping[str
         inside = np.abs(shift) <= 0.5
         scaled = correlation[inside] / np.max(np.abs(correlation[inside]))
         colour = COLOURS[index % 7]
-        axes.plot(1000 * shift[inside], scaled, color=colour, label=name)
+        axes.plot(1000 * shift[inside], scaled, color=colour, label=showable(name))
         peak = peaks.get(name)
         if peak is not None and np.isfinite(peak):
             height = float(np.interp(peak, shift[inside], scaled))
@@ -259,7 +261,7 @@ def errors(accuracy: pd.DataFrame) -> Figure:
             panel.scatter(known, np.full(len(known), index), s=16, color=colour, alpha=0.5)
             if len(known):
                 panel.plot([known.mean()], [index], marker, color=colour, markersize=9, markeredgecolor="white")
-    axes[0].set_yticks(range(len(names)), names)
+    axes[0].set_yticks(range(len(names)), [showable(name) for name in names])
     axes[0].invert_yaxis()
     if accuracy["rmse_mm"].max() > 15 * accuracy["rmse_mm"].min():
         axes[0].set_xscale("log")
@@ -288,7 +290,7 @@ def noise(residuals: Sequence[FloatArray], units: Sequence[str], names: Sequence
         grid = np.linspace(-reach, reach, 200)
         panel.plot(grid, stats.norm.pdf(grid, scale=sd), color=COLOURS[index % 7], linewidth=2)
         panel.set_xlabel(f"Reading {MINUS} slow drift ({unit})")
-        panel.set_title(f"{name}: SD {sd:.3g} {unit}")
+        panel.set_title(f"{showable(name)}: SD {sd:.3g} {unit}")
         panel.set_yticks([])
         panel.spines["left"].set_visible(False)
     return figure

@@ -17,6 +17,7 @@ from pipeline.document.model import (
     Text,
     numbered,
 )
+from pipeline.typeface import font_folder, showable
 
 _HERE = Path(__file__).parent
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
@@ -26,16 +27,28 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
     import typst
 
-    data = json.dumps(_content(document), ensure_ascii=False)
+    content = _content(document)
+    shown = _showable(content)
+    shown["lacking"] = shown != content
     compiler = typst.Compiler(
         (_HERE / "report.typ").read_bytes(),
         root=figures.resolve(),
+        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
         ignore_system_fonts=True,
-        sys_inputs={"document": data},
+        sys_inputs={"document": json.dumps(shown, ensure_ascii=False)},
     )
     pdf = compiler.compile(format="pdf", pdf_standards=[*_STANDARDS], timestamp=0)
     assert isinstance(pdf, bytes)  # noqa: S101 - one document gives one PDF
     path.write_bytes(pdf)
+
+
+def _showable(value: Any) -> Any:
+    """Plain data with every text as the fonts can show it."""
+    if isinstance(value, str):
+        return showable(value)
+    if isinstance(value, list):
+        return [_showable(item) for item in value]
+    return {key: _showable(item) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def _content(document: Document) -> dict[str, Any]:

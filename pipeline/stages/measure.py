@@ -212,7 +212,8 @@ def _finite(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
                 "reason": f"the cell is empty or not a finite number{at}",
             }
         )
-    return values.loc[np.isfinite(values["value"])]
+    kept: pd.DataFrame = values.drop(index=bad.index)
+    return kept
 
 
 def _cells(values: pd.DataFrame) -> pd.DataFrame:

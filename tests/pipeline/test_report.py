@@ -1,0 +1,264 @@
+"""The pages: complete, self-contained, the same for the same input, and text stays text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from pypdf import PdfReader
+
+from pipeline.document import html, pdf
+from pipeline.document.model import (
+    Column,
+    Document,
+    Figure,
+    KeyFigure,
+    KeyFigures,
+    Notice,
+    Paragraph,
+    Section,
+    Strong,
+    Table,
+)
+from tests.conftest import STREAMS, session_messages, write_session
+from tests.pipeline.helpers import Steadyhand
+
+Folder = Callable[..., Path]
+
+HOSTILE = [
+    "<script>alert(1)</script>",
+    "<img src=x onerror=alert(1)>",
+    '"><b>bold</b>',
+    "#panic()",
+    '#image("/etc/passwd")',
+    "$x^2$ *strong* _emph_ `code` @label \\ // comment",
+    "{{ 7 * 7 }}",
+    "{% include 'x' %}",
+    '=HYPERLINK("x")',
+    "مرحبا \u202eabc",
+    "\u0007bell",
+    "x" * 500,
+]
+
+
+class Checker(HTMLParser):
+    """What a page refers to and whether its headings and pictures are named."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.references: list[str] = []
+        self.pictures_without_alt = 0
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        named = dict(attrs)
+        self.references += [value or "" for key, value in attrs if key in ("src", "href")]
+        if tag == "img" and not named.get("alt"):
+            self.pictures_without_alt += 1
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def checked(page: str) -> Checker:
+    checker = Checker()
+    checker.feed(page)
+    return checker
+
+
+@pytest.fixture
+def hostile_document(tmp_path: Path) -> Document:
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 10"><rect width="5" height="5"/></svg>'
+    (tmp_path / "a.svg").write_text(svg)
+    text = "|".join(HOSTILE)
+    return Document(
+        text,
+        text,
+        text,
+        (
+            Section(
+                "s",
+                text,
+                (
+                    Paragraph((text, Strong(text))),
+                    Notice(text, ((text,), (Strong(text),))),
+                    Notice(text, ((text,),), "information"),
+                    KeyFigures((KeyFigure(text[:40], text, text),)),
+                    Table("t", text, (Column(text, False), Column("n")), ((text, "1"), ("b", text)), text),
+                    Figure("f", "a.svg", text, text),
+                ),
+            ),
+        ),
+    )
+
+
+def test_hostile_text_stays_text_in_html(hostile_document: Document, tmp_path: Path) -> None:
+    html.render(hostile_document, tmp_path, tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    found = checked(page)
+    assert "script" not in found.tags
+    assert found.tags.count("img") == 1
+    assert "b" not in {tag for tag in found.tags if tag == "bold"}
+    seen = "".join(found.text)
+    for text in HOSTILE:
+        assert text in seen
+    assert "49" not in re.sub(r"\s", "", seen.split("{{ 7 * 7 }}")[0][-10:])
+
+
+def test_hostile_text_stays_text_in_pdf(hostile_document: Document, tmp_path: Path) -> None:
+    pdf.render(hostile_document, tmp_path, tmp_path / "r.pdf")
+    text = "".join(page.extract_text() for page in PdfReader(tmp_path / "r.pdf").pages)
+    for expected in ("#panic()", "<script>", "$x^2$ *strong* _emph_", "{{ 7 * 7 }}", "□bell"):
+        assert expected in text
+    assert "is shown as □" in text
+
+
+def test_hostile_names_of_a_whole_study(folder: Folder, steadyhand: Steadyhand) -> None:
+    """Ids, measures, titles and a log's facts with markup, formulas and paths reach every output as text."""
+    evil = '=cmd()<b>&"x'
+    settings = (
+        f"title: '<script>alert(1)</script> #panic()'\nnotes: '{evil}'\nconditions: ['<i>a</i>', '=b']\nmeasures:"
+        " measures.csv\nsessions: '{session}.mcap'\nestimators: {'<u>e': {type: raw}}\ncomparisons: [{measure:"
+        " '../m<x>_s', test: wilcoxon}, {measure: 'q<y>/*', test: wilcoxon}]\n" + STREAMS
+    )
+    rows = "participant,condition,measure,value\n"
+    for number, person in enumerate(["@P1", "-P2", "<b>P3", "P4"]):
+        for shift, condition in enumerate(["<i>a</i>", "=b"]):
+            for measure in ("../m<x>_s", "q<y>/one", "q<y>/two"):
+                rows += f"{person},{condition},{measure},{number * 2 + shift * (number + 1)}\n"
+    root = folder(settings, **{"measures.csv": rows})
+    write_session(root / "x.mcap", session_messages(2.5), participant="@P1", condition="<i>a</i>")
+    ran = steadyhand("report", root)
+    assert ran.code == 0, ran.err
+    found = checked((steadyhand.out / "report.html").read_text(encoding="utf-8"))
+    assert not {"script", "i", "u"} & set(found.tags)
+    assert PdfReader(steadyhand.out / "report.pdf").pages[0].extract_text()
+    for path in (steadyhand.out / "tables").iterdir():
+        for line in path.read_text(encoding="utf-8").splitlines():
+            for cell in line.split(","):
+                assert not cell.startswith(("=", "@")), f"{path.name}: {line}"
+    outside = [p for p in steadyhand.out.parent.rglob("*.svg") if not p.is_relative_to(steadyhand.out / "figures")]
+    assert not [p for p in outside if "cache" not in p.parts]
+
+
+@pytest.fixture
+def report(folder: Folder, steadyhand: Steadyhand) -> Path:
+    root = folder(
+        "title: Two conditions\ndata_origin: simulated\nconditions: [a, b]\nsessions:"
+        " '{participant}_{condition}.mcap'\ndisplay: {px_per_mm: 10}\nquestionnaires: q.csv\nestimators: {raw: {type:"
+        " raw}, gp: {type: window_gp, use: [tracker]}, fusion: {type: window_gp}}\ncomparisons: [{measure:"
+        " selection_mse_px2, test: rm_anova}, {measure: nasa_tlx/*, test: wilcoxon, adjust: holm}]\n" + STREAMS,
+        **{
+            "q.csv": (
+                "participant,condition,questionnaire,scale,rating\n"
+                + "".join(
+                    f"P{p},{c},nasa_tlx,{s},{(p * 3 + len(s) + (c == 'b') * p) % 20}\n"
+                    for p in (1, 2, 3)
+                    for c in "ab"
+                    for s in ("mental", "effort")
+                )
+            )
+        },
+    )
+    for participant in (1, 2, 3):
+        for condition in "ab":
+            messages = session_messages(4.0, seed=participant, bias_mm=participant * (condition == "b"))
+            write_session(root / f"P{participant}_{condition}.mcap", messages)
+    assert steadyhand("report", root).code == 0
+    return steadyhand.out
+
+
+def test_the_page_is_whole_without_network_or_script(report: Path) -> None:
+    page = (report / "report.html").read_text(encoding="utf-8")
+    found = checked(page)
+    assert "script" not in found.tags
+    assert found.pictures_without_alt == 0
+    assert all(reference.startswith(("#", "data:image/svg+xml;base64,")) for reference in found.references)
+    assert "url(" not in page.split("</style>")[0]
+    assert found.tags.count("h1") == 1
+    assert "Simulated data" in page
+    titles = re.findall(r"<h2[^>]*>([^<]*)</h2>", page)
+    for title in (
+        "Summary",
+        "Design and participants",
+        "Data quality and exclusions",
+        "Fusion accuracy",
+        "Target selection",
+    ):
+        assert title in titles
+    for anchor in re.findall(r'href="#([^"]+)"', page):
+        assert f'id="{anchor}"' in page
+
+
+def test_every_figure_is_whole_and_vector(report: Path) -> None:
+    figures = list((report / "figures").iterdir())
+    assert {"streams.svg", "estimates.svg", "lead.svg", "accuracy.svg"} <= {f.name for f in figures}
+    for figure in figures:
+        root = ElementTree.parse(figure).getroot()  # noqa: S314 - our own file
+        assert root.tag.endswith("svg")
+        assert figure.stat().st_size < 500_000
+
+
+def test_the_pdf_is_tagged_named_and_says_the_origin_on_every_page(report: Path) -> None:
+    reader = PdfReader(report / "report.pdf")
+    root = reader.trailer["/Root"]
+    assert root["/MarkInfo"]["/Marked"]  # type: ignore[index]
+    assert root["/Lang"] == "en"  # type: ignore[index]
+    assert reader.metadata is not None
+    assert reader.metadata.title == "Two conditions"
+    metadata = root["/Metadata"].get_data().decode()  # type: ignore[index]
+    assert "pdfuaid:part" in metadata
+    assert "pdfaid:part" in metadata
+    assert len(reader.outline) > 5
+    for page in reader.pages:
+        assert "Simulated data" in page.extract_text()
+
+
+def test_the_same_input_gives_the_same_bytes(report: Path, folder: Folder, steadyhand: Steadyhand) -> None:
+    import shutil
+
+    before = {p.relative_to(report): p.read_bytes() for p in report.rglob("*") if p.is_file()}
+    shutil.rmtree(steadyhand.out)
+    shutil.rmtree(steadyhand.cache)
+    assert steadyhand("report", report.parent / "study").code == 0
+    for name, content in before.items():
+        assert (report / name).read_bytes() == content, name
+
+
+def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report: Path, steadyhand: Steadyhand) -> None:
+    page = (report / "report.html").read_text(encoding="utf-8")
+    for row in steadyhand.results()["comparisons"]:
+        assert f"{row['statistic']:.2f}" in page
+
+
+def test_files_of_an_earlier_report_that_are_no_more_are_removed(
+    report: Path, steadyhand: Steadyhand, folder: Folder
+) -> None:
+    (report / "mine.txt").write_text("a file of the user's")
+    study = report.parent / "study"
+    path = study / "study.yaml"
+    path.write_text(path.read_text().replace("estimators: {raw", "# estimators: {raw"))
+    assert steadyhand("report", study).code == 0
+    assert not (report / "figures" / "lead.svg").exists()
+    assert (report / "mine.txt").exists()
+
+
+def test_names_in_any_script_are_drawn_and_set(folder: Folder, steadyhand: Steadyhand) -> None:
+    """Where a font has no glyph the PDF and the figures show a box; the page has the character itself."""
+    rows = "participant,condition,measure,value\n" + "".join(
+        f"参加者{p},{c},m $x_1$ 🙂,{p * (1 + (c == 'β'))}\n" for p in (1, 2, 3, 5) for c in ("عربي", "β")
+    )
+    settings = (
+        "title: 測定 🙂\nconditions: [عربي, β]\nmeasures: measures.csv\ncomparisons: [{measure: 'm $x_1$ 🙂', test:"
+        " wilcoxon}]\n"
+    )
+    ran = steadyhand("report", folder(settings, **{"measures.csv": rows}))
+    assert ran.code == 0, ran.err
+    assert "測定 🙂" in (steadyhand.out / "report.html").read_text(encoding="utf-8")
+    assert "□□ □" in PdfReader(steadyhand.out / "report.pdf").pages[0].extract_text()

@@ -1,0 +1,171 @@
+"""What is computed again, and what is not."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import pytest
+
+from pipeline import cache as cache_module
+from pipeline.cache import Cache, code_digest
+from pipeline.commands.console import PlainLines
+from pipeline.runner import InThisProcess, Means, Result, bring_up_to_date
+from pipeline.stages import COMPARE, STAGES
+from tests.conftest import STREAMS, session_messages, write_session
+from tests.pipeline.helpers import Steadyhand
+
+Folder = Callable[..., Path]
+SETTINGS = (
+    """
+title: T
+conditions: [a, b]
+sessions: data/{participant}_{condition}.mcap
+estimators:
+  raw: {type: raw}
+  fusion: {type: window_gp}
+measures: measures.csv
+"""
+    + STREAMS
+)
+MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\n"
+
+
+@pytest.fixture
+def study(folder: Folder) -> Path:
+    root = folder(SETTINGS, **{"measures.csv": MEASURES})
+    for condition in "ab":
+        write_session(root / "data" / f"P1_{condition}.mcap", session_messages(2.5))
+    return root
+
+
+@pytest.fixture
+def update(study: Path, tmp_path: Path) -> Callable[[], Result]:
+    means = Means(Cache(tmp_path / "cache"), InThisProcess(), PlainLines())
+    return lambda: bring_up_to_date(study, COMPARE, means)
+
+
+def test_a_second_run_computes_nothing(update: Callable[[], Result]) -> None:
+    assert update().computed == {"ingest": 2, "fuse": 2, "assess": 2, "measure": 1, "compare": 1}
+    assert set(update().computed.values()) == {0}
+
+
+def test_a_second_report_says_that_nothing_was_computed(study: Path, steadyhand: Steadyhand) -> None:
+    assert steadyhand("report", study).code == 0
+    before = {path: path.stat().st_mtime_ns for path in steadyhand.out.rglob("*.*") if path.name != "provenance.json"}
+    ran = steadyhand("report", study)
+    assert "Nothing had changed, so nothing was computed again" in ran.out
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "computed"),
+    [
+        ("title: T", "title: Another", {"compare"}),
+        ("fusion: {type: window_gp}", "fusion: {type: window_gp, window: 3}", {"fuse", "assess", "measure", "compare"}),
+        ("title: T", "title: T\nalpha: 0.01", {"compare"}),
+        ("title: T", "title: T\ndisplay: {px_per_mm: 10}", {"measure", "compare"}),
+        ("noise_sd_mm: 8", "noise_sd_mm: 9", {"ingest", "fuse", "assess", "measure", "compare"}),
+    ],
+)
+def test_a_setting_reaches_the_stages_that_use_it_and_no_others(
+    study: Path, update: Callable[[], Result], before: str, after: str, computed: set[str]
+) -> None:
+    update()
+    path = study / "study.yaml"
+    path.write_text(path.read_text().replace(before, after))
+    again = {stage for stage, count in update().computed.items() if count}
+    # A stage whose inputs come out the same again is not computed again.
+    assert again <= computed
+    assert again & {next(stage for stage in ("ingest", "fuse", "assess", "measure", "compare") if stage in computed)}
+
+
+def test_a_changed_log_reaches_its_own_session_only(study: Path, update: Callable[[], Result]) -> None:
+    update()
+    write_session(study / "data" / "P1_a.mcap", session_messages(2.5, seed=9))
+    computed = update().computed
+    assert (computed["ingest"], computed["fuse"], computed["assess"]) == (1, 1, 1)
+
+
+def test_a_new_session_computes_that_session(study: Path, update: Callable[[], Result]) -> None:
+    update()
+    write_session(study / "data" / "P2_a.mcap", session_messages(2.5, seed=3))
+    assert update().computed["fuse"] == 1
+
+
+def test_edited_code_invalidates_what_it_touches(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A stage's digest follows every module of ours it reaches, also those named as text, and the libraries."""
+    for package in ("pipeline", "fusion_core"):
+        shutil.copytree(Path(cache_module.__file__).parents[1] / package, tmp_path / package)
+    monkeypatch.setattr(cache_module, "_ROOT", tmp_path)
+
+    def digests() -> dict[str, str]:
+        code_digest.cache_clear()
+        return {stage.name: code_digest(stage.function.split(":")[0]) for stage in STAGES}
+
+    def touched(path: str) -> set[str]:
+        before = digests()
+        target = tmp_path / path
+        target.write_text(target.read_text() + "\n# edited\n")
+        after = digests()
+        return {name for name in before if before[name] != after[name]}
+
+    assert touched("fusion_core/window_gp.py") == {"fuse", "assess", "report"}
+    assert touched("pipeline/formats/mcap.py") == {"ingest"}
+    assert touched("pipeline/statistics/rank.py") == {"compare"}
+    assert touched("pipeline/document/style.css") == {"report"}
+    assert touched("pipeline/wording.py") >= {"compare", "report"}
+    code_digest.cache_clear()
+
+
+def test_a_damaged_entry_is_computed_again(update: Callable[[], Result]) -> None:
+    entry = update().entries["fuse"]["P1_a"].folder
+    (entry / "tracks.parquet").write_bytes(b"half")
+    assert update().computed["fuse"] == 1
+    assert update().computed["fuse"] == 0
+
+
+def test_processes_give_the_same_entries_as_this_process(study: Path, tmp_path: Path) -> None:
+    here = bring_up_to_date(study, COMPARE, Means(Cache(tmp_path / "one"), InThisProcess(), PlainLines()))
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        there = bring_up_to_date(study, COMPARE, Means(Cache(tmp_path / "two"), pool, PlainLines()))
+    for stage, entries in here.entries.items():
+        assert {key: e.content for key, e in entries.items()} == {k: e.content for k, e in there.entries[stage].items()}
+
+
+def test_a_fault_of_ours_in_one_session_is_said_and_tried_again(
+    study: Path, update: Callable[[], Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipeline.stages import fuse
+
+    original = fuse.run
+
+    def failing(work: object) -> object:
+        if getattr(work, "session").id == "P1_a":  # noqa: B009 - untyped on purpose
+            raise ZeroDivisionError("no")
+        return original(work)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fuse, "run", failing)
+    result = update()
+    assert [(session.id, "ZeroDivisionError: no" in reason) for session, reason in result.set_aside] == [("P1_a", True)]
+    monkeypatch.setattr(fuse, "run", original)
+    assert update().set_aside == []
+
+
+def test_an_entry_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    with pytest.raises(KeyboardInterrupt), cache.new("fuse") as folder:
+        (folder / "tracks.parquet").write_text("half")
+        raise KeyboardInterrupt
+    assert cache.get("fuse", "0" * 64) is None
+    assert not any((tmp_path / "new").iterdir())
+    with cache.new("fuse") as folder:
+        (folder / "tracks.parquet").write_text("whole")
+        kept = cache.keep("fuse", "1" * 64, folder, {"set_aside": None})
+    found = cache.get("fuse", "1" * 64)
+    assert found == kept
+    assert json.loads((kept.folder / "entry.json").read_text())["files"]["tracks.parquet"]["size"] == 5

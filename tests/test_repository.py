@@ -1,0 +1,115 @@
+"""The repository itself: what its pages say is so, and what must not be in it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from dataclasses import fields
+
+import pytest
+import yaml
+
+from fusion_core import ESTIMATORS
+from pipeline import tables
+from pipeline.study import (
+    AccelerationStream,
+    Comparison,
+    Display,
+    PositionStream,
+    ReferenceStream,
+    Study,
+    _Stream,
+    load_study,
+    parse,
+)
+from pipeline.study_tables import MEASURE_REQUIRED, MEASURE_RESERVED, RATING_REQUIRED, TRIAL_OPTIONAL, TRIAL_REQUIRED
+from tests.conftest import CLONE
+
+REFERENCE = (CLONE / "studies" / "README.md").read_text(encoding="utf-8")
+
+
+def listed_after(heading: str) -> set[str]:
+    """The names in the first column of the table under a heading."""
+    part = REFERENCE.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
+    return {
+        name
+        for line in part.splitlines()
+        if line.startswith("| `")
+        for name in re.findall(r"`([^`]+)`", line.split("|")[1])
+    }
+
+
+def test_every_key_of_a_study_is_in_the_reference() -> None:
+    table = REFERENCE.split("| key | meaning | if absent |", 1)[1].split("\n\n", 1)[0]
+    assert {re.findall(r"`(\w+)`", line)[0] for line in table.splitlines() if line.startswith("| `")} == set(
+        Study.model_fields
+    )
+    for model in (PositionStream, AccelerationStream, ReferenceStream, _Stream, Display, Comparison):
+        for key in model.model_fields:
+            assert f"`{key}`" in REFERENCE, key
+
+
+def test_every_estimator_and_parameter_is_in_the_reference() -> None:
+    assert listed_after("Estimators") == set(ESTIMATORS)
+    for name, kind in ESTIMATORS.items():
+        line = next(line for line in REFERENCE.splitlines() if line.startswith(f"| `{name}`"))
+        for field in fields(kind):
+            if field.name != "sensors":
+                assert f"`{field.name}`" in line, (name, field.name)
+
+
+def test_every_column_of_the_tables_is_in_the_reference() -> None:
+    for column in (*TRIAL_REQUIRED, *TRIAL_OPTIONAL, *RATING_REQUIRED, *MEASURE_REQUIRED, *MEASURE_RESERVED):
+        assert f"`{column}`" in REFERENCE, column
+
+
+def test_the_example_of_the_reference_is_a_study() -> None:
+    example = re.findall(r"```yaml\n(.*?)```", REFERENCE, flags=re.DOTALL)[0]
+    study = parse(Study, yaml.safe_load(example), CLONE / "studies" / "README.md")
+    assert study.conditions == ("kinect", "fusion")
+
+
+@pytest.mark.parametrize("name", ["feng2016", "reach"])
+def test_the_bundled_studies_load(name: str) -> None:
+    assert load_study(CLONE / "studies" / name).title
+
+
+def test_the_example_of_fusion_core_runs() -> None:
+    text = (CLONE / "fusion_core" / "README.md").read_text(encoding="utf-8")
+    namespace: dict[str, object] = {}
+    exec(re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)[0], namespace)  # noqa: S102
+    assert hasattr(namespace["track"], "mean")
+
+
+def test_units_are_in_the_names_of_columns() -> None:
+    bare = {"value", "statistic", "sd", "mean", "median", "residual"}  # in the unit of their measure or stream
+    dimensionless = {"p", "p_adjusted", "df1", "df2", "effect_size", "reduction", "coverage_95", "ci_low", "ci_high"}
+    units = ("_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95")
+    for name, schema in tables.TABLES.items():
+        for column in schema:
+            if str(column.type) == "double" and column.name not in bare | dimensionless:
+                known = column.name.endswith(units) or column.name in ("qx", "qy", "qz", "qw")
+                assert known or column.name in ("mean_difference", "stated_sd", "computed_value"), (name, column.name)
+
+
+def tracked() -> list[str]:
+    listed = subprocess.run(["git", "ls-files"], cwd=CLONE, capture_output=True, text=True, check=False)  # noqa: S607
+    if listed.returncode or not listed.stdout:
+        pytest.skip("not a git checkout")
+    return listed.stdout.splitlines()
+
+
+def test_no_file_holds_a_path_of_a_machine_or_a_download_address() -> None:
+    for name in tracked():
+        path = CLONE / name
+        if path.suffix in (".mcap", ".png") or not path.is_file():
+            continue
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"(^|[^.\w])/(home|root|work|Users)/", text), name
+        if path.suffix == ".lock":
+            assert "://" not in text, name
+
+
+def test_the_bundled_logs_stay_small() -> None:
+    size = sum((CLONE / name).stat().st_size for name in tracked() if name.startswith("studies/"))
+    assert size < 1_000_000
