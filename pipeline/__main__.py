@@ -86,11 +86,17 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except PipelineError as error:
-        print(f"steadyhand: {error}", file=sys.stderr)  # noqa: T201
+        from pipeline.commands.console import warn
+
+        warn(f"steadyhand: {error}")
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
         sys.exit(130)
+    except OSError as error:
+        where = error.filename or "a file"
+        print(f"steadyhand: {where}: {error.strerror or error}; check --out and --cache", file=sys.stderr)  # noqa: T201
+        sys.exit(2)
     except Exception as error:
         if os.environ.get("STEADYHAND_TRACEBACK"):
             raise

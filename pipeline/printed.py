@@ -14,6 +14,7 @@ from pipeline.errors import PipelineError
 from pipeline.study import Frozen, parse, read_yaml
 
 Row = dict[str, Any]
+_LARGEST_EXPONENT = 100
 
 
 class Figure(Frozen):
@@ -71,7 +72,10 @@ def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.Data
 
 def _decimal(path: Path, text: str) -> Decimal:
     try:
-        return Decimal(text)
+        value = Decimal(text)
+        if value.is_finite() and abs(value.adjusted()) < _LARGEST_EXPONENT:
+            return value
+        raise InvalidOperation
     except InvalidOperation:
         raise PipelineError(f'{path}: "{text}" should be a number, in quotes and with the digits as printed') from None
 
@@ -108,13 +112,15 @@ def _computed(path: Path, figure: Figure, table: pd.DataFrame) -> float:
     """The figure's value in the table; a reduction of a descriptive is that of its two conditions' means."""
     rows = table[table["measure"] == figure.measure]
     if figure.table == "descriptives" and figure.column == "reduction":
-        first, second = rows["mean"].to_numpy(np.float64)[:2]
-        return float(1 - second / first)
+        means = rows["mean"].to_numpy(np.float64)
+        if len(means) != 2:
+            raise PipelineError(f'{path}: "{figure.what}": a reduction needs two conditions, found {len(means)}')
+        return float(1 - means[1] / means[0]) if means[0] != 0 else np.nan
     for column in ("condition", "test"):
         wanted = getattr(figure, column)
         if wanted is not None:
             rows = rows[rows[column] == wanted]
-    if len(rows) != 1 or figure.column not in rows:
+    if len(rows) != 1 or figure.column not in rows or rows[figure.column].dtype.kind not in "fi":
         raise PipelineError(
             f'{path}: "{figure.what}" fits {len(rows)} rows of {figure.table} with a column "{figure.column}"; it must '
             "fit one: check measure, condition, test and column"

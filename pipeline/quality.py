@@ -10,6 +10,7 @@ from pipeline.formats.log import FloatArray, IntArray, Readings
 
 _SECONDS = 1e-9
 _STEP_BACK_MIN = 10  # messages: a clock that went back stays back; a late message comes alone
+_FORWARDS = 0.8  # of the steps in a run; in shuffled messages half of them are
 
 
 def quality_row(session: str, stream: str, readings: Readings, notes: list[str]) -> dict[str, Any]:
@@ -53,18 +54,21 @@ def _behind(stamp: IntArray) -> int:
 def clock_went_back(readings: Readings) -> float | None:
     """By how many seconds a clock was set back in mid-stream, or None.
 
-    Late messages come singly; a clock that was set back runs through the same times a second time. Looked for in
-    the recorder's clock by the order of the file, and in the sender's by the order of arrival.
+    Late messages come singly; a clock that was set back runs, forwards, through the same times a second time.
+    Looked for in the recorder's clock by the order of the file, and in the sender's by the order of arrival.
     """
     order = np.argsort(readings.arrival_ns, kind="stable")
     for times in (readings.arrival_ns, readings.stamp_ns[order]):
-        descents = np.flatnonzero(np.diff(times) < 0) + 1
-        if len(descents) == 0 or len(times) < _STEP_BACK_MIN * (len(descents) + 1):
+        if len(times) < 2 * _STEP_BACK_MIN:
             continue
-        for at in descents:
-            behind = times[at:] < times[:at].max()
-            run = len(behind) if behind.all() else int(np.argmin(behind))
-            again = times[:at] > times[at]
-            if run >= _STEP_BACK_MIN and int(again.sum()) >= _STEP_BACK_MIN:
-                return float((times[:at].max() - times[at]) * _SECONDS)
+        newest = np.maximum.accumulate(times)
+        behind = np.concatenate([[False], times[1:] < newest[:-1], [False]])
+        edges = np.flatnonzero(np.diff(behind.astype(np.int8)))
+        for begin, end in zip(edges[::2] + 1, edges[1::2] + 1, strict=True):
+            run = times[begin:end]
+            if len(run) < _STEP_BACK_MIN or int((times[:begin] > run[0]).sum()) < _STEP_BACK_MIN:
+                continue
+            apart = _STEP_BACK_MIN // 2  # single late messages within the run do not turn its direction
+            if np.mean(run[apart:] > run[:-apart]) > _FORWARDS:
+                return float((newest[begin - 1] - run[0]) * _SECONDS)
     return None

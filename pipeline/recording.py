@@ -41,7 +41,7 @@ def load(study: Study, entry: Path) -> Recording:
     """A session's recording from its ingested tables."""
     positions, imu = tables.read("positions", entry), tables.read("imu", entry)
     stamps = pd.concat([positions["arrival_ns"], imu["arrival_ns"]])
-    origin_ns = int(stamps.min())
+    origin_ns = int(stamps.min()) if len(stamps) else 0
     axes = ["xyz".index(axis) for axis in study.axes]
     samples: dict[str, Samples] = {}
     reference = display = None
@@ -134,6 +134,8 @@ def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
 
 
 def _converted(kind: type, key: str, value: Any, where: str) -> Any:
+    if isinstance(value, bool):
+        raise PipelineError(f'{where}: "{key}": should not be {str(value).lower()}')
     try:
         return _adapters(kind)[key].validate_python(value)
     except ValidationError as error:

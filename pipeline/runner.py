@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future, as_completed
 from dataclasses import asdict, dataclass, field, replace
@@ -55,7 +56,9 @@ class Result:
     computed: dict[str, int] = field(default_factory=dict)
     set_aside: list[tuple[Session, str]] = field(default_factory=list)
     in_part: list[tuple[Session, str]] = field(default_factory=list)
+    unused: list[tuple[str, str]] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
 
     @property
     def name(self) -> str:
@@ -86,18 +89,33 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
 
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
+    began = time.monotonic()
     study = load_study(folder)
-    sessions = find_sessions(folder, study)
-    result = Result(folder.resolve(), study)
+    sessions, unused = find_sessions(folder, study)
+    result = Result(folder.resolve(), study, unused=unused)
     result.inputs = _input_digests(result.folder, study, sessions)
     for stage in stages:
-        if stage.scope == "session":
-            result.entries[stage.name] = _run_sessions(stage, result, sessions, means)
-            sessions = _still_usable(result, sessions, result.entries[stage.name])
-            _require_something(folder, result, sessions)
-        else:
-            result.entries[stage.name] = {"": _run_study(stage, result, sessions, means)}
+        try:
+            if stage.scope == "session":
+                result.entries[stage.name] = _run_sessions(stage, result, sessions, means)
+                sessions = _still_usable(result, sessions, result.entries[stage.name])
+                _require_something(folder, result, sessions)
+            else:
+                result.entries[stage.name] = {"": _run_study(stage, result, sessions, means)}
+        except PipelineError as error:
+            raise PipelineError(_with_context(folder, result, str(error))) from None
+    result.seconds = time.monotonic() - began
     return result
+
+
+def _with_context(folder: Path, result: Result, message: str) -> str:
+    """A stage's message with the study's folder, and the sessions that were set aside before it."""
+    lines = [f"{folder}/{line}" if line.startswith("study.yaml") else line for line in message.splitlines()]
+    if str(folder) not in lines[0] and str(result.folder) not in lines[0]:
+        lines[0] = f"{folder}: {lines[0]}"
+    if result.set_aside and "no session can be used" not in message:
+        lines += ["sessions set aside before:", *(f"  {session.id}: {why}" for session, why in result.set_aside)]
+    return "\n".join(lines)
 
 
 def _input_digests(root: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
@@ -145,6 +163,7 @@ def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Wo
         {name: tuple(entry.folder for entry in found) for name, found in read.items()},
         tuple(result.set_aside) if whole else (),
         tuple(result.in_part) if whole else (),
+        tuple(result.unused) if whole else (),
         inputs,
     )
     key = digest_of(
@@ -157,6 +176,7 @@ def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Wo
             inputs,
             {name: [entry.content for entry in found] for name, found in read.items()},
             [[session.id, reason] for session, reason in (*work.set_aside, *work.in_part)],
+            work.unused,
         ]
     )
     return work, key
@@ -258,7 +278,7 @@ def _require_something(folder: Path, result: Result, sessions: Sequence[Session]
     if result.set_aside:
         reasons = "\n".join(f"  {session.id}: {reason}" for session, reason in result.set_aside)
         raise PipelineError(f"{folder}: no session can be used:\n{reasons}")
-    hint = ""
+    hint = "".join(f"\n  {name}: {reason}" for name, reason in result.unused)
     if study.simulation is not None:
         hint = f"; its logs are made by: steadyhand simulate {folder}"
     raise PipelineError(f'{folder}: no file matches sessions: "{study.sessions}"{hint}')

@@ -44,7 +44,7 @@ class Work:
     """One piece of work. `study` holds the declared settings only, `entries` the folders of the stages read.
 
     For a stage of scope "study" each stage read has a folder a session, in the order of `sessions`; a stage of
-    scope "study" has one.
+    scope "study" has one. `unused` are files among the sessions that are none, with the reason.
     """
 
     study_name: str
@@ -55,6 +55,7 @@ class Work:
     entries: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
     set_aside: tuple[tuple[Session, str], ...] = ()
     in_part: tuple[tuple[Session, str], ...] = ()
+    unused: tuple[tuple[str, str], ...] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -28,9 +28,10 @@ def identifier(value: object) -> object:
 
 
 Id = Annotated[str, BeforeValidator(identifier), Field(min_length=1)]
-Vector = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)]
 
 
 class Frozen(BaseModel):
@@ -42,7 +43,7 @@ class Frozen(BaseModel):
 class _Stream(Frozen):
     topic: str
     stamp: Literal["arrival", "measurement"] = "measurement"
-    latency_s: NotNegative = 0.0
+    latency_s: Seconds = 0.0
 
 
 class PositionStream(_Stream):
@@ -64,8 +65,14 @@ class ReferenceStream(_Stream):
     """Ground truth, brought into the tracker's frame by a rotation and a translation."""
 
     kind: Literal["reference"]
-    rotation_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    rotation_xyzw: tuple[Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 1.0)
     translation_mm: Vector = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _turns(self) -> ReferenceStream:
+        if not sum(part**2 for part in self.rotation_xyzw) > 0:
+            raise ValueError("rotation_xyzw is all zeros; no rotation is [0, 0, 0, 1]")
+        return self
 
 
 class DisplayStream(_Stream):
@@ -100,9 +107,9 @@ class Estimator(BaseModel):
 
 
 class Comparison(Frozen):
-    measure: str
+    measure: Id
     test: Literal["rm_anova", "t_paired", "wilcoxon", "friedman"]
-    within: tuple[str, ...] = ("condition",)
+    within: tuple[Id, ...] = ("condition",)
     adjust: Literal["none", "holm", "bonferroni", "benjamini_hochberg"] = "none"
     zeros: Literal["dropped", "pratt"] = "dropped"
 
@@ -113,7 +120,7 @@ class Exclusion(Frozen):
     participant: Id | None = None
     condition: Id | None = None
     session: Id | None = None
-    measure: str | None = None
+    measure: Id | None = None
     reason: str = Field(min_length=1)
 
     @model_validator(mode="after")
@@ -130,9 +137,9 @@ class ReachSimulation(Frozen):
     seed: int
     recordings: Annotated[int, Field(ge=1, le=999)]
     distance_mm: Positive = 200.0
-    still_before_s: NotNegative = 2.1
+    still_before_s: Seconds = 2.1
     reach_s: Positive = 0.9
-    still_after_s: NotNegative = 2.1
+    still_after_s: Seconds = 2.1
     tracker_rate_hz: Positive = 30.0
     imu_rate_hz: Positive = 90.0
     reference_rate_hz: Positive = 90.0
@@ -181,8 +188,12 @@ class Study(Frozen):
                 raise ValueError(f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice')
             if len(comparison.within) > 3 or (len(comparison.within) > 1 and comparison.test != "rm_anova"):
                 raise ValueError(f"comparisons: {comparison.test} does not take within: {list(comparison.within)}")
+        for kind in ("reference", "display"):
+            named = [name for name, stream in self.streams.items() if stream.kind == kind]
+            if len(named) > 1:
+                raise ValueError(f"streams: {' and '.join(named)} are both of kind {kind}; there can be one")
         if self.sessions is not None:
-            _check_pattern(self.sessions)
+            _check_pattern(self.sessions, self.conditions)
         if not (self.sessions or self.trials or self.questionnaires or self.measures):
             raise ValueError("names no data; give sessions, trials, questionnaires or measures")
         return self
@@ -212,7 +223,7 @@ _PLACEHOLDER = re.compile(r"\{(\w+)\}")
 _PLACEHOLDERS = ("participant", "condition", "session")
 
 
-def _check_pattern(pattern: str) -> None:
+def _check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
     names = _PLACEHOLDER.findall(pattern)
     for name in names:
         if name not in _PLACEHOLDERS:
@@ -220,6 +231,12 @@ def _check_pattern(pattern: str) -> None:
     _unique("sessions: placeholder", tuple(names))
     if not names:
         raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
+    for condition in conditions:
+        if "condition" in names and ("_" in condition or "/" in condition):
+            raise ValueError(
+                f'sessions: {{condition}} stands for text without "_" and "/", so no log can be of "{condition}"; '
+                "rename the condition, or use {session} and let the logs' metadata say it"
+            )
 
 
 @dataclass(frozen=True)
@@ -232,8 +249,15 @@ class Session:
     path: Path
 
 
-class _UniqueKeyLoader(yaml.CSafeLoader):
+class _UniqueKeyLoader(yaml.SafeLoader):
     """A key that stands twice in one mapping is an error, not the last one's victory."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """No aliases: a few lines of them can stand for gigabytes."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem="aliases (*name) are not understood; write it out", problem_mark=mark)
+        return super().compose_node(parent, index)
 
 
 def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, object]:
@@ -274,6 +298,7 @@ def load_study(folder: Path) -> Study:
     path = folder / SETTINGS_FILE
     if not path.is_file():
         raise PipelineError(f"{folder}: holds no {SETTINGS_FILE}; studies/README.md shows what goes into one")
+    inside(folder, SETTINGS_FILE, str(folder))
     content = read_yaml(path)
     content.setdefault("title", folder.resolve().name)
     study = parse(Study, content, path)
@@ -339,17 +364,25 @@ def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path
     """A path of the study, refused if it leads out of its folder by `..`, a root or a link."""
     root = folder.resolve()
     path = root / name
-    if Path(name).is_absolute() or ".." in Path(name).parts or not path.resolve().is_relative_to(root):
+    try:
+        leads_out = Path(name).is_absolute() or ".." in Path(name).parts or not path.resolve().is_relative_to(root)
+        exists = path.is_file()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise PipelineError(f"{field}: {name!r} cannot be a path: {error}") from None
+    if leads_out:
         raise PipelineError(f'{field}: "{name}" leads out of the study folder; put the file into it')
-    if must_exist and not path.is_file():
+    if must_exist and not exists:
         raise PipelineError(f'{field}: there is no file "{name}" in the study folder')
     return path
 
 
-def find_sessions(folder: Path, study: Study) -> list[Session]:
-    """The logs that match the study's pattern, sorted by id; two equal ids are a PipelineError."""
+def find_sessions(folder: Path, study: Study) -> tuple[list[Session], list[tuple[str, str]]]:
+    """The logs that match the study's pattern, sorted by id, and the files beside them that do not, with the reason.
+
+    Two equal ids, or a link that leads out of the folder, are a PipelineError.
+    """
     if study.sessions is None:
-        return []
+        return [], []
     root = folder.resolve()
     pieces = _PLACEHOLDER.split(Path(study.sessions).as_posix())
     pattern = "".join(
@@ -357,10 +390,14 @@ def find_sessions(folder: Path, study: Study) -> list[Session]:
     )
     fixed = Path(pieces[0]).parent if not pieces[0].endswith("/") else Path(pieces[0])
     sessions: dict[str, Session] = {}
+    unused: list[tuple[str, str]] = []
     for path in sorted((root / fixed).rglob("*")):
         relative = unicodedata.normalize("NFC", path.relative_to(root).as_posix())
         match = re.fullmatch(pattern, relative)
-        if match is None or not path.is_file():
+        reason = _cannot_be_a_log(path, relative, match is not None, Path(study.sessions).suffix)
+        if reason is not None:
+            unused.append((relative.encode("utf-8", "backslashreplace").decode(), reason))
+        if match is None or reason is not None:
             continue
         inside(folder, path.relative_to(root).as_posix(), f"{folder / SETTINGS_FILE}: sessions")
         found = match.groupdict()
@@ -372,4 +409,22 @@ def find_sessions(folder: Path, study: Study) -> list[Session]:
                 f"\"{session.id}\"; a session's id is its file's name, rename one"
             )
         sessions[session.id] = session
-    return [sessions[key] for key in sorted(sessions)]
+    return [sessions[key] for key in sorted(sessions)], unused
+
+
+def _cannot_be_a_log(path: Path, relative: str, matches: bool, suffix: str) -> str | None:
+    """Why a file among the sessions is not used; None for one that is, or that has nothing to do with them."""
+    if path.is_symlink() and path.is_dir():
+        return "a link to a folder is not followed"
+    if path.is_dir() and not matches:
+        return None
+    if not matches:
+        near = Path(relative).suffix.casefold() == suffix.casefold()
+        return "its name does not fit the pattern of study.yaml" if near else None
+    if not path.is_file():
+        return "it is not a file that can be read"
+    try:
+        relative.encode("utf-8")
+    except UnicodeEncodeError:
+        return "its name is not UTF-8; rename it"
+    return None

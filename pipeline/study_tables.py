@@ -15,6 +15,7 @@ from pipeline.study import identifier
 
 MISSING = ("", "NA", "N/A")
 _SHOWN_FAULTS = 5
+_HUGE, _TINY = 1e100, 1e-100
 
 PARTICIPANT_REQUIRED = ("participant",)
 TRIAL_REQUIRED = (
@@ -43,6 +44,8 @@ def _read(path: Path, required: Sequence[str], optional: Sequence[str] | None) -
     if not numbered:
         raise PipelineError(f"{path}: is empty; its first line must name the columns {', '.join(required)}")
     header = _header(path, numbered[0][1], required, optional)
+    if len(numbered) == 1:
+        raise PipelineError(f"{path}: holds no rows below its header")
     for line, row in numbered[1:]:
         if len(row) != len(header):
             raise PipelineError(f"{path}, row {line}: has {len(row)} cells, the first line {len(header)}")
@@ -56,7 +59,7 @@ def _read(path: Path, required: Sequence[str], optional: Sequence[str] | None) -
 
 def _header(path: Path, first: Sequence[str], required: Sequence[str], optional: Sequence[str] | None) -> list[str]:
     """The names of the columns, checked."""
-    header = [name.strip() for name in first]
+    header = [str(identifier(name.strip())) for name in first]
     for name in header:
         if header.count(name) > 1:
             raise PipelineError(f'{path}: the column "{name}" stands there twice')
@@ -79,12 +82,20 @@ def _required_text(path: Path, table: pd.DataFrame, columns: Iterable[str]) -> N
             raise PipelineError(f'{path}, row {line}: "{column}" is empty')
 
 
+def _number(text: str) -> float:
+    """A number as people write them: no underscores, nor figures beyond what squares and sums can hold."""
+    value = float(text)
+    if "_" in text or _TINY > abs(value) > 0 or (np.isfinite(value) and abs(value) > _HUGE):
+        raise ValueError(text)
+    return value
+
+
 def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
     """A column as numbers, NaN for a missing cell; text is an error that names its rows."""
     values, faults = [], []
     for line, text in table[column].items():
         try:
-            values.append(np.nan if text in MISSING else float(text))
+            values.append(np.nan if text in MISSING else _number(text))
         except ValueError:
             faults.append(f'row {line}: "{column}" should be a number, found "{text}"')
     if faults:
@@ -97,7 +108,7 @@ def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
 def _whole_numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
     values = _numbers(path, table, column)
     for line, value in values.items():
-        if not (np.isfinite(value) and value == round(value)):
+        if not (np.isfinite(value) and abs(value) < 2**53 and value == round(value)):
             found = str(table.at[line, column])
             raise PipelineError(f'{path}, row {line}: "{column}" should be a whole number, found "{found}"')
     return values.astype(np.int64)
@@ -175,7 +186,7 @@ def participant_facts(table: pd.DataFrame) -> dict[str, Any]:
             break
     for name in ("age", "age_years"):
         if name in columns:
-            ages = pd.to_numeric(table[columns[name]], errors="coerce").dropna()
+            ages = pd.to_numeric(table[columns[name]], errors="coerce").replace([np.inf, -np.inf], np.nan).dropna()
             if len(ages):
                 facts["age"] = {
                     "mean": float(ages.mean()),

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.cache import versions
+from pipeline.errors import PipelineError
 from pipeline.provenance import LIBRARIES
 from pipeline.runner import Result
 
@@ -22,6 +23,7 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     files.pop("entry.json")
     files["results.json"] = result.entry("compare") / "results.json"
+    _refuse_inputs(result, folder)
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
     for name, source in files.items():
@@ -39,8 +41,16 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     (folder / _PROVENANCE).write_text(text, encoding="utf-8")
 
 
+def _refuse_inputs(result: Result, folder: Path) -> None:
+    """A report never lies over the study it is of: the study's own files are not changed."""
+    for name in result.inputs:
+        if (result.folder / name).resolve().is_relative_to(folder.resolve()):
+            raise PipelineError(f"--out {folder}: holds the study's own {name}; name a folder for the report alone")
+
+
 def publish_results(result: Result, folder: Path) -> None:
     """results.json alone."""
+    _refuse_inputs(result, folder)
     _copy(result.entry("compare") / "results.json", folder / "results.json")
 
 
@@ -51,7 +61,8 @@ def _published(folder: Path) -> list[str]:
     except (OSError, ValueError, KeyError, TypeError):
         return []
     root = folder.resolve()
-    return [name for name in listed if isinstance(name, str) and (root / name).resolve().is_relative_to(root)]
+    ours = [name for name in listed if isinstance(name, str) and Path(name).parent.name in ("tables", "figures")]
+    return [name for name in ours if (root / name).resolve().is_relative_to(root)]
 
 
 def _copy(source: Path, target: Path) -> None:

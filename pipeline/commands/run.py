@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -49,13 +48,15 @@ def executor_of(jobs: int | None) -> Iterator[Executor]:
 
 def results_of(
     studies: Sequence[Path], stages: Sequence[Stage], jobs: int | None, cache: Path | None
-) -> Iterator[Result]:
-    """Each study brought up to date, one after the other."""
+) -> Iterator[tuple[Path, Result | PipelineError]]:
+    """Each study brought up to date, one after the other; one that cannot be does not stop the others."""
     with executor_of(jobs) as executor:
         for folder in studies:
-            with console.progress() as progress:
-                result = bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
-            yield result
+            try:
+                with console.progress() as progress:
+                    yield folder, bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
+            except PipelineError as error:
+                yield folder, error
 
 
 def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:
@@ -82,25 +83,35 @@ def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: 
 def _run(
     studies: Sequence[Path], stages: Sequence[Stage], out: Path | None, jobs: int | None, cache: Path | None
 ) -> None:
-    folders = _out_folders(studies, out)
+    folders = dict(zip(studies, _out_folders(studies, out), strict=True))
     code = 0
-    began = time.monotonic()
-    for result, folder in zip(results_of(studies, stages, jobs, cache), folders, strict=True):
-        for session, reason in result.set_aside:
-            console.warn(f"{result.name}: session {session.id} set aside: {reason}")
-        for session, reason in result.in_part:
-            console.warn(f"{result.name}: session {session.id} read in part: {reason}")
-        for line in summary(results.read(result.entry("compare") / "results.json")):
-            console.say(line)
+    for study, result in results_of(studies, stages, jobs, cache):
+        if isinstance(result, PipelineError):
+            console.warn(f"steadyhand: {result}")
+            code = max(code, result.exit_code)
+            continue
+        _show(result)
         if stages is STAGES:
-            publish(result, folder, sys.argv)
-            console.say(f"Report: {_short(folder / 'report.html')}  {_short(folder / 'report.pdf')}")
+            publish(result, folders[study], sys.argv)
+            console.say(f"Report: {_short(folders[study] / 'report.html')}  {_short(folders[study] / 'report.pdf')}")
         else:
-            publish_results(result, folder)
-            console.say(f"Results: {_short(folder / 'results.json')}")
-        console.say(_what_was_done(result, time.monotonic() - began))
+            publish_results(result, folders[study])
+            console.say(f"Results: {_short(folders[study] / 'results.json')}")
+        console.say(_what_was_done(result))
         code = max(code, result.exit_code)
     sys.exit(code)
+
+
+def _show(result: Result) -> None:
+    """What happened to the sessions, and the results in a few lines."""
+    for session, reason in result.set_aside:
+        console.warn(f"{result.name}: session {session.id} set aside: {reason}")
+    for session, reason in result.in_part:
+        console.warn(f"{result.name}: session {session.id} read in part: {reason}")
+    for name, reason in result.unused:
+        console.warn(f"{result.name}: {name} not used: {reason}")
+    for line in summary(results.read(result.entry("compare") / "results.json")):
+        console.say(line)
 
 
 def _short(path: Path) -> str:
@@ -111,8 +122,8 @@ def _short(path: Path) -> str:
         return str(path)
 
 
-def _what_was_done(result: Result, seconds: float) -> str:
+def _what_was_done(result: Result) -> str:
     done = [f"{stage} {count}" for stage, count in result.computed.items() if count]
     if not done:
-        return f"Nothing had changed, so nothing was computed again ({seconds:.1f} s)."
-    return f"Computed: {', '.join(done)} ({seconds:.1f} s)."
+        return f"Nothing had changed, so nothing was computed again ({result.seconds:.1f} s)."
+    return f"Computed: {', '.join(done)} ({result.seconds:.1f} s)."

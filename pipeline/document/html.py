@@ -9,6 +9,7 @@ import jinja2
 
 from pipeline.document.model import Document, numbered
 
+_CONTROLS = {code: "□" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
 _HERE = Path(__file__).parent
 
 
@@ -34,4 +35,4 @@ def render(document: Document, figures: Path, path: Path) -> None:
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         picture=picture,
     )
-    path.write_text(page, encoding="utf-8")
+    path.write_text(page.translate(_CONTROLS), encoding="utf-8")

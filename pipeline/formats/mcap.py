@@ -41,6 +41,11 @@ _INFLATED_LIMIT = 64 * 2**20  # bytes a log may always inflate to; beyond it, so
 _INFLATION_LIMIT = 64
 _RECORD_HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
+_MESSAGES_LIMIT = 500_000  # a log may always hold; beyond it, one for so many bytes of its size
+_BYTES_PER_MESSAGE = 16
+_TIME_LIMIT_NS = 2**62
+_NUMBER_LIMIT = 2**53
+_BLOCK = 2**20
 _PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond it the bytes are something else
 
 
@@ -58,6 +63,8 @@ class _Walk:
 
     wanted: Mapping[str, Content]
     inflated_limit: int
+    messages_limit: int
+    messages: int = 0
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     topics: dict[str, _Topic] = field(default_factory=dict)
@@ -79,7 +86,7 @@ def read(path: Path, wanted: Iterable[Wanted]) -> Log:
     """
     asked = {want.topic: want.content for want in wanted}
     size = path.stat().st_size
-    walk = _Walk(asked, max(_INFLATED_LIMIT, _INFLATION_LIMIT * size))
+    walk = _Walk(asked, max(_INFLATED_LIMIT, _INFLATION_LIMIT * size), max(_MESSAGES_LIMIT, size // _BYTES_PER_MESSAGE))
     with path.open("rb") as file:
         _walk_file(walk, file, size)
     _adopt_orphans(walk)
@@ -101,6 +108,7 @@ def _walk_file(walk: _Walk, file: BinaryIO, size: int) -> None:
         raise SessionError("not an MCAP file: it does not begin with the MCAP mark")
     checksum = zlib.crc32(start)
     while not walk.complete:
+        before = checksum
         head = file.read(_RECORD_HEAD.size)
         if len(head) < _RECORD_HEAD.size:
             walk.faults.append("the log ends without its summary: it was cut off, or its recorder was stopped")
@@ -112,13 +120,45 @@ def _walk_file(walk: _Walk, file: BinaryIO, size: int) -> None:
             walk.faults.append(f"the log is cut off, or damaged, {file.tell()} bytes in: {what} is not all there")
             walk.unknown_loss = True
             return
+        checksum = zlib.crc32(head, checksum)
+        if opcode not in _USED:
+            checksum = _passed_over(file, length, checksum)
+            continue
+        if length > walk.inflated_limit:
+            raise SessionError(f"refused: a record of {length // 2**20} MiB, which no session's log holds")
         body = file.read(length)
         if opcode == Opcode.DATA_END:
-            _check_data_end(walk, body, checksum)
-        checksum = zlib.crc32(body, zlib.crc32(head, checksum))
+            _check_data_end(walk, body, before)
+        checksum = zlib.crc32(body, checksum)
         _take_record(walk, opcode, body)
     if file.read(len(MAGIC)) != MAGIC:
         walk.faults.append("the log's last bytes are missing")
+
+
+_USED = frozenset(
+    {
+        Opcode.FOOTER,
+        Opcode.SCHEMA,
+        Opcode.CHANNEL,
+        Opcode.MESSAGE,
+        Opcode.CHUNK,
+        Opcode.MESSAGE_INDEX,
+        Opcode.METADATA,
+        Opcode.STATISTICS,
+        Opcode.DATA_END,
+    }
+)
+
+
+def _passed_over(file: BinaryIO, length: int, checksum: int) -> int:
+    """The checksum after a record of no use here, such as an attachment, read in blocks."""
+    while length > 0:
+        block = file.read(min(length, _BLOCK))
+        if not block:
+            break
+        checksum = zlib.crc32(block, checksum)
+        length -= len(block)
+    return checksum
 
 
 def _adopt_orphans(walk: _Walk) -> None:
@@ -181,6 +221,9 @@ def _take_message_record(walk: _Walk, opcode: int, body: bytes) -> None:
     if opcode == Opcode.MESSAGE:
         channel_id, _, log_time, publish_time = _MESSAGE_HEAD.unpack_from(body)
         channel = walk.channels.get(channel_id)
+        walk.messages += 1
+        if walk.messages > walk.messages_limit:
+            raise SessionError(f"refused: it holds more than {walk.messages_limit} messages, too many for its size")
         payload = body[_MESSAGE_HEAD.size :]
         if channel is None:
             walk.orphans.append((log_time, publish_time, channel_id, payload))
@@ -269,7 +312,9 @@ def _decode(walk: _Walk, topic: str, content: Content) -> Readings:
         channel = walk.channels[channel_id]
         try:
             stamp, row, event = decode(factory, channel, walk.schemas.get(channel.schema_id), payload)
-        except (*_BROKEN, AttributeError, TypeError, IndexError, KeyError, OverflowError) as error:
+            if log_time > _TIME_LIMIT_NS or publish_time > _TIME_LIMIT_NS:
+                raise ValueError("its time is out of all range")
+        except (*_BROKEN, AttributeError, TypeError, LookupError, OverflowError, RecursionError) as error:
             reason = str(error) or type(error).__name__
             failures[reason] = failures.get(reason, 0) + 1
             continue
@@ -366,6 +411,9 @@ def _event(factory: DecoderFactory, channel: Channel, schema: Schema | None, pay
     event = json.loads(payload)
     if not isinstance(event, dict) or event.get("type") not in EVENT_TYPES:
         raise ValueError(f"it is no event: `type` must be one of {', '.join(EVENT_TYPES)}")
+    trial = event.get("trial")
+    if trial is not None and not (isinstance(trial, int) and abs(trial) < _NUMBER_LIMIT):
+        raise ValueError("its trial is not a whole number")
     for key in ("target_x", "target_y", "target_z", "x", "y", "z"):
         if event.get(key) is not None:
             event[key] = float(event[key])

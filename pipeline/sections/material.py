@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ from pipeline.document.model import Figure
 from pipeline.study import Session, Study
 
 Row = Mapping[str, Any]
+
+_NAME_LENGTH = 60
 
 ORIGINS = {
     "recorded": "Recorded data: measured with people and devices.",
@@ -70,8 +73,11 @@ class Material:
 
 
 def safe_name(text: str) -> str:
-    """A name fit for a file: letters, digits and dashes."""
-    return "-".join(part for part in "".join(c if c.isalnum() and c.isascii() else " " for c in text).split()).lower()
+    """A name fit for a file, different for different texts: letters, digits and dashes."""
+    plain = "-".join("".join(c if c.isalnum() and c.isascii() else " " for c in text).split()).lower()
+    if plain == text.replace("_", "-").replace("/", "-") and len(plain) <= _NAME_LENGTH:
+        return plain
+    return f"{plain[:_NAME_LENGTH]}-{hashlib.sha256(text.encode()).hexdigest()[:6]}".lstrip("-")
 
 
 def conditions_text(conditions: Sequence[str]) -> str:

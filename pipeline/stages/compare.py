@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Sequence
-from fnmatch import fnmatchcase
 from itertools import combinations
 from typing import Any
 
@@ -15,6 +15,7 @@ from scipy import stats
 from pipeline import results, study_tables, tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.printed import compare_printed
+from pipeline.recording import build_estimator
 from pipeline.stage import Outcome, Work
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.multiplicity import adjusted
@@ -32,6 +33,8 @@ _SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise")
 def run(work: Work) -> Outcome:
     """The study's descriptives, comparisons, all exclusions, and results.json."""
     study = work.study
+    for name in study.estimators:
+        build_estimator(study, name)  # a misspelt one is an error also where there is no log to run it on
     measured = work.entry("measure")
     measures = tables.read("measures", measured)
     found: dict[str, pd.DataFrame] = {
@@ -41,6 +44,7 @@ def run(work: Work) -> Outcome:
     }
     rows, left_out = comparisons(study, measures)
     found["comparisons"] = tables.frame("comparisons", rows)
+    left_out += _without_accuracy(work)
     found["exclusions"] = pd.concat(
         [
             tables.frame("exclusions", _sessions(work)),
@@ -60,6 +64,28 @@ def run(work: Work) -> Outcome:
         tables.write(name, table, work.out)
     results.write(work.out / "results.json", work.study_name, study, found, _people(work, measures))
     return Outcome()
+
+
+def _without_accuracy(work: Work) -> list[Row]:
+    """Sessions whose reference could not be held against any estimate."""
+    reference = work.study.stream_of_kind("reference")
+    if reference is None or not work.study.estimators:
+        return []
+    quality = tables.read("quality", work.entries["ingest"])
+    there = set(quality.loc[quality["stream"] == reference, "session"])
+    rated = set(tables.read("accuracy", work.entries["assess"])["session"])
+    reason = "its reference has no instant from 1 s after the first frame on"
+    return [
+        {
+            "participant": session.participant,
+            "condition": session.condition,
+            "session": session.id,
+            "what": "no accuracy",
+            "reason": reason,
+        }
+        for session in work.sessions
+        if session.id in there - rated
+    ]
 
 
 def _people(work: Work, measures: pd.DataFrame) -> Row:
@@ -84,7 +110,7 @@ def _sessions(work: Work) -> list[Row]:
                     "reason": reason,
                 }
             )
-    return rows
+    return rows + [{"session": name, "what": "file not used", "reason": reason} for name, reason in work.unused]
 
 
 def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataFrame:
@@ -187,7 +213,8 @@ def comparisons(study: Study, measures: pd.DataFrame) -> tuple[list[Row], list[R
 def _matching(entry: Comparison, known: Sequence[str]) -> list[str]:
     """The measures an entry names; `*` stands for scales, never for a total."""
     if "*" in entry.measure:
-        found = [name for name in known if fnmatchcase(name, entry.measure) and not name.endswith("/total")]
+        pattern = ".*".join(re.escape(piece) for piece in entry.measure.split("*"))
+        found = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
     else:
         found = [name for name in known if name == entry.measure]
     if not found:
@@ -239,6 +266,9 @@ def _factorial(
         list(study.conditions) if factor == "condition" else list(dict.fromkeys(rows[factor]))
         for factor in entry.within
     ]
+    for factor, found in zip(entry.within, levels, strict=True):
+        if len(found) < 2:
+            raise PipelineError(f'study.yaml: comparisons: factor "{factor}" of "{measure}" has one level: {found[0]}')
     wide = rows.pivot_table(index="participant", columns=list(entry.within), values="value", aggfunc="mean")
     wide = wide.reindex(columns=pd.MultiIndex.from_product(levels, names=list(entry.within)))
     _list_incomplete(entry, measure, wide, left_out)

@@ -14,7 +14,7 @@ def run(work: Work) -> Outcome:
     study = work.study
     loaded = recording.load(study, work.entry("ingest"))
     parts = []
-    for name in study.estimators:
+    for name in study.estimators if len(loaded.times) else ():
         track = recording.build_estimator(study, name).replay(loaded.samples, loaded.times)
         known = np.isfinite(track.mean).all(axis=1)
         columns = {

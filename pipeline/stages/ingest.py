@@ -19,6 +19,8 @@ from pipeline.study import Session, Stream, Study
 
 MM_PER_M = 1000.0
 _NEEDED = ("position", "acceleration")  # without these a session has nothing to fuse
+_DAY_NS = 86_400e9
+_SAME_CLOCK_S = 3600.0
 _CONTENT = {
     "acceleration": "acceleration",
     "position": "position",
@@ -43,7 +45,12 @@ def run(work: Work) -> Outcome:
         readings = _stream(log, name, stream, in_part)
         if readings is None:
             continue
-        finite, notes = _finite(readings, stream)
+        finite, notes = _usable(readings, stream)
+        if finite.read == 0:
+            fault = f'stream "{name}": topic {stream.topic} holds no usable sample: {"; ".join(notes)}'
+            if stream.kind in _NEEDED:
+                raise SessionError(fault)
+            in_part.append(fault)
         quality.append(quality_row(session.id, name, readings, notes))
         (imu if stream.kind == "acceleration" else positions).append(_table(session.id, name, stream, finite))
     events = _events(log, study, session.id, in_part, quality)
@@ -96,23 +103,30 @@ def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings
     return None
 
 
-def _finite(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
-    """Without readings that are not finite, and a note of what was left out or will be."""
+def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
+    """Without readings that are not finite or of another day, and a note of what was left out or will be."""
     width = 3 if stream.kind != "acceleration" else 6
-    keep = np.isfinite(readings.values[:, :width]).all(axis=1)
-    notes = []
-    if not keep.all():
-        notes.append(f"{int((~keep).sum())} samples left out: NaN or infinite")
-        if not keep.any():
-            raise SessionError(f"topic {stream.topic} holds no finite sample")
-    if stream.kind == "acceleration":
+    finite = np.isfinite(readings.values[:, :width]).all(axis=1)
+    notes = [] if finite.all() else [f"{int((~finite).sum())} samples left out: NaN or infinite"]
+    in_time = np.ones(readings.read, bool)
+    for times in (readings.stamp_ns, readings.arrival_ns):
+        off = np.abs(times.astype(np.float64) - float(np.median(times)))
+        in_time &= off <= _DAY_NS
+    if not in_time.all():
+        notes.append(f"{int((~in_time).sum())} samples left out: their time is more than a day off")
+    late_s = float(np.median(readings.arrival_ns - readings.stamp_ns)) * tables.NANOSECONDS
+    if stream.kind in _NEEDED and abs(late_s) > _SAME_CLOCK_S:
+        raise SessionError(
+            f"topic {stream.topic}: stamps and arrivals are {abs(late_s):.0f} s apart, so they are not of one clock"
+        )
+    keep = finite & in_time
+    if stream.kind == "acceleration" and keep.any():
         unknown = int(np.isnan(readings.values[keep, 6]).sum())
         if unknown == keep.sum():
             notes.append("no orientation in the log, so no acceleration in the tracker frame")
         elif unknown:
             notes.append(f"{unknown} samples of unknown orientation, not fused")
-    kept = Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep])
-    return kept, notes
+    return Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep]), notes
 
 
 def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.DataFrame:
@@ -140,19 +154,24 @@ def _events(log: Log, study: Study, session: str, in_part: list[str], quality: l
     if study.events is None:
         return tables.frame("events", [])
     readings = log.topics.get(study.events.topic)
-    if readings is None or readings.read == 0:
+    if readings is None or (readings.read == 0 and not readings.notes):
         in_part.append(f"events: topic {study.events.topic} holds none")
         return tables.frame("events", [])
-    quality.append(quality_row(session, "events", readings, []))
+    if readings.read == 0:
+        in_part.append(f"events: {'; '.join(readings.notes)}")
     order = np.argsort(readings.arrival_ns, kind="stable")
     rows = [_event(session, int(readings.arrival_ns[at]), readings.events[at]) for at in order]
-    return tables.frame("events", rows)
+    events = tables.frame("events", rows)
+    once = events.drop_duplicates()
+    repeated = [f"{len(events) - len(once)} repeated events left out"] if len(once) < len(events) else []
+    quality.append(quality_row(session, "events", readings, repeated))
+    return once
 
 
 def _event(session: str, time_ns: int, event: Mapping[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {"session": session, "time_ns": time_ns, "type": event["type"]}
     trial = event.get("trial")
-    row["trial"] = int(trial) if isinstance(trial, int | float) and np.isfinite(trial) else None
+    row["trial"] = trial
     for axis in "xyz":
         for key, column in ((f"target_{axis}", f"target_{axis}_mm"), (axis, f"{axis}_mm")):
             value = event.get(key)

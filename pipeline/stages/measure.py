@@ -23,14 +23,24 @@ def run(work: Work) -> Outcome:
     study = work.study
     exclusions: list[Row] = []
     trials = _trials(work)
-    values = pd.concat([_selection_values(study, trials), _completion_values(work), *_tabled_values(work)])
-    values = _without_excluded(study, values, trials, exclusions)
-    trials = _trials_without_excluded(study, trials)
-    exclusions += _unselected(trials)
-    values = _finite(values, exclusions)
+    values = pd.concat(
+        [_selection_values(study, trials), _completion_values(work, exclusions), *_tabled_values(work)]
+    ).reset_index(drop=True)
     _check_sources(values)
+    known = _known(work, values, trials)
+    for excluded in study.exclusions:
+        _check_exclusion(excluded, known)
+        values = values[~_matches(excluded, values)]
+        if excluded.measure is None:
+            trials = trials[~_matches(excluded, trials)]
+        exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
+    exclusions += _incomplete_trials(trials)
+    values = _finite(values, exclusions)
     cells = _cells(values)
-    measures = pd.concat([cells, _totals(cells)])
+    measures = pd.concat([cells, _totals(cells)]).reset_index(drop=True)
+    for excluded in study.exclusions:
+        if excluded.session is None:
+            measures = measures[~_matches(excluded, measures)]
     exclusions += _gaps(work, measures)
     tables.write("trials", trials, work.out)
     tables.write("measures", measures.sort_values(["measure", *CELL, "factors"], kind="stable"), work.out)
@@ -44,25 +54,32 @@ def _path(work: Work, field: str) -> Any:
 
 
 def _trials(work: Work) -> pd.DataFrame:
-    """The trials of all sessions and of trials.csv, as recorded and as each estimator would have shown."""
+    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown."""
     trials = tables.read("trials", work.entries["assess"])
     path = _path(work, "trials")
     if path is None:
         return trials
+    if len(trials):
+        raise PipelineError(
+            f"{path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:` out of "
+            "study.yaml"
+        )
     table = study_tables.read_trials(path, work.study.conditions)
     squared = np.zeros(len(table))
     for axis in "xyz":
-        target, selected = f"target_{axis}_mm", f"selected_{axis}_mm"
-        if target in table and table[target].notna().any():
-            squared = squared + (table[selected] - table[target]).fillna(np.nan if axis in "xy" else 0.0) ** 2
+        # A trial counts over the axes its target has; a selection that lacks one of them cannot be measured.
+        aimed = table[f"target_{axis}_mm"].notna() if axis == "z" else pd.Series(True, index=table.index)
+        apart = (table[f"selected_{axis}_mm"] - table[f"target_{axis}_mm"]) ** 2
+        squared = squared + apart.where(aimed, 0.0).to_numpy()
+    duration_s = table["selection_s"] - table["start_s"]
     tabled = table[[*CELL, "trial"]].assign(
         session=table["session"].replace("", None),
         estimator="recorded",
         squared_error_mm2=squared,
         position_error_mm=np.sqrt(squared),
-        duration_s=table["selection_s"] - table["start_s"],
+        duration_s=duration_s.where(duration_s >= 0),
     )
-    return pd.concat([trials, tables.as_table("trials", tabled)])
+    return tables.as_table("trials", tabled)
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
@@ -95,18 +112,28 @@ def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(parts)
 
 
-def _completion_values(work: Work) -> pd.DataFrame:
-    """From session_start to the last selection, a row a session that has both."""
+def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
+    """From session_start to the last selection, a row a session that has both; what does not fit is listed."""
     rows = []
     events = tables.read("events", work.entries["ingest"])
     sessions = {session.id: session for session in work.sessions}
     for session_id, happened in events.groupby("session"):
-        starts = happened.loc[happened["type"] == "session_start", "time_ns"]
-        selections = happened.loc[happened["type"] == "selection", "time_ns"]
-        if len(starts) and len(selections):
-            session = sessions[str(session_id)]
-            seconds = float(selections.max() - starts.min()) * tables.NANOSECONDS
-            rows.append((session.participant, session.condition, session.id, seconds))
+        session = sessions[str(session_id)]
+        who: Row = {"participant": session.participant, "condition": session.condition, "session": session.id}
+        times = {kind: found["time_ns"] for kind, found in happened.groupby("type")}
+        selections = times.get("selection", pd.Series(dtype="int64"))
+        starts = times.get("trial_start", pd.Series(dtype="int64"))
+        early = int((selections < starts.min()).sum()) if len(starts) else len(selections)
+        if early:
+            reason = f"{early} before the session's first trial_start"
+            exclusions.append({**who, "what": "selections outside any trial", "reason": reason})
+        if "session_start" in times and len(selections):
+            seconds = float(selections.max() - times["session_start"].min()) * tables.NANOSECONDS
+            if seconds < 0:
+                reason = "the last selection comes before session_start"
+                exclusions.append({**who, "measure": "completion_time_s", "what": "impossible time", "reason": reason})
+            else:
+                rows.append((session.participant, session.condition, session.id, seconds))
     found = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
     return _values(found, "completion_time_s", "seconds", "the events")
 
@@ -141,59 +168,61 @@ def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
     return hit.astype(bool)
 
 
-def _without_excluded(study: Study, values: pd.DataFrame, trials: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
-    """The values that stay; an exclusion that fits nothing in the data is an error, for it is likely misspelt."""
-    values = values.reset_index(drop=True)
-    for excluded in study.exclusions:
-        for column in ("participant", "session", "measure"):
-            wanted, known = getattr(excluded, column), set(values[column].dropna())
-            if column in ("participant", "session"):
-                known |= set(trials[column].dropna())
-            if wanted is not None and wanted not in known:
-                hint = did_you_mean(wanted, sorted(known))
-                raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
-        values = values[~_matches(excluded, values)]
-        exclusions.append(
-            {
-                "participant": excluded.participant,
-                "condition": excluded.condition,
-                "session": excluded.session,
-                "measure": excluded.measure,
-                "what": "excluded in study.yaml",
-                "reason": excluded.reason,
-            }
-        )
-    return values
+def _known(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
+    """Every combination of ids that an exclusion may name: what is in the data, totals, and sessions set aside."""
+    told = [{"participant": s.participant, "condition": s.condition, "session": s.id} for s in work.sessions]
+    told += [{"participant": s.participant, "condition": s.condition, "session": s.id} for s, _ in work.set_aside]
+    columns = [*CELL, "session", "measure"]
+    totals = values[values["measure"].str.contains("/")].copy()
+    totals["measure"] = totals["measure"].str.partition("/")[0] + "/total" if len(totals) else totals["measure"]
+    sessions = pd.DataFrame(told, columns=columns).astype("object")
+    return pd.concat(
+        [
+            values[columns].astype("object"),
+            totals[columns].astype("object"),
+            sessions,
+            trials.reindex(columns=columns).astype("object"),
+        ]
+    )
 
 
-def _trials_without_excluded(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials stay in their table unless whole participants, cells or sessions were excluded."""
-    trials = trials.reset_index(drop=True)
-    for excluded in study.exclusions:
-        if excluded.measure is None:
-            trials = trials[~_matches(excluded, trials)]
-    return trials
+def _check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
+    """An exclusion that fits nothing in the data is an error, for it is likely misspelt."""
+    for column in ("participant", "session", "measure"):
+        wanted, there = getattr(excluded, column), sorted(set(known[column].dropna()))
+        if wanted is not None and wanted not in there:
+            hint = did_you_mean(wanted, there)
+            raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
+    if not _matches(excluded, known).any():
+        named = ", ".join(f"{key} {value}" for key, value in excluded.model_dump().items() if value and key != "reason")
+        raise PipelineError(f"study.yaml: exclusions: nothing in the data fits {named}; there is nothing to exclude")
 
 
-def _unselected(trials: pd.DataFrame) -> list[Row]:
-    """Trials without a measurable selection, counted by session or cell."""
+def _incomplete_trials(trials: pd.DataFrame) -> list[Row]:
+    """Trials without a measurable selection, or without a duration, counted by session or cell."""
     recorded = trials[trials["estimator"] == "recorded"]
-    missing = recorded[recorded["squared_error_mm2"].isna()]
     rows = []
     cell: Any
-    for cell, found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
-        participant, condition, session = cell
-        named = ", ".join(str(trial) for trial in found["trial"][:10]) + (", …" if len(found) > 10 else "")
-        rows.append(
-            {
-                "participant": participant,
-                "condition": condition,
-                "session": None if pd.isna(session) else session,
-                "measure": "selection_mse_mm2",
-                "what": "trials without a measurable selection",
-                "reason": f"{len(found)} of the cell's trials: {named}",
-            }
-        )
+    for measure, column, what in (
+        ("selection_mse_mm2", "squared_error_mm2", "trials without a measurable selection"),
+        ("trial_time_s", "duration_s", "trials without a duration"),
+    ):
+        missing = recorded[recorded[column].isna()]
+        if len(missing) == len(recorded):
+            continue  # a study that does not measure this at all
+        for cell, found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
+            participant, condition, session = cell
+            named = ", ".join(str(trial) for trial in found["trial"][:10]) + (", …" if len(found) > 10 else "")
+            rows.append(
+                {
+                    "participant": participant,
+                    "condition": condition,
+                    "session": None if pd.isna(session) else session,
+                    "measure": measure,
+                    "what": what,
+                    "reason": f"{len(found)} of the cell's trials: {named}",
+                }
+            )
     return rows
 
 
@@ -256,46 +285,46 @@ def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
         named = study_tables.read_participants(path)["participant"]
         for participant in sorted(listed - set(named)):
             hint = did_you_mean(participant, sorted(named)) if len(named) else ""
-            rows.append(
-                {
-                    "participant": participant,
-                    "what": "not in participants",
-                    "reason": f"kept; check its spelling{hint}",
-                }
-            )
+            reason = f"kept; check its spelling{hint}"
+            rows.append({"participant": participant, "what": "not in participants", "reason": reason})
         listed |= set(named)
-    excluded = {e.participant for e in work.study.exclusions if e.participant and not (e.measure or e.session)}
     seen = set(zip(measures["participant"], measures["condition"], strict=True))
     seen |= {(session.participant, session.condition) for session in work.sessions}
     for participant in sorted(listed):
-        absent = [condition for condition in work.study.conditions if (participant, condition) not in seen]
-        if participant not in excluded:
-            for condition in absent:
-                rows.append(
-                    {
-                        "participant": participant,
-                        "condition": condition,
-                        "what": "no data",
-                        "reason": "the participant has nothing in this condition",
-                    }
-                )
-    rows += _missing_cells(work.study, measures, seen, excluded)
-    return rows
+        for condition in work.study.conditions:
+            if (participant, condition) not in seen and not _decided(work.study, participant, condition, None):
+                cell = {"participant": participant, "condition": condition}
+                rows.append({**cell, "what": "no data", "reason": "the participant has nothing in this condition"})
+    return rows + _missing_cells(work.study, measures, seen)
 
 
-def _missing_cells(study: Study, measures: pd.DataFrame, seen: set[Any], excluded: set[Any]) -> list[Row]:
+def _decided(study: Study, participant: str, condition: str, measure: str | None) -> bool:
+    """Is the cell empty because study.yaml excludes it?"""
+    return any(
+        excluded.session is None
+        and excluded.participant == participant
+        and excluded.condition in (None, condition)
+        and excluded.measure in (None, measure)
+        for excluded in study.exclusions
+    )
+
+
+def _missing_cells(study: Study, measures: pd.DataFrame, seen: set[Any]) -> list[Row]:
+    """Cells, and cells of a further factor, that others have."""
     rows = []
     for measure, values in measures.groupby("measure", sort=True):
-        have = set(zip(values["participant"], values["condition"], strict=True))
-        for participant, condition in sorted(seen - have):
-            if participant not in excluded:
-                rows.append(
-                    {
-                        "participant": participant,
-                        "condition": condition,
-                        "measure": measure,
-                        "what": "missing cell",
-                        "reason": "others have this measure",
-                    }
-                )
+        every = sorted({factors for factors in values["factors"] if isinstance(factors, str)})
+        have: dict[Any, set[str]] = {}
+        for row in values.itertuples():
+            have.setdefault((row.participant, row.condition), set()).add(str(row.factors))
+        for participant, condition in sorted(seen):
+            if _decided(study, participant, condition, str(measure)):
+                continue
+            lacking = [factors for factors in every if factors not in have.get((participant, condition), set())]
+            if (participant, condition) in have and not lacking:
+                continue
+            whole = (participant, condition) not in have
+            at = "" if whole else f" ({'; '.join(lacking)})"
+            cell = {"participant": participant, "condition": condition, "measure": measure}
+            rows.append({**cell, "what": "missing cell", "reason": f"others have this measure{at}"})
     return rows

@@ -113,6 +113,19 @@ def test_a_bomb_is_refused_before_it_goes_off(tmp_path: Path, stated: int, messa
         read_log(path, WANTED)
 
 
+def test_a_flood_of_empty_messages_is_refused(tmp_path: Path) -> None:
+    """A few kilobytes can hold millions of messages without a byte in them."""
+    message = struct.pack("<BQHIQQ", 5, 22, 1, 0, 0, 0)
+    channel = struct.pack("<HH", 1, 0) + struct.pack("<I", 2) + b"/t" + struct.pack("<I", 4) + b"json" + b"\0" * 4
+    records = struct.pack("<BQ", 4, len(channel)) + channel + message * 600_000
+    data = zstandard.compress(records)
+    head = struct.pack("<QQQI", 0, 0, len(records), 0) + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(data))
+    path = tmp_path / "flood.mcap"
+    path.write_bytes(MAGIC + struct.pack("<BQ", 6, len(head) + len(data)) + head + data)
+    with pytest.raises(SessionError, match="refused: it holds more than 500000 messages"):
+        read_log(path, WANTED)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

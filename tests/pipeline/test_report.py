@@ -107,7 +107,7 @@ def test_hostile_text_stays_text_in_html(hostile_document: Document, tmp_path: P
     assert "b" not in {tag for tag in found.tags if tag == "bold"}
     seen = "".join(found.text)
     for text in HOSTILE:
-        assert text in seen
+        assert text.replace("\a", "□") in seen
     assert "49" not in re.sub(r"\s", "", seen.split("{{ 7 * 7 }}")[0][-10:])
 
 

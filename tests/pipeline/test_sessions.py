@@ -66,7 +66,7 @@ def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, stea
     trials = (steadyhand.out / "tables" / "trials.csv").read_text().splitlines()
     row = next(line.split(",") for line in trials if line.startswith("P1,a,P1_a,1,fusion,"))
     loaded_study = load_study(study)
-    session = next(s for s in find_sessions(study, loaded_study) if s.id == "P1_a")
+    session = next(s for s in find_sessions(study, loaded_study)[0] if s.id == "P1_a")
     out = study.parent / "ingested"
     out.mkdir()
     ingest.run(Work("t", loaded_study, study, out, (session,)))
@@ -86,7 +86,7 @@ def test_replay_agreement_is_zero_where_the_log_shows_what_it_says(folder: Folde
     study = load_study(root)
     out = root / "ingested"
     out.mkdir()
-    ingest.run(Work("t", study, root, out, tuple(find_sessions(root, study))))
+    ingest.run(Work("t", study, root, out, tuple(find_sessions(root, study)[0])))
     loaded = recording.load(study, out)
     track = recording.build_estimator(study, "fusion").replay(loaded.samples, loaded.times)
     for time, mean in zip(track.time, track.mean, strict=True):
@@ -136,7 +136,7 @@ def without(topic: str) -> Callable[[list[Message]], list[Message]]:
 BAD_SESSIONS: dict[str, tuple[Callable[[list[Message]], list[Message]], str]] = {
     "missing topic": (without("/tracker/position"), 'stream "tracker": topic /tracker/position is not in the log'),
     "clock backwards": (set_back, 'stream "imu": the clock went backwards by 0.489 s'),
-    "all NaN": (with_values(np.nan, 1), "topic /tracker/position holds no finite sample"),
+    "all NaN": (with_values(np.nan, 1), "holds no usable sample: 120 samples left out: NaN or infinite"),
     "no reference": (without("/reference/position"), 'stream "reference": topic /reference/position is not in the log'),
 }
 
@@ -260,3 +260,113 @@ def test_a_trial_without_a_selection_is_counted_not_lost(study: Path, steadyhand
     assert steadyhand("compare", study).code == 0
     row = next(r for r in steadyhand.results()["exclusions"] if "selection" in r["what"])
     assert (row["participant"], row["session"], row["reason"]) == ("P1", "P1_a", "1 of the cell's trials: 2")
+
+
+def listed(steadyhand: Steadyhand, what: str) -> list[tuple[str | None, str]]:
+    return [(row["session"], row["reason"]) for row in steadyhand.results()["exclusions"] if row["what"] == what]
+
+
+def test_files_beside_the_sessions_are_not_passed_over_in_silence(study: Path, steadyhand: Steadyhand) -> None:
+    data = study / "data"
+    (data / "P5-a.mcap").touch()
+    (data / "P6_a.MCAP").touch()
+    (data / "P7_a.mcap").symlink_to(data / "nowhere")
+    (data / "linked").symlink_to(study.parent, target_is_directory=True)
+    (data / "notes.txt").touch()
+    assert steadyhand("compare", study).code == 0
+    assert listed(steadyhand, "file not used") == [
+        ("data/P5-a.mcap", "its name does not fit the pattern of study.yaml"),
+        ("data/P6_a.MCAP", "its name does not fit the pattern of study.yaml"),
+        ("data/P7_a.mcap", "it is not a file that can be read"),
+        ("data/linked", "a link to a folder is not followed"),
+    ]
+
+
+def test_a_condition_that_the_pattern_cannot_match_is_an_error(study: Path, steadyhand: Steadyhand) -> None:
+    path = study / "study.yaml"
+    path.write_text(path.read_text().replace("conditions: [a, b]", "conditions: [a, b_2]"))
+    ran = steadyhand("compare", study)
+    assert ran.code == 2
+    assert 'no log can be of "b_2"' in ran.err
+
+
+def test_selections_outside_any_trial_are_counted(study: Path, steadyhand: Steadyhand) -> None:
+    def drop(_: int, message: Message) -> Message | None:
+        event = message.event or {}
+        return None if event.get("type") == "trial_start" and event.get("trial") == 1 else message
+
+    write_session(study / "data" / "P1_a.mcap", moved(session_messages(), "/events", drop))
+    assert steadyhand("compare", study).code == 0
+    assert listed(steadyhand, "selections outside any trial") == [("P1_a", "1 before the session's first trial_start")]
+
+
+def test_repeated_events_count_once(study: Path, steadyhand: Steadyhand) -> None:
+    messages = session_messages()
+    events = [message for message in messages if message.topic == "/events"]
+    write_session(study / "data" / "P1_a.mcap", messages + events)
+    assert steadyhand("compare", study).code == 0
+    assert listed(steadyhand, "trials without a measurable selection") == []
+    row = next(r for r in steadyhand.results()["quality"] if r["session"] == "P1_a" and r["stream"] == "events")
+    assert "7 repeated events left out" in row["note"]
+
+
+def test_a_clock_set_back_is_told_from_late_messages_also_under_jitter(study: Path, steadyhand: Steadyhand) -> None:
+    def jittered(step_back_s: float) -> list[Message]:
+        middle = EPOCH_NS + 2_000_000_000
+
+        def change(index: int, message: Message) -> Message:
+            late = 40_000_000 if index % 4 == 0 else 0
+            back = round(step_back_s * 1e9) if message.stamp_ns > middle else 0
+            return replace(message, stamp_ns=message.stamp_ns - late - back)
+
+        return moved(session_messages(), "/tracker/position", change)
+
+    write_session(study / "data" / "P1_a.mcap", jittered(1.5))
+    write_session(study / "data" / "P1_b.mcap", jittered(0.0))
+    ran = steadyhand("compare", study)
+    assert "session P1_a set aside" in ran.err
+    assert "P1_b" not in ran.err
+
+
+def test_one_impossible_arrival_costs_one_sample(study: Path, steadyhand: Steadyhand) -> None:
+    messages = session_messages()
+    one = next(index for index, message in enumerate(messages) if message.topic == "/tracker/position") + 40
+    messages[one] = replace(messages[one], arrival_ns=0)
+    write_session(study / "data" / "P1_a.mcap", messages)
+    assert steadyhand("compare", study).code == 0
+    row = next(r for r in steadyhand.results()["quality"] if r["session"] == "P1_a" and r["stream"] == "tracker")
+    assert "1 samples left out: their time is more than a day off" in row["note"]
+
+
+def test_an_accuracy_study_may_exclude_a_session(study: Path, steadyhand: Steadyhand) -> None:
+    path = study / "study.yaml"
+    text = path.read_text().replace("events: {topic: /events}", "").replace("comparisons:", "# comparisons:")
+    path.write_text(text + "exclusions: [{session: P1_a, reason: dropped the phone}]\n")
+    assert steadyhand("compare", study).code == 0
+    assert {row["session"] for row in steadyhand.results()["accuracy"]} == {"P1_b", "P2_a", "P2_b"}
+
+
+def test_a_study_of_events_alone(folder: Folder, steadyhand: Steadyhand) -> None:
+    settings = "conditions: [a, b]\nsessions: '{participant}_{condition}.mcap'\nevents: {topic: /events}\n"
+    root = folder(settings + "comparisons: [{measure: selection_mse_mm2, test: t_paired}]\n")
+    for participant in ("P1", "P2", "P3"):
+        for condition in "ab":
+            write_session(root / f"{participant}_{condition}.mcap")
+    assert steadyhand("report", root).code == 0
+    assert steadyhand.results()["comparisons"][0]["n"] == 3
+
+
+def test_the_study_is_never_written_over(study: Path, steadyhand: Steadyhand) -> None:
+    before = {path: path.read_bytes() for path in study.rglob("*") if path.is_file()}
+    ran = steadyhand("report", study, "--out", str(study))
+    assert ran.code == 2
+    assert "holds the study's own" in ran.err
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_a_bad_study_does_not_stop_the_next(study: Path, folder: Folder, steadyhand: Steadyhand) -> None:
+    bad = folder("conditions: [a]\n", name="bad")
+    ran = steadyhand("compare", bad, str(study))
+    assert ran.code == 2
+    assert f"{bad / 'study.yaml'}: names no data" in ran.err
+    assert (steadyhand.out / "study" / "results.json").is_file()

@@ -120,7 +120,8 @@ def test_sessions_are_found_by_pattern_and_ids_compared_after_nfc(folder: Folder
     for name in (unicodedata.normalize("NFD", "P1_café"), "P2_other", "notes", "P_1_2"):
         (root / "data" / f"{name}.mcap").touch()
     study = load_study(root)
-    sessions = find_sessions(root, study)
+    sessions, unused = find_sessions(root, study)
+    assert [name for name, _ in unused] == ["data/P_1_2.mcap", "data/notes.mcap"]
     assert [(session.id, session.condition) for session in sessions] == [
         ("P1_café", "café"),
         ("P2_other", "other"),
@@ -142,3 +143,24 @@ def test_a_minimal_study_needs_no_title(folder: Folder) -> None:
     study = load_study(root)
     assert study.title == "pilot"
     assert study.conditions == ("1", "2")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("streams: {i: {topic: /i, kind: acceleration, gravity_mm_s2: [0, .nan, 0]}}", "streams.i.gravity_mm_s2.1"),
+        ("streams: {r: {topic: /r, kind: reference, rotation_xyzw: [0, 0, 0, 0]}}", "rotation_xyzw is all zeros"),
+        ("streams: {t: {topic: /t, kind: position, latency_s: 1e9}}", "streams.t.latency_s"),
+        (
+            "streams: {r: {topic: /r, kind: reference}, s: {topic: /s, kind: reference}}",
+            "r and s are both of kind reference; there can be one",
+        ),
+        ("notes: &a x\ncitation: *a", "aliases (*name) are not understood"),
+        ('measures: "a\\0b.csv"', "cannot be a path"),
+    ],
+)
+def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhand, line: str, message: str) -> None:
+    settings = MINIMAL if not line.startswith("measures") else MINIMAL.replace("measures: measures.csv\n", "")
+    ran = steadyhand("compare", folder(settings + line + "\n", **{"measures.csv": MEASURES}))
+    assert ran.code == 2
+    assert message in ran.err

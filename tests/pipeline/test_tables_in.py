@@ -114,3 +114,68 @@ def test_ids_in_either_unicode_form_are_one(folder: Folder, steadyhand: Steadyha
     text = GOOD.replace("P1,a", "Jose\u0301,a").replace("P1,b", "Jos\u00e9,b")
     assert steadyhand("compare", folder(SETTINGS, **{"measures.csv": text})).code == 0
     assert steadyhand.results()["comparisons"][0]["n"] == 3
+
+
+TRIALS = (
+    "participant,condition,trial,target_x_mm,target_y_mm,target_z_mm,selected_x_mm,selected_y_mm,selected_z_mm,"
+    "start_s,selection_s\nP1,a,1,0,0,100,3,4,,0,1\nP1,a,2,0,0,100,3,4,112,2,\nP1,a,3,0,0,,3,4,7,5,4\nP1,b,1,0,0,,6,8,,0,2\n"
+)
+
+
+def test_what_a_trial_lacks_is_listed_and_not_taken_for_zero(folder: Folder, steadyhand: Steadyhand) -> None:
+    """Trial 1 lacks a coordinate its target has, 2 has no time, 3 a negative one; the target of 3 is on a plane."""
+    assert steadyhand("compare", folder("conditions: [a, b]\ntrials: trials.csv\n", **{"trials.csv": TRIALS})).code == 0
+    found = {(r["measure"], r["condition"]): r["mean"] for r in steadyhand.results()["descriptives"]}
+    assert found["selection_mse_mm2", "a"] == pytest.approx((25 + 144 + 25) / 2)
+    assert found["selection_mse_mm2", "b"] == pytest.approx(100)
+    assert found["trial_time_s", "a"] == pytest.approx(1)
+    missing = {(r["what"], r["reason"]) for r in steadyhand.results()["exclusions"] if r["condition"] == "a"}
+    assert ("trials without a measurable selection", "1 of the cell's trials: 1") in missing
+    assert ("trials without a duration", "2 of the cell's trials: 2, 3") in missing
+
+
+def test_a_missing_cell_of_a_further_factor_is_listed(folder: Folder, steadyhand: Steadyhand) -> None:
+    rows = "participant,condition,measure,task,value\n" + "".join(
+        f"P{p},{c},m,{t},{p}\n" for p in (1, 2) for c in "ab" for t in ("easy", "hard") if (p, c, t) != (1, "a", "hard")
+    )
+    assert steadyhand("compare", folder(SETTINGS, **{"measures.csv": rows})).code == 0
+    entry = next(e for e in steadyhand.results()["exclusions"] if e["what"] == "missing cell")
+    assert (entry["participant"], entry["condition"]) == ("P1", "a")
+    assert '"task": "hard"' in entry["reason"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GOOD.replace("P1,a,m,1\n", "P1,a,m,1_0\n"), '"value" should be a number, found "1_0"'),
+        (GOOD.replace("P1,a,m,1\n", "P1,a,m,1e200\n"), '"value" should be a number, found "1e200"'),
+        (HEAD, "measures.csv: holds no rows below its header"),
+    ],
+)
+def test_more_that_is_refused(folder: Folder, steadyhand: Steadyhand, text: str, message: str) -> None:
+    ran = steadyhand("compare", folder(SETTINGS, **{"measures.csv": text}))
+    assert ran.code == 2
+    assert message in ran.err
+
+
+def test_an_exclusion_of_one_cell_hides_no_other_gap(folder: Folder, steadyhand: Steadyhand) -> None:
+    extra = "exclusions: [{participant: P1, condition: a, reason: tired}]\n"
+    text = GOOD.replace("P1,b,m,2\n", "") + "P1,b,other,1\nP2,b,other,1\n"
+    assert steadyhand("compare", folder(SETTINGS + extra, **{"measures.csv": text})).code == 0
+    gaps = [
+        (e["participant"], e["condition"]) for e in steadyhand.results()["exclusions"] if e["what"] == "missing cell"
+    ]
+    assert ("P1", "b") in gaps
+    assert ("P1", "a") not in gaps
+
+
+def test_measure_names_in_either_unicode_form_are_one(folder: Folder, steadyhand: Steadyhand) -> None:
+    settings = SETTINGS.replace("measure: m", "measure: me\u0301")
+    assert steadyhand("compare", folder(settings, **{"measures.csv": GOOD.replace(",m,", ",m\u00e9,")})).code == 0
+
+
+def test_a_misspelt_estimator_is_an_error_also_without_logs(folder: Folder, steadyhand: Steadyhand) -> None:
+    streams = "streams: {t: {topic: /t, kind: position}}\nestimators: {e: {type: windowgp}}\n"
+    ran = steadyhand("compare", folder(SETTINGS + streams, **{"measures.csv": GOOD}))
+    assert ran.code == 2
+    assert 'study.yaml: estimators.e: type "windowgp" is not known' in ran.err
