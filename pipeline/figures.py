@@ -200,27 +200,51 @@ def streams(view: View) -> Figure:
 
 
 def estimates(view: View) -> Figure:
-    """Each estimator's mean and two SDs with the reference and the frames (paper, Figs. 7 and 8)."""
+    """Each estimator's mean and two SDs (paper, Figs. 7 and 8), and with a reference its error beside it."""
     names = list(view.tracks)
-    figure, axes = _axes(len(names), 1, 0.7 + 1.65 * len(names), sharex=True, sharey=True)
-    means = np.concatenate([mean for _, mean, _ in view.tracks.values()])
-    seen = np.concatenate([means, view.frames[1]] + ([view.reference[1]] if view.reference is not None else []))
-    margin = 0.15 * float(np.ptp(seen)) + 1
-    for index, (panel, name) in enumerate(zip(axes, names, strict=True)):
-        time, mean, sd = view.tracks[name]
-        colour = COLOURS[index % 6]
-        panel.fill_between(time, mean - 2 * sd, mean + 2 * sd, color=colour, alpha=0.2, linewidth=0, label="± 2 SD")
-        panel.plot(time, mean, color=colour, label="estimate")
+    columns = 1 if view.reference is None else 2
+    figure = Figure(figsize=(_WIDTH, 0.7 + 1.45 * len(names)))
+    panels = figure.subplots(len(names), columns, sharex=True, sharey="col", squeeze=False)
+    for index, (name, row) in enumerate(zip(names, panels, strict=True)):
+        _estimate(row[0], view, name, COLOURS[index % 6])
         if view.reference is not None:
-            panel.plot(*view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
-        panel.scatter(*view.frames, s=7, color=_GREY, label="tracker, as it arrives", zorder=3)
-        panel.set_title(showable(name))
-        panel.set_ylabel(f"{view.axis} (mm)")
-    axes[0].set_ylim(float(seen.min()) - margin, float(seen.max()) + margin)
-    handles, labels = axes[0].get_legend_handles_labels()
+            _error(row[1], view, name, COLOURS[index % 6])
+    seen = [view.frames[1], *(mean for _, mean, _ in view.tracks.values())]
+    seen += [view.reference[1]] if view.reference is not None else []
+    _around(panels[0, 0], np.concatenate(seen))
+    handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=4)
-    axes[-1].set_xlabel("Time since the session's start (s)")
+    for panel in panels[-1]:
+        panel.set_xlabel("Time since the session's start (s)")
     return figure
+
+
+def _around(axes: Axes, values: FloatArray) -> None:
+    margin = 0.15 * float(np.ptp(values)) + 1
+    axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)
+
+
+def _estimate(axes: Axes, view: View, name: str, colour: str) -> None:
+    time, mean, sd = view.tracks[name]
+    axes.fill_between(time, mean - 2 * sd, mean + 2 * sd, color=colour, alpha=0.2, linewidth=0, label="± 2 SD")
+    axes.plot(time, mean, color=colour, label="estimate")
+    if view.reference is not None:
+        axes.plot(*view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
+    axes.scatter(*view.frames, s=5, color=_GREY, label="tracker, as it arrives", zorder=3)
+    axes.set_title(showable(name))
+    axes.set_ylabel(f"{view.axis} (mm)")
+
+
+def _error(axes: Axes, view: View, name: str, colour: str) -> None:
+    """Estimate minus reference, within the band that the estimator states."""
+    assert view.reference is not None  # noqa: S101 - the caller has one
+    time, mean, sd = view.tracks[name]
+    error = mean - np.interp(time, *view.reference, left=np.nan, right=np.nan)
+    axes.fill_between(time, -2 * sd, 2 * sd, color=colour, alpha=0.2, linewidth=0)
+    axes.axhline(0, color=COLOURS[6], linewidth=0.8)
+    axes.plot(time, error, color=colour)
+    axes.set_title(f"{showable(name)}: error")
+    axes.set_ylabel("error (mm)")
 
 
 def lead(curves: Mapping[str, tuple[FloatArray, FloatArray]], peaks: Mapping[str, float]) -> Figure:

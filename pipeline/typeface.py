@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import unicodedata
 from functools import cache
 from pathlib import Path
 
 STAND_IN = "□"
+_INVISIBLE = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")  # controls, formats, halves of pairs, nothing, separators
 
 
 def font_folder() -> Path:
@@ -24,5 +26,11 @@ def _covered() -> frozenset[int]:
 
 def showable(text: str) -> str:
     """Text with □ for each character that has no glyph; line breaks become spaces."""
-    known = _covered()
-    return "".join(c if ord(c) in known and c.isprintable() else " " if c.isspace() else STAND_IN for c in text)
+    return "".join(_shown(c) for c in text)
+
+
+def _shown(character: str) -> str:
+    if character in "\n\r\t":
+        return " "
+    visible = unicodedata.category(character) not in _INVISIBLE
+    return character if visible and ord(character) in _covered() else STAND_IN

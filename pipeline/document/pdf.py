@@ -113,5 +113,5 @@ def _shares(table: Table) -> list[float]:
         longest, heading = max(cells, default=1), max((len(word) for word in column.title.split()), default=1)
         typical = sum(cells) / max(len(cells), 1)
         width = longest if column.numeric else min(longest, max(12, 1.6 * typical))
-        wanted.append(float(max(width, heading) + 2))
+        wanted.append(float(max(width, heading) + 3))
     return wanted

@@ -172,8 +172,9 @@ def _session_figures(material: Material) -> list[Block]:
             material.figure(
                 "estimates",
                 figures.estimates,
-                f"What each estimator makes of them ({span}): its mean and two stated SDs. Look whether it runs behind "
-                "the reference, how much it trembles, and whether the band holds the reference.",
+                f"What each estimator makes of them ({span}): its mean and two stated SDs, and beside it its error in"
+                " the band it states. Look whether it runs behind the reference, how much it trembles, and whether the"
+                " error stays in the band.",
                 f"One panel an estimator ({', '.join(view.tracks)}) with mean, band, reference and tracker frames.",
                 view,
             )

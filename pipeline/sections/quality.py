@@ -62,6 +62,7 @@ def _quality_table(material: Material) -> Table:
         )
         for row in rows[:_ROWS_MAX]
     )
+    shown = len(titles) if any(row[-1] for row in cells) else len(titles) - 1  # no column without a note in it
     more = (
         f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/quality.csv." if len(rows) > _ROWS_MAX else ""
     )
@@ -69,8 +70,8 @@ def _quality_table(material: Material) -> Table:
         "table-quality",
         "Each sensor stream as it was recorded. Look for lost messages, long gaps and rates off their usual value."
         + more,
-        tuple(Column(title, title not in ("Session", "Stream", "Note")) for title in titles),
-        cells,
+        tuple(Column(title, title not in ("Session", "Stream", "Note")) for title in titles[:shown]),
+        tuple(row[:shown] for row in cells),
         "Rate: messages a second of the stream's own clock. Jitter: SD of the time between arrivals, gaps left out. "
         "Delay in log: median of arrival minus stamp; a tracker that stamps on delivery shows none.",
     )
