@@ -69,8 +69,9 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
 
     Sub-sample by a parabola through the smallest squared distance and its neighbours; the 95 % interval is the
     2.5 and 97.5 percentile of 1000 resamples of moving blocks of 0.5 s. NaN with less than 1 s of usable track, or
-    where the smallest distance sits at the edge of the range; a resample at the edge counts as the edge, so that an
-    interval that reaches ±0.5 s says the data cannot tell.
+    where the smallest distance sits at the edge of the range. A resample at the edge counts as the edge, so that an
+    interval that reaches ±0.5 s says the data cannot tell; one in which the hand never moves says nothing of the lag
+    and does not count.
     """
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
     distance = np.stack(
@@ -90,10 +91,20 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     resampled = np.zeros((_RESAMPLES, len(shifts)))
     for column in picks.T:
         resampled += sums[column]
+    resampled = resampled[~_flat(resampled)]
+    if len(resampled) < _RESAMPLES // 2:
+        return Interval(float(whole), np.nan, np.nan)
     found = _lowest(shifts, resampled)
     lows = np.where(np.isfinite(found), found, shifts[np.argmin(resampled, axis=1)])
     low, high = np.percentile(lows, [2.5, 97.5])
     return Interval(float(whole), float(low), float(high))
+
+
+def _flat(cost: FloatArray) -> BoolArray:
+    """Rows that are the same at every shift but for round-off: while the reference is still, any shift fits."""
+    highest = cost.max(axis=1)
+    flat: BoolArray = highest - cost.min(axis=1) <= 1e-6 * highest
+    return flat
 
 
 def _lowest(shifts: FloatArray, cost: FloatArray) -> FloatArray:
@@ -103,7 +114,7 @@ def _lowest(shifts: FloatArray, cost: FloatArray) -> FloatArray:
     row = np.arange(len(cost))
     before, here, after = cost[row, inside - 1], cost[row, inside], cost[row, inside + 1]
     bend = before - 2 * here + after
-    sharp = (at == inside) & (bend > 0)
+    sharp = (at == inside) & (bend > 0) & ~_flat(cost)
     step = np.divide(before - after, 2 * bend, out=np.zeros_like(bend), where=sharp)
     return np.where(sharp, shifts[inside] + step * (shifts[1] - shifts[0]), np.nan)
 

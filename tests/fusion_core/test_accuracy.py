@@ -47,8 +47,9 @@ def test_lag_is_found_to_a_fraction_of_a_sample(late_s: float) -> None:
 def test_lag_of_a_hand_that_never_moves_is_not_claimed() -> None:
     time = np.arange(0, 10, 1 / 90)
     still = np.zeros((len(time), 2))
-    found = accuracy.lag(time, still, of(time, still), np.random.default_rng(0))
-    assert np.isnan(found.value)
+    for track in (still, still + np.random.default_rng(1).normal(0, 3, still.shape)):
+        found = accuracy.lag(time, track, of(time, still), np.random.default_rng(0))
+        assert np.isnan(found.value)
 
 
 @pytest.mark.parametrize("ahead_s", [0.11, -0.05])
