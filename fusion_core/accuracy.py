@@ -18,6 +18,7 @@ LAG_RANGE_S = 0.5
 _LAG_STEP_S = 0.005
 _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
+_ROUND_OFF = 1e-9  # of a cost, what the order of a sum may change
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,9 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     if not usable.any() or np.ptp(time[usable]) < 1.0:
         return NO_INTERVAL
     distance = distance[usable]
-    whole = _lowest(shifts, distance.sum(axis=0)[None, :])[0]
-    if not np.isfinite(whole):
+    summed = distance.sum(axis=0)[None, :]
+    whole = _lowest(shifts, summed)[0]
+    if _flat(summed)[0] or not shifts[0] < whole < shifts[-1]:
         return NO_INTERVAL
     block = max(1, round(_BLOCK_S / float(np.median(np.diff(time[usable])))))
     cumulative = np.vstack([np.zeros(len(shifts)), np.cumsum(distance, axis=0)])
@@ -94,8 +96,7 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     resampled = resampled[~_flat(resampled)]
     if len(resampled) < _RESAMPLES // 2:
         return Interval(float(whole), np.nan, np.nan)
-    found = _lowest(shifts, resampled)
-    lows = np.where(np.isfinite(found), found, shifts[np.argmin(resampled, axis=1)])
+    lows = _lowest(shifts, resampled)
     low, high = np.percentile(lows, [2.5, 97.5])
     return Interval(float(whole), float(low), float(high))
 
@@ -108,15 +109,20 @@ def _flat(cost: FloatArray) -> BoolArray:
 
 
 def _lowest(shifts: FloatArray, cost: FloatArray) -> FloatArray:
-    """Where each row of `cost` is lowest, by a parabola; NaN at the edges or where the cost is flat."""
-    at = np.argmin(cost, axis=1)
+    """Where each row of `cost` is lowest, refined by a parabola unless that is at an edge.
+
+    Where a stretch of shifts fits equally well but for round-off the first of them is taken.
+    """
+    scale = np.maximum(cost.max(axis=1), np.finfo(float).tiny)
+    at = np.argmax(cost <= (cost.min(axis=1) + _ROUND_OFF * scale)[:, None], axis=1)
     inside = np.clip(at, 1, len(shifts) - 2)
     row = np.arange(len(cost))
     before, here, after = cost[row, inside - 1], cost[row, inside], cost[row, inside + 1]
     bend = before - 2 * here + after
-    sharp = (at == inside) & (bend > 0) & ~_flat(cost)
+    sharp = (at == inside) & (bend > _ROUND_OFF * scale)
     step = np.divide(before - after, 2 * bend, out=np.zeros_like(bend), where=sharp)
-    return np.where(sharp, shifts[inside] + step * (shifts[1] - shifts[0]), np.nan)
+    lowest: FloatArray = shifts[at] + step * (shifts[1] - shifts[0])
+    return lowest
 
 
 def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
