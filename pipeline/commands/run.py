@@ -52,11 +52,13 @@ def results_of(
     """Each study brought up to date, one after the other; one that cannot be does not stop the others."""
     with executor_of(jobs) as executor:
         for folder in studies:
+            result: Result | PipelineError
             try:
                 with console.progress() as progress:
-                    yield folder, bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
+                    result = bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
             except PipelineError as error:
-                yield folder, error
+                result = error
+            yield folder, result
 
 
 def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:

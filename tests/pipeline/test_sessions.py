@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -370,3 +371,49 @@ def test_a_bad_study_does_not_stop_the_next(study: Path, folder: Folder, steadyh
     assert ran.code == 2
     assert f"{bad / 'study.yaml'}: names no data" in ran.err
     assert (steadyhand.out / "study" / "results.json").is_file()
+
+
+def test_a_stream_without_samples_sets_the_session_aside(study: Path, steadyhand: Steadyhand) -> None:
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    path = study / "data" / "P1_a.mcap"
+    content = path.read_bytes()
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        known: dict[int, int] = {}
+        for schema, channel, message in make_reader(BytesIO(content)).iter_messages():
+            if channel.id not in known:
+                assert schema is not None
+                copied = writer.register_schema(schema.name, schema.encoding, schema.data)
+                known[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, copied)
+            if channel.topic != "/tracker/position":
+                writer.add_message(known[channel.id], message.log_time, message.data, message.publish_time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    ran = steadyhand("compare", study)
+    assert ran.code == 1
+    assert 'session P1_a set aside: stream "tracker": topic /tracker/position holds no samples' in ran.err
+
+
+@pytest.mark.parametrize("lacking", ["imu", "orientation", "tracker"])
+def test_a_study_with_fewer_sensors(folder: Folder, steadyhand: Steadyhand, lacking: str) -> None:
+    """Without an IMU, without orientation, or without a tracker: what can be said is said."""
+    lines = [line for line in SETTINGS.splitlines() if lacking == "orientation" or f"  {lacking}:" not in line]
+    text = "\n".join(lines).replace("fusion: {type: fusion_kalman}", "fusion: {type: window_gp}")
+    if lacking == "tracker":
+        text = text.replace("  raw: {type: raw}\n  fusion: {type: window_gp}", "").replace(
+            "estimators:", "estimators: {}"
+        )
+    root = folder(text.replace("comparisons:", "# comparisons:"))
+
+    def forget(_: int, message: Message) -> Message:
+        assert message.values is not None
+        return replace(message, values=np.concatenate([message.values[:6], [np.nan] * 4]))
+
+    messages = moved(session_messages(), "/phone/imu", forget) if lacking == "orientation" else session_messages()
+    write_session(root / "data" / "P1_a.mcap", messages)
+    ran = steadyhand("report", root)
+    assert ran.code == 0, ran.err
+    rated = {row["estimator"] for row in steadyhand.results()["accuracy"]}
+    assert rated == (set() if lacking == "tracker" else {"raw", "fusion"})
