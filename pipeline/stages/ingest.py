@@ -21,6 +21,7 @@ MM_PER_M = 1000.0
 _NEEDED = ("position", "acceleration")  # without these a session has nothing to fuse
 _DAY_NS = 86_400e9
 _SAME_CLOCK_S = 3600.0
+_LATE_S = 0.5  # what an estimator remembers by default
 _CONTENT = {
     "acceleration": "acceleration",
     "position": "position",
@@ -120,6 +121,12 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
             f"topic {stream.topic}: stamps and arrivals are {abs(late_s):.0f} s apart, so they are not of one clock"
         )
     keep = finite & in_time
+    delay_s = (readings.arrival_ns - readings.stamp_ns)[keep] * tables.NANOSECONDS
+    delay_s = delay_s + (stream.latency_s if stream.stamp == "arrival" else 0.0)
+    if np.any(delay_s > _LATE_S):
+        notes.append(
+            f"{int((delay_s > _LATE_S).sum())} samples arrive over {_LATE_S:g} s late, and may come too late to fuse"
+        )
     if stream.kind == "acceleration" and keep.any():
         unknown = int(np.isnan(readings.values[keep, 6]).sum())
         if unknown == keep.sum():
