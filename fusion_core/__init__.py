@@ -4,14 +4,16 @@ NumPy, SciPy and Numba only: no files, sockets, clocks or DataFrames. The README
 """
 
 from fusion_core.estimator import Estimator, replay_loop
-from fusion_core.filters import Raw
+from fusion_core.filters import Holt, OneEuro, Raw
 from fusion_core.kalman import FusionKalman, PositionKalman
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import OPERATORS, Sensor
 from fusion_core.window_gp import WindowGP
 
-ESTIMATORS: dict[str, type[Raw | PositionKalman | WindowGP | FusionKalman]] = {
+ESTIMATORS: dict[str, type[Raw | OneEuro | Holt | PositionKalman | WindowGP | FusionKalman]] = {
     "raw": Raw,
+    "one_euro": OneEuro,
+    "holt": Holt,
     "position_kalman": PositionKalman,
     "window_gp": WindowGP,
     "fusion_kalman": FusionKalman,
@@ -24,6 +26,8 @@ __all__ = [
     "Estimator",
     "FloatArray",
     "FusionKalman",
+    "Holt",
+    "OneEuro",
     "PositionKalman",
     "Raw",
     "Sample",

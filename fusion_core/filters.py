@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusion_core.estimator import unknown
+from fusion_core.estimator import replay_loop, require_not_negative, require_positive, unknown
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 
@@ -47,3 +47,118 @@ class Raw:
         mean[known] = frames.value[newest[known]]
         sd[known] = tracker.noise_sd
         return Track(times, mean, sd)
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A filter's position (d,), its rate of change (d,), and the measurement time they are of, in s."""
+
+    time: float
+    position: FloatArray
+    rate: FloatArray
+
+
+@dataclass(frozen=True)
+class OneEuro:
+    """The 1 € filter (Casiez, Roussel and Vogel 2012): a low-pass whose cut-off rises with the hand's speed.
+
+    cut-off = `min_cutoff_hz` + `beta_per_mm` · speed, the speed itself low-passed at `rate_cutoff_hz`. The speed is
+    the vector's, not each axis's, so that the estimate does not depend on the frame's orientation. It states no
+    uncertainty of its own: the SD is the sensor's noise.
+    """
+
+    sensors: Mapping[str, Sensor]
+    min_cutoff_hz: float = 1.0
+    beta_per_mm: float = 0.01
+    rate_cutoff_hz: float = 1.0
+
+    def __post_init__(self) -> None:
+        position_sensor(self.sensors)
+        require_positive(min_cutoff_hz=self.min_cutoff_hz, rate_cutoff_hz=self.rate_cutoff_hz)
+        require_not_negative(beta_per_mm=self.beta_per_mm)
+
+    def start(self) -> Smoothed | None:
+        """No frame yet."""
+        return None
+
+    def update(self, state: Smoothed | None, sensor: str, sample: Sample) -> Smoothed | None:
+        """One step a frame; a frame older than the newest comes too late to be smoothed and changes nothing."""
+        if sensor != position_sensor(self.sensors):
+            return state
+        if state is None:
+            return Smoothed(sample.time, sample.value, np.zeros_like(sample.value))
+        step = sample.time - state.time
+        if step <= 0:
+            return state
+        rate = state.rate + _share(self.rate_cutoff_hz, step) * ((sample.value - state.position) / step - state.rate)
+        cutoff_hz = self.min_cutoff_hz + self.beta_per_mm * float(np.linalg.norm(rate))
+        position = state.position + _share(cutoff_hz, step) * (sample.value - state.position)
+        return Smoothed(sample.time, position, rate)
+
+    def predict(self, state: Smoothed | None, time: float) -> tuple[FloatArray, FloatArray]:
+        """The filtered frame, held."""
+        tracker = self.sensors[position_sensor(self.sensors)]
+        if state is None:
+            return unknown(tracker.dimension)
+        return state.position, np.full(tracker.dimension, tracker.noise_sd)
+
+    def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
+        """The plain loop."""
+        return replay_loop(self, samples, times)
+
+
+def _share(cutoff_hz: float, step_s: float) -> float:
+    """How much of a new reading a first-order low-pass takes on."""
+    return 1.0 / (1.0 + 1.0 / (2.0 * np.pi * cutoff_hz * step_s))
+
+
+@dataclass(frozen=True)
+class Holt:
+    """Double exponential smoothing (Holt 1957), the Kinect's own smoother, with prediction ahead.
+
+    Level and trend are those of the measurement time, over true time steps; the estimate goes on along the trend up to
+    `ahead_s`, so that `ahead_s` = the tracker's latency takes the lag out and brings its noise in. It states no
+    uncertainty of its own: the SD is the sensor's noise.
+    """
+
+    sensors: Mapping[str, Sensor]
+    level_weight: float = 0.5
+    trend_weight: float = 0.25
+    ahead_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        position_sensor(self.sensors)
+        require_not_negative(ahead_s=self.ahead_s)
+        for name, weight in (("level_weight", self.level_weight), ("trend_weight", self.trend_weight)):
+            if not 0 < weight <= 1:
+                raise ValueError(f"{name} must be above 0 and at most 1, got {weight}")
+
+    def start(self) -> Smoothed | None:
+        """No frame yet."""
+        return None
+
+    def update(self, state: Smoothed | None, sensor: str, sample: Sample) -> Smoothed | None:
+        """One step a frame; a frame older than the newest comes too late to be smoothed and changes nothing."""
+        if sensor != position_sensor(self.sensors):
+            return state
+        if state is None:
+            return Smoothed(sample.time, sample.value, np.zeros_like(sample.value))
+        step = sample.time - state.time
+        if step <= 0:
+            return state
+        expected = state.position + state.rate * step
+        level = expected + self.level_weight * (sample.value - expected)
+        rate = state.rate + self.trend_weight * ((level - state.position) / step - state.rate)
+        return Smoothed(sample.time, level, rate)
+
+    def predict(self, state: Smoothed | None, time: float) -> tuple[FloatArray, FloatArray]:
+        """The level, gone on along the trend to `time`, `ahead_s` at the most."""
+        tracker = self.sensors[position_sensor(self.sensors)]
+        if state is None:
+            return unknown(tracker.dimension)
+        ahead = float(np.clip(time - state.time, 0.0, self.ahead_s))
+        return state.position + ahead * state.rate, np.full(tracker.dimension, tracker.noise_sd)
+
+    def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
+        """The plain loop."""
+        return replay_loop(self, samples, times)
