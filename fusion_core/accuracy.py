@@ -143,8 +143,8 @@ def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArra
 def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: Samples) -> float:
     """How far in s the track is ahead of the tracker *as it arrived*, by the paper's Fig. 9, within ±0.5 s.
 
-    Both are brought to one regular grid at the track's median step; the tracker is interpolated between
-    arrivals. NaN where the peak sits at the edge of the range or there is no motion.
+    Both are brought to one regular grid at the track's median step; the tracker is held between arrivals, as it was
+    seen. NaN where the peak sits at the edge of the range or there is no motion.
     """
     found = lead_curve(time, estimate, tracker)
     if found is None:
@@ -166,9 +166,8 @@ def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tupl
     if end - begin < 2 * LAG_RANGE_S:
         return None
     grid = np.arange(begin, end, step)
-    axes = range(estimate.shape[1])
-    track = np.stack([np.interp(grid, time, estimate[:, axis]) for axis in axes], axis=1)
-    arrived = np.stack([np.interp(grid, tracker.arrival, tracker.value[:, axis]) for axis in axes], axis=1)
+    track = estimate[np.searchsorted(time, grid + step * 1e-3, side="right") - 1]
+    arrived = tracker.value[np.searchsorted(tracker.arrival, grid + step * 1e-3, side="right") - 1]
     shifts, correlation = cross_correlation(track, arrived)
     return np.asarray(shifts * step, dtype=np.float64), correlation
 

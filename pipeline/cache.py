@@ -122,12 +122,13 @@ class Cache:
         return self.root / stage / key[:2] / key
 
     def get(self, stage: str, key: str) -> Entry | None:
-        """The entry, or None if there is none or a file of it is missing or has another size."""
+        """The entry, or None if there is none or a file of it is missing or not what was written."""
         folder = self._folder(stage, key)
         try:
             manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
             for name, stated in manifest["files"].items():
-                if (folder / name).stat().st_size != stated["size"]:
+                path = folder / name
+                if path.stat().st_size != stated["size"] or file_digest(path) != stated["sha256"]:
                     return None
         except (OSError, ValueError, KeyError, TypeError):
             return None

@@ -26,7 +26,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _GREY = "#6b757d"
 _WIDTH = 7.2  # inches: a page's text
-_MARKS_MAX = 2000  # beyond it marks are drawn as an image, or a file grows to megabytes
+_NAME_LENGTH = 32
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -45,6 +45,12 @@ _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "steadyhand",
     "savefig.dpi": 200,
 }
+
+
+def _name(text: str) -> str:
+    """A name as a figure can show it: with glyphs for all of it, and no longer than leaves room for the data."""
+    shown = showable(text)
+    return shown if len(shown) <= _NAME_LENGTH else f"{shown[: _NAME_LENGTH - 1]}…"
 
 
 def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:
@@ -88,9 +94,9 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
         if len(column):
             values.scatter(np.full(len(column), index), column, s=16, color=COLOURS[index % 7], alpha=0.55, zorder=2)
             _interval(values, index, column, COLOURS[index % 7], MARKERS[index % 7])
-    values.set_xticks(at, [showable(condition) for condition in conditions])
+    values.set_xticks(at, [_name(condition) for condition in conditions])
     values.set_xlim(-0.5, len(conditions) - 0.5)
-    values.set_ylabel(showable(measure_label(measure)))
+    values.set_ylabel(_name(measure_label(measure)))
     values.set_title(f"Participants (n = {len(complete)}), mean and 95 % interval")
     if not np.nanmin(wide.to_numpy(np.float64)) < 0:
         values.set_ylim(bottom=0)
@@ -130,10 +136,10 @@ def _differences(axes: Axes, complete: pd.DataFrame, measure: str) -> None:
     axes.axhline(0, color=_GREY, linewidth=0.8)
     axes.scatter(spread, np.sort(difference), s=16, color=COLOURS[2], alpha=0.6)
     _interval(axes, 0.08, difference, COLOURS[2], "D")
-    axes.set_xticks([0], [showable(f"{first} {MINUS} {second}")])
+    axes.set_xticks([0], [_name(f"{first} {MINUS} {second}")])
     axes.set_xlim(-0.5, 0.7)
     unit = unit_of(measure)
-    axes.set_ylabel(showable(f"Difference ({unit})") if unit else "Difference")
+    axes.set_ylabel(_name(f"Difference ({unit})") if unit else "Difference")
     axes.set_title("Differences")
     _grouped(axes)
 
@@ -162,8 +168,8 @@ def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
         for centre, values in zip(centres, ratings, strict=True):
             spread = np.linspace(-0.22, 0.22, len(values)) * width
             axes.scatter(centre + spread, np.sort(values), s=9, color=colour, marker=MARKERS[index % 7], alpha=0.8)
-        axes.plot([], [], color=colour, marker=MARKERS[index % 7], linewidth=5, alpha=0.6, label=showable(condition))
-    axes.set_xticks(np.arange(len(wide)), [showable(short_label(measure)) for measure in wide])
+        axes.plot([], [], color=colour, marker=MARKERS[index % 7], linewidth=5, alpha=0.6, label=_name(condition))
+    axes.set_xticks(np.arange(len(wide)), [_name(short_label(measure)) for measure in wide])
     axes.set_ylabel("Rating")
     axes.legend(loc="upper left", bbox_to_anchor=(0, 1.12), ncols=min(len(conditions), 6))
     return figure
@@ -231,7 +237,7 @@ def _estimate(axes: Axes, view: View, name: str, colour: str) -> None:
     if view.reference is not None:
         axes.plot(*view.reference, color=COLOURS[6], linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
     axes.scatter(*view.frames, s=5, color=_GREY, label="tracker, as it arrives", zorder=3)
-    axes.set_title(showable(name))
+    axes.set_title(_name(name))
     axes.set_ylabel(f"{view.axis} (mm)")
 
 
@@ -243,7 +249,7 @@ def _error(axes: Axes, view: View, name: str, colour: str) -> None:
     axes.fill_between(time, -2 * sd, 2 * sd, color=colour, alpha=0.2, linewidth=0)
     axes.axhline(0, color=COLOURS[6], linewidth=0.8)
     axes.plot(time, error, color=colour)
-    axes.set_title(f"{showable(name)}: error")
+    axes.set_title(f"{_name(name)}: error")
     axes.set_ylabel("error (mm)")
 
 
@@ -254,7 +260,7 @@ def lead(curves: Mapping[str, tuple[FloatArray, FloatArray]], peaks: Mapping[str
         inside = np.abs(shift) <= 0.5
         scaled = correlation[inside] / np.max(np.abs(correlation[inside]))
         colour = COLOURS[index % 7]
-        axes.plot(1000 * shift[inside], scaled, color=colour, label=showable(name))
+        axes.plot(1000 * shift[inside], scaled, color=colour, label=_name(name))
         peak = peaks.get(name)
         if peak is not None and np.isfinite(peak):
             height = float(np.interp(peak, shift[inside], scaled))
@@ -285,7 +291,7 @@ def errors(accuracy: pd.DataFrame) -> Figure:
             panel.scatter(known, np.full(len(known), index), s=16, color=colour, alpha=0.5)
             if len(known):
                 panel.plot([known.mean()], [index], marker, color=colour, markersize=9, markeredgecolor="white")
-    axes[0].set_yticks(range(len(names)), [showable(name) for name in names])
+    axes[0].set_yticks(range(len(names)), [_name(name) for name in names])
     axes[0].invert_yaxis()
     if accuracy["rmse_mm"].max() > 15 * accuracy["rmse_mm"].min():
         axes[0].set_xscale("log")
@@ -314,7 +320,7 @@ def noise(residuals: Sequence[FloatArray], units: Sequence[str], names: Sequence
         grid = np.linspace(-reach, reach, 200)
         panel.plot(grid, stats.norm.pdf(grid, scale=sd), color=COLOURS[index % 7], linewidth=2)
         panel.set_xlabel(f"Reading {MINUS} slow drift ({unit})")
-        panel.set_title(f"{showable(name)}: SD {sd:.3g} {unit}")
+        panel.set_title(f"{_name(name)}: SD {sd:.3g} {unit}")
         panel.set_yticks([])
         panel.spines["left"].set_visible(False)
     return figure

@@ -22,6 +22,7 @@ LISTS = (
     "exclusions",
     "sensor_noise",
     "shown_at_selection",
+    "accuracy_means",
     "printed",
 )
 

@@ -91,8 +91,9 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     """
     began = time.monotonic()
     study = load_study(folder)
-    sessions, unused = find_sessions(folder, study)
-    result = Result(folder.resolve(), study, unused=unused)
+    found = find_sessions(folder, study)
+    sessions = found.sessions
+    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
     result.inputs = _input_digests(result.folder, study, sessions)
     for stage in stages:
         try:

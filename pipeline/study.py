@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import unicodedata
 from collections.abc import Mapping
@@ -286,6 +287,12 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise PipelineError(f"{path}{line}: not valid YAML: {error.problem}") from None
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise PipelineError(f"{path}: not valid YAML: {error}") from None
+    try:
+        json.dumps(content, ensure_ascii=False, default=str).encode("utf-8")
+    except UnicodeEncodeError:
+        raise PipelineError(
+            f"{path}: holds half of a surrogate pair (\\ud800 and the like); write the character"
+        ) from None
     if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
         raise PipelineError(f"{path}: holds no settings; it needs lines like `title: My study`")
     return content
@@ -376,13 +383,22 @@ def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path
     return path
 
 
-def find_sessions(folder: Path, study: Study) -> tuple[list[Session], list[tuple[str, str]]]:
-    """The logs that match the study's pattern, sorted by id, and the files beside them that do not, with the reason.
+@dataclass(frozen=True)
+class Found:
+    """A study's logs by id; what has a log's name and cannot be read; what lies beside them and has not."""
+
+    sessions: list[Session]
+    set_aside: list[tuple[Session, str]]
+    unused: list[tuple[str, str]]
+
+
+def find_sessions(folder: Path, study: Study) -> Found:
+    """The logs that match the study's pattern, sorted by id, and what is there beside them, with the reason.
 
     Two equal ids, or a link that leads out of the folder, are a PipelineError.
     """
     if study.sessions is None:
-        return [], []
+        return Found([], [], [])
     root = folder.resolve()
     pieces = _PLACEHOLDER.split(Path(study.sessions).as_posix())
     pattern = "".join(
@@ -390,13 +406,18 @@ def find_sessions(folder: Path, study: Study) -> tuple[list[Session], list[tuple
     )
     fixed = Path(pieces[0]).parent if not pieces[0].endswith("/") else Path(pieces[0])
     sessions: dict[str, Session] = {}
+    set_aside: list[tuple[Session, str]] = []
     unused: list[tuple[str, str]] = []
     for path in sorted((root / fixed).rglob("*")):
         relative = unicodedata.normalize("NFC", path.relative_to(root).as_posix())
         match = re.fullmatch(pattern, relative)
         reason = _cannot_be_a_log(path, relative, match is not None, Path(study.sessions).suffix)
         if reason is not None:
-            unused.append((relative.encode("utf-8", "backslashreplace").decode(), reason))
+            name = relative.encode("utf-8", "backslashreplace").decode()
+            if match is None:
+                unused.append((name, reason))
+            else:
+                set_aside.append((Session(name, None, None, path), reason))
         if match is None or reason is not None:
             continue
         inside(folder, path.relative_to(root).as_posix(), f"{folder / SETTINGS_FILE}: sessions")
@@ -409,7 +430,7 @@ def find_sessions(folder: Path, study: Study) -> tuple[list[Session], list[tuple
                 f"\"{session.id}\"; a session's id is its file's name, rename one"
             )
         sessions[session.id] = session
-    return [sessions[key] for key in sorted(sessions)], unused
+    return Found([sessions[key] for key in sorted(sessions)], set_aside, unused)
 
 
 def _cannot_be_a_log(path: Path, relative: str, matches: bool, suffix: str) -> str | None:

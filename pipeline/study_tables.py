@@ -85,8 +85,10 @@ def _required_text(path: Path, table: pd.DataFrame, columns: Iterable[str]) -> N
 def _number(text: str) -> float:
     """A number as people write them: no underscores, nor figures beyond what squares and sums can hold."""
     value = float(text)
-    if "_" in text or _TINY > abs(value) > 0 or (np.isfinite(value) and abs(value) > _HUGE):
-        raise ValueError(text)
+    if "_" in text:
+        raise ValueError
+    if _TINY > abs(value) > 0 or (np.isfinite(value) and abs(value) > _HUGE):
+        raise ValueError(f" between {_TINY:g} and {_HUGE:g}")
     return value
 
 
@@ -96,8 +98,9 @@ def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
     for line, text in table[column].items():
         try:
             values.append(np.nan if text in MISSING else _number(text))
-        except ValueError:
-            faults.append(f'row {line}: "{column}" should be a number, found "{text}"')
+        except ValueError as error:
+            span = str(error) if str(error).startswith(" between") else ""
+            faults.append(f'row {line}: "{column}" should be a number{span}, found "{text}"')
     if faults:
         more = f"; and {len(faults) - _SHOWN_FAULTS} more" if len(faults) > _SHOWN_FAULTS else ""
         hint = " (a decimal comma? use a point)" if any('"' in f and "," in f.split("found")[1] for f in faults) else ""
@@ -168,7 +171,7 @@ def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, 
     """A row a value, NaN where missing, and the names of the further within-factors, each a column of text."""
     table = _read(path, MEASURE_REQUIRED, None)
     factors = [str(name) for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]
-    _required_text(path, table, [*MEASURE_REQUIRED[:3], *factors])
+    _required_text(path, table, MEASURE_REQUIRED[:3])
     _check_conditions(path, table, conditions)
     table["value"] = _numbers(path, table, "value")
     keys = [*MEASURE_REQUIRED[:3], *factors, *(name for name in ("trial", "period") if name in table)]

@@ -125,6 +125,16 @@ TABLES: Mapping[str, pa.Schema] = {
         ("lead_xcorr_s", _FLOAT),
         ("jitter_mm", _FLOAT),
     ),
+    "accuracy_means": _schema(
+        ("estimator", _TEXT),
+        ("n", _COUNT),
+        ("rmse_mm", _FLOAT),
+        ("sd_mm", _FLOAT),
+        ("coverage_95", _FLOAT),
+        ("lag_s", _FLOAT),
+        ("lead_xcorr_s", _FLOAT),
+        ("jitter_mm", _FLOAT),
+    ),
     "replay_agreement": _schema(
         ("session", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("max_mm", _FLOAT), ("rms_mm", _FLOAT)
     ),

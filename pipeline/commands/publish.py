@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from pipeline.cache import versions
 from pipeline.errors import PipelineError
 from pipeline.provenance import LIBRARIES
 from pipeline.runner import Result
+from pipeline.study import SETTINGS_FILE
 
 _PROVENANCE = "provenance.json"
 
@@ -23,7 +24,8 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     files.pop("entry.json")
     files["results.json"] = result.entry("compare") / "results.json"
-    _refuse_inputs(result, folder)
+    refuse_study(folder)
+    _refuse_inputs(result, folder, files)
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
     for name, source in files.items():
@@ -41,16 +43,24 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     (folder / _PROVENANCE).write_text(text, encoding="utf-8")
 
 
-def _refuse_inputs(result: Result, folder: Path) -> None:
-    """A report never lies over the study it is of: the study's own files are not changed."""
-    for name in result.inputs:
-        if (result.folder / name).resolve().is_relative_to(folder.resolve()):
-            raise PipelineError(f"--out {folder}: holds the study's own {name}; name a folder for the report alone")
+def refuse_study(folder: Path) -> None:
+    """A report never goes into a study's own folder."""
+    if (folder / SETTINGS_FILE).exists():
+        raise PipelineError(f"--out {folder}: is a study, and its files are not changed; name a folder for the report")
+
+
+def _refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
+    """Nor over the files it was made from."""
+    inputs = {(result.folder / name).resolve() for name in result.inputs}
+    for name in files:
+        if (folder / name).resolve() in inputs:
+            raise PipelineError(f"--out {folder}: {name} there is the study's own; name a folder for the report alone")
 
 
 def publish_results(result: Result, folder: Path) -> None:
     """results.json alone."""
-    _refuse_inputs(result, folder)
+    refuse_study(folder)
+    _refuse_inputs(result, folder, ["results.json"])
     _copy(result.entry("compare") / "results.json", folder / "results.json")
 
 

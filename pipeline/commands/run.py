@@ -12,7 +12,7 @@ from pathlib import Path
 from pipeline import results
 from pipeline.cache import Cache
 from pipeline.commands import console
-from pipeline.commands.publish import publish, publish_results
+from pipeline.commands.publish import publish, publish_results, refuse_study
 from pipeline.commands.summary import summary
 from pipeline.errors import PipelineError
 from pipeline.runner import InThisProcess, Means, Result, bring_up_to_date
@@ -86,6 +86,8 @@ def _run(
     studies: Sequence[Path], stages: Sequence[Stage], out: Path | None, jobs: int | None, cache: Path | None
 ) -> None:
     folders = dict(zip(studies, _out_folders(studies, out), strict=True))
+    for folder in folders.values():
+        refuse_study(folder)
     code = 0
     for study, result in results_of(studies, stages, jobs, cache):
         if isinstance(result, PipelineError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pipeline.wording import comparison_sentence, measure_label, number
+from pipeline.wording import comparison_sentence, counted, measure_label, number
 
 Row = Mapping[str, Any]
 
@@ -21,12 +21,8 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
         yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
     if len(rows) < len(results["comparisons"]):
         yield f"  {len(results['comparisons']) - len(rows)} pairwise comparisons: see the report"
-    errors: dict[str, list[float]] = {}
-    for row in results["accuracy"]:
-        errors.setdefault(row["estimator"], []).append(row["rmse_mm"])
-    for estimator, values in errors.items():
-        mean = sum(values) / len(values)
-        yield f"  {estimator}: RMSE {number(mean)} mm (mean of {len(values)} sessions)"
+    for row in results["accuracy_means"]:
+        yield f"  {row['estimator']}: RMSE {number(row['rmse_mm'])} mm (mean of {counted(row['n'], 'session')})"
     differing = [row for row in results["printed"] if row["verdict"] in ("differs", "contradiction")]
     agreeing = sum(row["verdict"] == "agrees" for row in results["printed"])
     if results["printed"]:

@@ -49,18 +49,6 @@ def _method(material: Material) -> tuple[str | Strong, ...]:
     )
 
 
-def _by_estimator(rows: list[Row]) -> dict[str, list[Row]]:
-    grouped: dict[str, list[Row]] = {}
-    for row in rows:
-        grouped.setdefault(row["estimator"], []).append(row)
-    return grouped
-
-
-def _mean(rows: list[Row], column: str) -> float | None:
-    values = [row[column] for row in rows if row[column] is not None]
-    return sum(values) / len(values) if values else None
-
-
 def _summary_table(material: Material, rows: list[Row]) -> Table:
     titles = (
         "Estimator",
@@ -73,15 +61,15 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
     )
     cells = tuple(
         (
-            name,
-            number(_mean(found, "rmse_mm"), 2),
-            number(_mean(found, "sd_mm"), 2),
-            percent(_mean(found, "coverage_95"), 0),
-            seconds(_mean(found, "lag_s")),
-            seconds(_mean(found, "lead_xcorr_s")),
-            number(_mean(found, "jitter_mm"), 2),
+            row["estimator"],
+            number(row["rmse_mm"], 2),
+            number(row["sd_mm"], 2),
+            percent(row["coverage_95"], 0),
+            seconds(row["lag_s"]),
+            seconds(row["lead_xcorr_s"]),
+            number(row["jitter_mm"], 2),
         )
-        for name, found in _by_estimator(rows).items()
+        for row in material.rows("accuracy_means")
     )
     n, axes = len({row["session"] for row in rows}), len(material.study.axes)
     where = f"{axes} axes together" if axes > 1 else f"along {material.study.axes[0]}"

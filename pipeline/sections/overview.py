@@ -78,11 +78,8 @@ def _key_figure(row: Row) -> KeyFigure:
 
 def _means(material: Material) -> dict[str, tuple[float, int]]:
     """Mean RMSE over sessions and their number, by estimator, best first."""
-    errors: dict[str, list[float]] = {}
-    for row in material.rows("accuracy"):
-        errors.setdefault(row["estimator"], []).append(row["rmse_mm"])
-    means = {name: (sum(values) / len(values), len(values)) for name, values in errors.items()}
-    return dict(sorted(means.items(), key=lambda item: item[1][0]))
+    ranked = sorted(material.rows("accuracy_means"), key=lambda row: row["rmse_mm"])
+    return {row["estimator"]: (row["rmse_mm"], row["n"]) for row in ranked}
 
 
 def _accuracy_keys(material: Material) -> list[KeyFigure]:

@@ -13,6 +13,7 @@ from pipeline import recording, tables
 from pipeline.recording import Recording
 from pipeline.stage import Outcome, Work
 from pipeline.study import Study
+from pipeline.trials import selections_by_trial
 
 _SETTLED_S = 1.0  # after the first frame's arrival: the grid of accuracy begins there
 Row = dict[str, Any]
@@ -126,13 +127,10 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
 
 def _trials(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
-    starts = events[events["type"] == "trial_start"]
-    selections = events[events["type"] == "selection"]
+    starts, selections = selections_by_trial(events)
     start: Any
-    for index, (start, following) in enumerate(zip(starts.itertuples(), starts["time_ns"].shift(-1), strict=True)):
-        after = selections[selections["time_ns"] >= start.time_ns]
-        if not pd.isna(following):
-            after = after[after["time_ns"] < following]
+    for index, start in enumerate(starts.itertuples()):
+        after = selections[selections["start"] == index]
         trial = {
             "participant": work.session.participant,
             "condition": work.session.condition,

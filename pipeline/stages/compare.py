@@ -55,6 +55,8 @@ def run(work: Work) -> Outcome:
     for name in _SESSION_TABLES:
         entries = work.entries["ingest" if name == "quality" else "assess"]
         found[name] = _without_excluded(study, work, tables.read(name, entries))
+    found["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(found["accuracy"]))
+    found["exclusions"] = pd.concat([found["exclusions"], tables.frame("exclusions", _samples_left_out(work))])
     found["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, found["trials"]))
     if study.printed is not None:
         found["printed"] = compare_printed(
@@ -86,6 +88,18 @@ def _without_accuracy(work: Work) -> list[Row]:
         for session in work.sessions
         if session.id in there - rated
     ]
+
+
+def _samples_left_out(work: Work) -> list[Row]:
+    """Readings of the logs that could not be used, by session and stream, as `quality` notes them."""
+    quality = tables.read("quality", work.entries["ingest"])
+    sessions = {session.id: session for session in work.sessions}
+    rows: list[Row] = []
+    for row in quality[quality["note"].str.contains("left out").fillna(False).astype(bool)].itertuples():
+        session = sessions[str(row.session)]
+        who = {"participant": session.participant, "condition": session.condition, "session": session.id}
+        rows.append({**who, "what": "samples left out", "reason": f"{row.stream}: {row.note}"})
+    return rows
 
 
 def _people(work: Work, measures: pd.DataFrame) -> Row:
@@ -168,6 +182,15 @@ def _root_rows(rows: Iterable[Row]) -> list[Row]:
         }
         for row in rows
         if row["measure"] in names and row["mean"] >= 0
+    ]
+
+
+def accuracy_means(accuracy: pd.DataFrame) -> list[Row]:
+    """Each estimator's accuracy, means over sessions, as far as a session has the figure."""
+    columns = [name for name in tables.TABLES["accuracy_means"].names if name not in ("estimator", "n")]
+    return [
+        {"estimator": str(estimator), "n": len(rows), **{column: float(rows[column].mean()) for column in columns}}
+        for estimator, rows in accuracy.groupby("estimator", sort=False)
     ]
 
 

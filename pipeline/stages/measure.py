@@ -13,6 +13,7 @@ from pipeline import study_tables, tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.stage import Outcome, Work
 from pipeline.study import Exclusion, Study
+from pipeline.trials import selections_by_trial
 
 Row = dict[str, Any]
 CELL = ["participant", "condition"]
@@ -122,10 +123,9 @@ def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
         who: Row = {"participant": session.participant, "condition": session.condition, "session": session.id}
         times = {kind: found["time_ns"] for kind, found in happened.groupby("type")}
         selections = times.get("selection", pd.Series(dtype="int64"))
-        starts = times.get("trial_start", pd.Series(dtype="int64"))
-        early = int((selections < starts.min()).sum()) if len(starts) else len(selections)
-        if early:
-            reason = f"{early} before the session's first trial_start"
+        stray = int((selections_by_trial(happened)[1]["start"] < 0).sum())
+        if stray:
+            reason = f"{stray} without the trial_start of their trial"
             exclusions.append({**who, "what": "selections outside any trial", "reason": reason})
         if "session_start" in times and len(selections):
             seconds = float(selections.max() - times["session_start"].min()) * tables.NANOSECONDS
@@ -153,8 +153,8 @@ def _tabled_values(work: Work) -> Iterator[pd.DataFrame]:
             measure=table["measure"]
         )
         if factors:
-            told = [json.dumps(dict(zip(factors, row, strict=True))) for row in table[factors].to_numpy()]
-            rows["factors"] = told
+            told = [{k: v for k, v in zip(factors, row, strict=True) if v} for row in table[factors].to_numpy()]
+            rows["factors"] = [json.dumps(facts) if facts else None for facts in told]
         yield rows
 
 
@@ -263,7 +263,7 @@ def _totals(cells: pd.DataFrame) -> pd.DataFrame:
         if "total" in scales:
             continue
         for (participant, condition, factors), cell in answered.groupby([*CELL, "factors"], dropna=False, sort=False):
-            if set(cell["scale"]) == scales and len(scales) > 1:
+            if set(cell["scale"]) == scales:
                 rows.append((participant, condition, factors, f"{questionnaire}/total", cell["value"].sum()))
     return pd.DataFrame(rows, columns=[*CELL, "factors", "measure", "value"])
 

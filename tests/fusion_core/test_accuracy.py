@@ -54,11 +54,20 @@ def test_lag_of_a_hand_that_never_moves_is_not_claimed() -> None:
 
 @pytest.mark.parametrize("ahead_s", [0.11, -0.05])
 def test_lead_by_cross_correlation_is_positive_ahead_of_the_tracker(ahead_s: float) -> None:
+    """The tracker is held between frames, so it is half a frame later than its newest one on average."""
     time = np.arange(0, 40, 1 / 90)
     frames = np.arange(0, 40, 1 / 30)
     tracker = Samples(frames - 0.1, frames, moving(frames - 0.1))
     estimate = moving(time - 0.1 + ahead_s)
-    assert accuracy.lead_by_cross_correlation(time, estimate, tracker) == pytest.approx(ahead_s, abs=0.012)
+    lead = accuracy.lead_by_cross_correlation(time, estimate, tracker)
+    assert lead == pytest.approx(ahead_s + 1 / 60, abs=0.012)
+
+
+def test_the_tracker_held_leads_itself_by_nothing() -> None:
+    time, frames = np.arange(0, 40, 1 / 90), np.arange(0, 40, 1 / 30)
+    tracker = Samples(frames - 0.1, frames, moving(frames - 0.1))
+    held = tracker.value[np.searchsorted(frames, time + 1e-9, side="right") - 1]
+    assert accuracy.lead_by_cross_correlation(time, held, tracker) == 0.0
 
 
 def test_unbiased_cross_correlation_by_its_definition() -> None:

@@ -67,7 +67,7 @@ def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, stea
     trials = (steadyhand.out / "tables" / "trials.csv").read_text().splitlines()
     row = next(line.split(",") for line in trials if line.startswith("P1,a,P1_a,1,fusion,"))
     loaded_study = load_study(study)
-    session = next(s for s in find_sessions(study, loaded_study)[0] if s.id == "P1_a")
+    session = next(s for s in find_sessions(study, loaded_study).sessions if s.id == "P1_a")
     out = study.parent / "ingested"
     out.mkdir()
     ingest.run(Work("t", loaded_study, study, out, (session,)))
@@ -87,7 +87,7 @@ def test_replay_agreement_is_zero_where_the_log_shows_what_it_says(folder: Folde
     study = load_study(root)
     out = root / "ingested"
     out.mkdir()
-    ingest.run(Work("t", study, root, out, tuple(find_sessions(root, study)[0])))
+    ingest.run(Work("t", study, root, out, tuple(find_sessions(root, study).sessions)))
     loaded = recording.load(study, out)
     track = recording.build_estimator(study, "fusion").replay(loaded.samples, loaded.times)
     for time, mean in zip(track.time, track.mean, strict=True):
@@ -274,13 +274,13 @@ def test_files_beside_the_sessions_are_not_passed_over_in_silence(study: Path, s
     (data / "P7_a.mcap").symlink_to(data / "nowhere")
     (data / "linked").symlink_to(study.parent, target_is_directory=True)
     (data / "notes.txt").touch()
-    assert steadyhand("compare", study).code == 0
+    assert steadyhand("compare", study).code == 1
     assert listed(steadyhand, "file not used") == [
         ("data/P5-a.mcap", "its name does not fit the pattern of study.yaml"),
         ("data/P6_a.MCAP", "its name does not fit the pattern of study.yaml"),
-        ("data/P7_a.mcap", "it is not a file that can be read"),
         ("data/linked", "a link to a folder is not followed"),
     ]
+    assert listed(steadyhand, "session set aside") == [("data/P7_a.mcap", "it is not a file that can be read")]
 
 
 def test_a_condition_that_the_pattern_cannot_match_is_an_error(study: Path, steadyhand: Steadyhand) -> None:
@@ -298,7 +298,21 @@ def test_selections_outside_any_trial_are_counted(study: Path, steadyhand: Stead
 
     write_session(study / "data" / "P1_a.mcap", moved(session_messages(), "/events", drop))
     assert steadyhand("compare", study).code == 0
-    assert listed(steadyhand, "selections outside any trial") == [("P1_a", "1 before the session's first trial_start")]
+    assert listed(steadyhand, "selections outside any trial") == [("P1_a", "1 without the trial_start of their trial")]
+
+
+def test_a_selection_is_not_credited_to_another_trial(study: Path, steadyhand: Steadyhand) -> None:
+    """Selection 1 and the start of trial 2 are lost: selection 2 must not be measured against target 1."""
+
+    def drop(_: int, message: Message) -> Message | None:
+        event = message.event or {}
+        gone = (event.get("type"), event.get("trial")) in (("selection", 1), ("trial_start", 2))
+        return None if gone else message
+
+    write_session(study / "data" / "P1_a.mcap", moved(session_messages(), "/events", drop))
+    assert steadyhand("compare", study).code == 0
+    assert listed(steadyhand, "selections outside any trial") == [("P1_a", "2 without the trial_start of their trial")]
+    assert listed(steadyhand, "trials without a measurable selection") == [("P1_a", "1 of the cell's trials: 1")]
 
 
 def test_repeated_events_count_once(study: Path, steadyhand: Steadyhand) -> None:
@@ -361,7 +375,7 @@ def test_the_study_is_never_written_over(study: Path, steadyhand: Steadyhand) ->
     before = {path: path.read_bytes() for path in study.rglob("*") if path.is_file()}
     ran = steadyhand("report", study, "--out", str(study))
     assert ran.code == 2
-    assert "holds the study's own" in ran.err
+    assert "is a study, and its files are not changed" in ran.err
     assert {path: path.read_bytes() for path in before} == before
 
 

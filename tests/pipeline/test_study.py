@@ -120,8 +120,9 @@ def test_sessions_are_found_by_pattern_and_ids_compared_after_nfc(folder: Folder
     for name in (unicodedata.normalize("NFD", "P1_café"), "P2_other", "notes", "P_1_2"):
         (root / "data" / f"{name}.mcap").touch()
     study = load_study(root)
-    sessions, unused = find_sessions(root, study)
-    assert [name for name, _ in unused] == ["data/P_1_2.mcap", "data/notes.mcap"]
+    found = find_sessions(root, study)
+    sessions = found.sessions
+    assert [name for name, _ in found.unused] == ["data/P_1_2.mcap", "data/notes.mcap"]
     assert [(session.id, session.condition) for session in sessions] == [
         ("P1_café", "café"),
         ("P2_other", "other"),

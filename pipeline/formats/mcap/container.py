@@ -31,6 +31,7 @@ BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError)
 
 _INFLATED_LIMIT = 64 * 2**20  # bytes a log may always inflate to; beyond it, so many times its own size
 _INFLATION_LIMIT = 64
+_CHUNK_LIMIT = 128 * 2**20
 _RECORD_HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _MESSAGES_LIMIT = 500_000  # a log may always hold; beyond it, one for so many bytes of its size
@@ -266,6 +267,8 @@ def _inflate(walk: Walk, chunk: Chunk) -> bytes:
         raise SessionError(
             f"refused: it would inflate to more than {walk.inflated_limit // 2**20} MiB, which no session's log does"
         )
+    if stated > _CHUNK_LIMIT:
+        raise SessionError(f"refused: a chunk that inflates to {stated // 2**20} MiB, which no recorder writes")
     if chunk.compression == "":
         data = bytes(chunk.data)
     elif chunk.compression == "zstd":

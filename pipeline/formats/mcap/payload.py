@@ -140,7 +140,7 @@ def _event(factory: DecoderFactory, channel: Channel, schema: Schema | None, pay
         raise ValueError("its trial is not a whole number")
     for key in ("target_x", "target_y", "target_z", "x", "y", "z"):
         if event.get(key) is not None:
-            event[key] = float(event[key])
+            (event[key],) = _plausible([float(event[key])], "position")
     return None, [], event
 
 
