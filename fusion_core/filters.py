@@ -59,41 +59,33 @@ class Smoothed:
 
 
 @dataclass(frozen=True)
-class OneEuro:
-    """The 1 € filter (Casiez, Roussel and Vogel 2012): a low-pass whose cut-off rises with the hand's speed.
+class Smoother:
+    """What filters of single frames share: one step a frame, and no uncertainty of their own (the sensor's noise).
 
-    cut-off = `min_cutoff_hz` + `beta_per_mm` · speed, the speed itself low-passed at `rate_cutoff_hz`. The speed is
-    the vector's, not each axis's, so that the estimate does not depend on the frame's orientation. It states no
-    uncertainty of its own: the SD is the sensor's noise.
+    A frame older than the newest comes too late to be smoothed and changes nothing.
     """
 
     sensors: Mapping[str, Sensor]
-    min_cutoff_hz: float = 1.0
-    beta_per_mm: float = 0.01
-    rate_cutoff_hz: float = 1.0
 
     def __post_init__(self) -> None:
         position_sensor(self.sensors)
-        require_positive(min_cutoff_hz=self.min_cutoff_hz, rate_cutoff_hz=self.rate_cutoff_hz)
-        require_not_negative(beta_per_mm=self.beta_per_mm)
+
+    def smoothed(self, state: Smoothed, value: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+        """Position and rate after one more frame, a step later."""
+        raise NotImplementedError
 
     def start(self) -> Smoothed | None:
         """No frame yet."""
         return None
 
     def update(self, state: Smoothed | None, sensor: str, sample: Sample) -> Smoothed | None:
-        """One step a frame; a frame older than the newest comes too late to be smoothed and changes nothing."""
+        """One step a frame; other sensors change nothing."""
         if sensor != position_sensor(self.sensors):
             return state
         if state is None:
             return Smoothed(sample.time, sample.value, np.zeros_like(sample.value))
-        step = sample.time - state.time
-        if step <= 0:
-            return state
-        rate = state.rate + _share(self.rate_cutoff_hz, step) * ((sample.value - state.position) / step - state.rate)
-        cutoff_hz = self.min_cutoff_hz + self.beta_per_mm * float(np.linalg.norm(rate))
-        position = state.position + _share(cutoff_hz, step) * (sample.value - state.position)
-        return Smoothed(sample.time, position, rate)
+        step_s = sample.time - state.time
+        return state if step_s <= 0 else Smoothed(sample.time, *self.smoothed(state, sample.value, step_s))
 
     def predict(self, state: Smoothed | None, time: float) -> tuple[FloatArray, FloatArray]:
         """The filtered frame, held."""
@@ -107,58 +99,63 @@ class OneEuro:
         return replay_loop(self, samples, times)
 
 
+@dataclass(frozen=True)
+class OneEuro(Smoother):
+    """The 1 € filter (Casiez, Roussel and Vogel 2012): a low-pass whose cut-off rises with the hand's speed.
+
+    cut-off = `min_cutoff_hz` + `beta_per_mm` · speed, the speed itself low-passed at `rate_cutoff_hz`. The speed is
+    the vector's, not each axis's, so that the estimate does not depend on the frame's orientation.
+    """
+
+    min_cutoff_hz: float = 1.0
+    beta_per_mm: float = 0.01
+    rate_cutoff_hz: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_positive(min_cutoff_hz=self.min_cutoff_hz, rate_cutoff_hz=self.rate_cutoff_hz)
+        require_not_negative(beta_per_mm=self.beta_per_mm)
+
+    def smoothed(self, state: Smoothed, value: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+        """First the rate, then the position at the cut-off that goes with it."""
+        rate = state.rate + _share(self.rate_cutoff_hz, step_s) * ((value - state.position) / step_s - state.rate)
+        cutoff_hz = self.min_cutoff_hz + self.beta_per_mm * float(np.linalg.norm(rate))
+        return state.position + _share(cutoff_hz, step_s) * (value - state.position), rate
+
+
 def _share(cutoff_hz: float, step_s: float) -> float:
     """How much of a new reading a first-order low-pass takes on."""
     return 1.0 / (1.0 + 1.0 / (2.0 * np.pi * cutoff_hz * step_s))
 
 
 @dataclass(frozen=True)
-class Holt:
+class Holt(Smoother):
     """Double exponential smoothing (Holt 1957), the Kinect's own smoother, with prediction ahead.
 
     Level and trend are those of the measurement time, over true time steps; the estimate goes on along the trend up to
-    `ahead_s`, so that `ahead_s` = the tracker's latency takes the lag out and brings its noise in. It states no
-    uncertainty of its own: the SD is the sensor's noise.
+    `ahead_s`, so that `ahead_s` = the tracker's latency takes the lag out and brings its noise in.
     """
 
-    sensors: Mapping[str, Sensor]
     level_weight: float = 0.5
     trend_weight: float = 0.25
     ahead_s: float = 0.1
 
     def __post_init__(self) -> None:
-        position_sensor(self.sensors)
+        super().__post_init__()
         require_not_negative(ahead_s=self.ahead_s)
         for name, weight in (("level_weight", self.level_weight), ("trend_weight", self.trend_weight)):
             if not 0 < weight <= 1:
                 raise ValueError(f"{name} must be above 0 and at most 1, got {weight}")
 
-    def start(self) -> Smoothed | None:
-        """No frame yet."""
-        return None
-
-    def update(self, state: Smoothed | None, sensor: str, sample: Sample) -> Smoothed | None:
-        """One step a frame; a frame older than the newest comes too late to be smoothed and changes nothing."""
-        if sensor != position_sensor(self.sensors):
-            return state
-        if state is None:
-            return Smoothed(sample.time, sample.value, np.zeros_like(sample.value))
-        step = sample.time - state.time
-        if step <= 0:
-            return state
-        expected = state.position + state.rate * step
-        level = expected + self.level_weight * (sample.value - expected)
-        rate = state.rate + self.trend_weight * ((level - state.position) / step - state.rate)
-        return Smoothed(sample.time, level, rate)
+    def smoothed(self, state: Smoothed, value: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+        """The level between what the trend expects and what was seen, the trend between its own and the level's."""
+        expected = state.position + state.rate * step_s
+        level = expected + self.level_weight * (value - expected)
+        return level, state.rate + self.trend_weight * ((level - state.position) / step_s - state.rate)
 
     def predict(self, state: Smoothed | None, time: float) -> tuple[FloatArray, FloatArray]:
         """The level, gone on along the trend to `time`, `ahead_s` at the most."""
-        tracker = self.sensors[position_sensor(self.sensors)]
+        held, sd = super().predict(state, time)
         if state is None:
-            return unknown(tracker.dimension)
-        ahead = float(np.clip(time - state.time, 0.0, self.ahead_s))
-        return state.position + ahead * state.rate, np.full(tracker.dimension, tracker.noise_sd)
-
-    def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-        """The plain loop."""
-        return replay_loop(self, samples, times)
+            return held, sd
+        return held + float(np.clip(time - state.time, 0.0, self.ahead_s)) * state.rate, sd
