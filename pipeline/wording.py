@@ -106,7 +106,8 @@ def seconds(value: float | None) -> str:
     """A lag in milliseconds, with its sign."""
     if value is None or not math.isfinite(value):
         return NOTHING
-    return f"{1000 * value:+.0f}".replace("-", MINUS).replace("+0", "0")
+    text = f"{1000 * value:+.0f}"
+    return "0" if text in ("+0", "-0") else text.replace("-", MINUS)
 
 
 def share(value: float | None, digits: int = 3) -> str:
