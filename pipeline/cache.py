@@ -156,14 +156,15 @@ class Cache:
         (folder / _MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
         final = self._folder(stage, key)
         final.parent.mkdir(parents=True, exist_ok=True)
-        if self.get(stage, key) is None:
-            shutil.rmtree(final, ignore_errors=True)
-            try:
-                folder.rename(final)
-            except OSError:
-                if self.get(stage, key) is None:  # not even another run's
-                    raise
-        found = self.get(stage, key)
-        if found is None:
-            raise OSError(f"{final}: the entry just written cannot be read back")
-        return found
+        there = self.get(stage, key)
+        if there is not None:
+            return there  # another run was first
+        shutil.rmtree(final, ignore_errors=True)
+        try:
+            folder.rename(final)
+        except OSError:
+            there = self.get(stage, key)
+            if there is None:
+                raise
+            return there
+        return Entry(final, dict(said), content)

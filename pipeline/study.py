@@ -130,6 +130,10 @@ class Exclusion(Frozen):
             raise ValueError("names neither a participant nor a session")
         return self
 
+    def covers(self, **ids: str | None) -> bool:
+        """Does it name nothing that differs from these ids?"""
+        return all(getattr(self, key) in (None, value) for key, value in ids.items())
+
 
 class ReachSimulation(Frozen):
     """The paper's Experiment 1: still, a minimum-jerk reach along x, still again; written by `steadyhand simulate`."""
@@ -248,6 +252,11 @@ class Session:
     participant: str | None
     condition: str | None
     path: Path
+
+    @property
+    def ids(self) -> dict[str, str | None]:
+        """Its columns in tables: participant, condition, session."""
+        return {"participant": self.participant, "condition": self.condition, "session": self.id}
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):

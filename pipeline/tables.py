@@ -246,6 +246,13 @@ def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, float) else value
 
 
+def participant_means(measures: pd.DataFrame, measure: str, conditions: Sequence[str]) -> pd.DataFrame:
+    """A row a participant, a column a condition in the given order: means over everything else, NaN if missing."""
+    rows = measures[measures["measure"] == measure]
+    wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean", sort=True)
+    return wide.reindex(columns=list(conditions)).astype("float64")
+
+
 NANOSECONDS = 1e-9
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 from pipeline import results
 from pipeline.commands import console
-from pipeline.commands.run import results_of
+from pipeline.commands.run import for_each
 from pipeline.errors import PipelineError
+from pipeline.runner import Result
 from pipeline.stages import COMPARE
 
 EXPECTED = "expected.json"
@@ -28,25 +29,21 @@ _KEYS = {
 
 def check(studies: Sequence[Path], accept: bool, jobs: int | None, cache: Path | None) -> None:
     """Compare each study with its expected.json, or write it; exit with 3 where a number moved."""
-    code = 0
-    for folder, result in results_of(studies, COMPARE, jobs, cache):
-        if isinstance(result, PipelineError):
-            console.warn(f"steadyhand: {result}")
-            code = max(code, result.exit_code)
-            continue
+
+    def compare(folder: Path, result: Result) -> int:
         found = dict(_numbers(results.read(result.entry("compare") / "results.json")))
         path = folder / EXPECTED
         if accept:
             path.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
             console.say(f"{result.name}: {len(found)} numbers accepted into {path}; review them before you commit")
-            continue
+            return 0
         moved = list(_moved(_expected(path), found))
         for line in moved:
             console.say(f"{result.name}: {line}")
-        same = len(found) - len(moved)
-        console.say(f"{result.name}: {same} numbers as expected, {len(moved)} not")
-        code = max(code, MOVED if moved else result.exit_code)
-    sys.exit(code)
+        console.say(f"{result.name}: {len(found) - len(moved)} numbers as expected, {len(moved)} not")
+        return MOVED if moved else result.exit_code
+
+    sys.exit(for_each(studies, COMPARE, jobs, cache, compare))
 
 
 def _expected(path: Path) -> dict[str, Any]:

@@ -24,7 +24,6 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     files.pop("entry.json")
     files["results.json"] = result.entry("compare") / "results.json"
-    refuse_study(folder)
     _refuse_inputs(result, folder, files)
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
@@ -44,7 +43,7 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
 
 
 def refuse_study(folder: Path) -> None:
-    """A report never goes into a study's own folder."""
+    """A report never goes into a study's own folder; asked before anything is computed."""
     if (folder / SETTINGS_FILE).exists():
         raise PipelineError(f"--out {folder}: is a study, and its files are not changed; name a folder for the report")
 
@@ -59,7 +58,6 @@ def _refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
 
 def publish_results(result: Result, folder: Path) -> None:
     """results.json alone."""
-    refuse_study(folder)
     _refuse_inputs(result, folder, ["results.json"])
     _copy(result.entry("compare") / "results.json", folder / "results.json")
 

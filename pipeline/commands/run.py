@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,19 +46,29 @@ def executor_of(jobs: int | None) -> Iterator[Executor]:
         yield pool
 
 
-def results_of(
-    studies: Sequence[Path], stages: Sequence[Stage], jobs: int | None, cache: Path | None
-) -> Iterator[tuple[Path, Result | PipelineError]]:
-    """Each study brought up to date, one after the other; one that cannot be does not stop the others."""
+def for_each(
+    studies: Sequence[Path],
+    stages: Sequence[Stage],
+    jobs: int | None,
+    cache: Path | None,
+    then: Callable[[Path, Result], int],
+) -> int:
+    """Bring each study up to date and do with it what `then` does; the highest of the exit codes.
+
+    A study that cannot be brought up to date is said, and does not stop the others.
+    """
+    code = 0
     with executor_of(jobs) as executor:
         for folder in studies:
-            result: Result | PipelineError
             try:
                 with console.progress() as progress:
                     result = bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
             except PipelineError as error:
-                result = error
-            yield folder, result
+                console.warn(f"steadyhand: {error}")
+                code = max(code, error.exit_code)
+            else:
+                code = max(code, then(folder, result))
+    return code
 
 
 def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:
@@ -88,12 +98,8 @@ def _run(
     folders = dict(zip(studies, _out_folders(studies, out), strict=True))
     for folder in folders.values():
         refuse_study(folder)
-    code = 0
-    for study, result in results_of(studies, stages, jobs, cache):
-        if isinstance(result, PipelineError):
-            console.warn(f"steadyhand: {result}")
-            code = max(code, result.exit_code)
-            continue
+
+    def write(study: Path, result: Result) -> int:
         _show(result)
         if stages is STAGES:
             publish(result, folders[study], sys.argv)
@@ -102,8 +108,9 @@ def _run(
             publish_results(result, folders[study])
             console.say(f"Results: {_short(folders[study] / 'results.json')}")
         console.say(_what_was_done(result))
-        code = max(code, result.exit_code)
-    sys.exit(code)
+        return result.exit_code
+
+    sys.exit(for_each(studies, stages, jobs, cache, write))
 
 
 def _show(result: Result) -> None:

@@ -11,9 +11,10 @@ from typing import Any
 import matplotlib.figure
 import pandas as pd
 
-from pipeline import figures
+from pipeline import figures, tables
 from pipeline.document.model import Figure
 from pipeline.study import Session, Study
+from pipeline.wording import listing
 
 Row = Mapping[str, Any]
 
@@ -55,9 +56,7 @@ class Material:
 
     def participant_means(self, measure: str) -> pd.DataFrame:
         """A row a participant, a column a condition."""
-        rows = self.measures[self.measures["measure"] == measure]
-        wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean")
-        return wide.reindex(columns=list(self.study.conditions)).astype("float64")
+        return tables.participant_means(self.measures, measure, self.study.conditions)
 
     def figure(
         self,
@@ -82,6 +81,4 @@ def safe_name(text: str) -> str:
 
 def conditions_text(conditions: Sequence[str]) -> str:
     """The conditions for a sentence, the baseline named."""
-    from pipeline.wording import listing
-
     return f"{listing(list(conditions))} ({conditions[0]} is the baseline)" if len(conditions) > 1 else conditions[0]

@@ -132,9 +132,7 @@ def _trials(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -
     for index, start in enumerate(starts.itertuples()):
         after = selections[selections["start"] == index]
         trial = {
-            "participant": work.session.participant,
-            "condition": work.session.condition,
-            "session": work.session.id,
+            **work.session.ids,
             "trial": index + 1 if pd.isna(start.trial) else int(start.trial),
         }
         if after.empty:

@@ -48,6 +48,7 @@ def run(work: Work) -> Outcome:
     found["exclusions"] = pd.concat(
         [
             tables.frame("exclusions", _sessions(work)),
+            tables.read("exclusions", work.entries["ingest"]),
             tables.read("exclusions", measured),
             tables.frame("exclusions", left_out),
         ]
@@ -56,7 +57,6 @@ def run(work: Work) -> Outcome:
         entries = work.entries["ingest" if name == "quality" else "assess"]
         found[name] = _without_excluded(study, work, tables.read(name, entries))
     found["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(found["accuracy"]))
-    found["exclusions"] = pd.concat([found["exclusions"], tables.frame("exclusions", _samples_left_out(work))])
     found["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, found["trials"]))
     if study.printed is not None:
         found["printed"] = compare_printed(
@@ -77,29 +77,10 @@ def _without_accuracy(work: Work) -> list[Row]:
     there = set(quality.loc[quality["stream"] == reference, "session"])
     rated = set(tables.read("accuracy", work.entries["assess"])["session"])
     reason = "its reference has no instant from 1 s after the first frame on"
+    lacking = there - rated
     return [
-        {
-            "participant": session.participant,
-            "condition": session.condition,
-            "session": session.id,
-            "what": "no accuracy",
-            "reason": reason,
-        }
-        for session in work.sessions
-        if session.id in there - rated
+        {**session.ids, "what": "no accuracy", "reason": reason} for session in work.sessions if session.id in lacking
     ]
-
-
-def _samples_left_out(work: Work) -> list[Row]:
-    """Readings of the logs that could not be used, by session and stream, as `quality` notes them."""
-    quality = tables.read("quality", work.entries["ingest"])
-    sessions = {session.id: session for session in work.sessions}
-    rows: list[Row] = []
-    for row in quality[quality["note"].str.contains("left out").fillna(False).astype(bool)].itertuples():
-        session = sessions[str(row.session)]
-        who = {"participant": session.participant, "condition": session.condition, "session": session.id}
-        rows.append({**who, "what": "samples left out", "reason": f"{row.stream}: {row.note}"})
-    return rows
 
 
 def _people(work: Work, measures: pd.DataFrame) -> Row:
@@ -112,18 +93,9 @@ def _people(work: Work, measures: pd.DataFrame) -> Row:
 
 def _sessions(work: Work) -> list[Row]:
     """The sessions that were set aside or read in part."""
-    rows = []
+    rows: list[Row] = []
     for what, sessions in (("session set aside", work.set_aside), ("session read in part", work.in_part)):
-        for session, reason in sessions:
-            rows.append(
-                {
-                    "participant": session.participant,
-                    "condition": session.condition,
-                    "session": session.id,
-                    "what": what,
-                    "reason": reason,
-                }
-            )
+        rows += [{**session.ids, "what": what, "reason": reason} for session, reason in sessions]
     return rows + [{"session": name, "what": "file not used", "reason": reason} for name, reason in work.unused]
 
 
@@ -133,26 +105,16 @@ def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataF
         session.id
         for session in work.sessions
         for excluded in study.exclusions
-        if excluded.measure is None
-        and excluded.participant in (None, session.participant)
-        and excluded.condition in (None, session.condition)
-        and excluded.session in (None, session.id)
+        if excluded.measure is None and excluded.covers(**session.ids)
     }
     return table[~table["session"].isin(out)]
-
-
-def participant_means(study: Study, measures: pd.DataFrame, measure: str) -> pd.DataFrame:
-    """A row a participant, a column a condition in the study's order: means over everything else, NaN if missing."""
-    rows = measures[measures["measure"] == measure]
-    wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean", sort=True)
-    return wide.reindex(columns=list(study.conditions))
 
 
 def descriptives(study: Study, measures: pd.DataFrame) -> list[Row]:
     """n, mean, SD, median and the t interval of the mean, a row a measure and condition."""
     rows: list[Row] = []
     for measure in sorted(set(measures["measure"]), key=measure_order):
-        wide = participant_means(study, measures, measure)
+        wide = tables.participant_means(measures, measure, study.conditions)
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
             if len(values):
@@ -254,7 +216,7 @@ def _compare(study: Study, entry: Comparison, measure: str, measures: pd.DataFra
     if len(entry.within) > 1:
         values, labels = _factorial(study, entry, measure, measures, left_out)
         return [_row(entry, measure, result) for result in rm_anova(values, labels)]
-    wide = participant_means(study, measures, measure)
+    wide = tables.participant_means(measures, measure, study.conditions)
     complete = wide.dropna()
     _list_incomplete(entry, measure, wide, left_out)
     values = complete.to_numpy(np.float64)

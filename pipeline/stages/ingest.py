@@ -17,6 +17,7 @@ from pipeline.quality import clock_went_back, quality_row
 from pipeline.stage import Outcome, Work
 from pipeline.study import Session, Stream, Study
 
+Row = dict[str, Any]
 MM_PER_M = 1000.0
 _NEEDED = ("position", "acceleration")  # without these a session has nothing to fuse
 _DAY_NS = 86_400e9
@@ -39,7 +40,8 @@ def run(work: Work) -> Outcome:
     log = read_log(session.path, wanted)
     participant, condition = _who(session, log, study)
     in_part = list(log.faults)
-    quality: list[dict[str, Any]] = []
+    quality: list[Row] = []
+    left_out: list[Row] = []
     positions: list[pd.DataFrame] = []
     imu: list[pd.DataFrame] = []
     for name, stream in study.streams.items():
@@ -53,13 +55,23 @@ def run(work: Work) -> Outcome:
                 raise SessionError(fault)
             in_part.append(fault)
         quality.append(quality_row(session.id, name, readings, notes))
+        if finite.read < readings.read:
+            left_out.append(quality[-1])
         (imu if stream.kind == "acceleration" else positions).append(_table(session.id, name, stream, finite))
-    events = _events(log, study, session.id, in_part, quality)
+    events, row, repeated = _events(log, study, session.id, in_part)
+    if row is not None:
+        quality.append(row)
+        if repeated:
+            left_out.append(row)
     for name, parts in (("positions", positions), ("imu", imu)):
         if parts:
             tables.write(name, pd.concat(parts), work.out)
     tables.write("events", events, work.out)
     tables.write("quality", tables.frame("quality", quality), work.out)
+    ids = {"participant": participant, "condition": condition, "session": session.id}
+    reasons = [f"{row['stream']}: {row['note']}" for row in left_out]
+    listed = [{**ids, "what": "samples left out", "reason": reason} for reason in reasons]
+    tables.write("exclusions", tables.frame("exclusions", listed), work.out)
     in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
@@ -156,29 +168,29 @@ def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.Da
     return tables.as_table("positions", pd.DataFrame(columns))
 
 
-def _events(log: Log, study: Study, session: str, in_part: list[str], quality: list[dict[str, Any]]) -> pd.DataFrame:
-    """The session's events by arrival."""
+def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[pd.DataFrame, Row | None, int]:
+    """The session's events by arrival, each once; their row of `quality`; and how many were repetitions."""
+    nothing = tables.frame("events", [])
     if study.events is None:
-        return tables.frame("events", [])
+        return nothing, None, 0
     readings = log.topics.get(study.events.topic)
     if readings is None or (readings.read == 0 and not readings.notes):
         in_part.append(f"events: topic {study.events.topic} holds none")
-        return tables.frame("events", [])
+        return nothing, None, 0
     if readings.read == 0:
         in_part.append(f"events: {'; '.join(readings.notes)}")
     order = np.argsort(readings.arrival_ns, kind="stable")
     rows = [_event(session, int(readings.arrival_ns[at]), readings.events[at]) for at in order]
-    events = tables.frame("events", rows)
-    once = events.drop_duplicates()
-    repeated = [f"{len(events) - len(once)} repeated events left out"] if len(once) < len(events) else []
-    quality.append(quality_row(session, "events", readings, repeated))
-    return once
+    every = tables.frame("events", rows)
+    once = every.drop_duplicates()
+    repeated = len(every) - len(once)
+    notes = [f"{repeated} repeated events left out"] if repeated else []
+    return once, quality_row(session, "events", readings, notes), repeated
 
 
-def _event(session: str, time_ns: int, event: Mapping[str, Any]) -> dict[str, Any]:
-    row: dict[str, Any] = {"session": session, "time_ns": time_ns, "type": event["type"]}
-    trial = event.get("trial")
-    row["trial"] = trial
+def _event(session: str, time_ns: int, event: Mapping[str, Any]) -> Row:
+    row: Row = {"session": session, "time_ns": time_ns, "type": event["type"]}
+    row["trial"] = event.get("trial")
     for axis in "xyz":
         for key, column in ((f"target_{axis}", f"target_{axis}_mm"), (axis, f"{axis}_mm")):
             value = event.get(key)

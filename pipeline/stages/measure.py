@@ -120,7 +120,7 @@ def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
     sessions = {session.id: session for session in work.sessions}
     for session_id, happened in events.groupby("session"):
         session = sessions[str(session_id)]
-        who: Row = {"participant": session.participant, "condition": session.condition, "session": session.id}
+        who: Row = session.ids
         times = {kind: found["time_ns"] for kind, found in happened.groupby("type")}
         selections = times.get("selection", pd.Series(dtype="int64"))
         stray = int((selections_by_trial(happened)[1]["start"] < 0).sum())
@@ -170,8 +170,7 @@ def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
 
 def _known(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     """Every combination of ids that an exclusion may name: what is in the data, totals, and sessions set aside."""
-    told = [{"participant": s.participant, "condition": s.condition, "session": s.id} for s in work.sessions]
-    told += [{"participant": s.participant, "condition": s.condition, "session": s.id} for s, _ in work.set_aside]
+    told = [session.ids for session in (*work.sessions, *(aside for aside, _ in work.set_aside))]
     columns = [*CELL, "session", "measure"]
     totals = values[values["measure"].str.contains("/")].copy()
     totals["measure"] = totals["measure"].str.partition("/")[0] + "/total" if len(totals) else totals["measure"]
@@ -301,10 +300,7 @@ def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
 def _decided(study: Study, participant: str, condition: str, measure: str | None) -> bool:
     """Is the cell empty because study.yaml excludes it?"""
     return any(
-        excluded.session is None
-        and excluded.participant == participant
-        and excluded.condition in (None, condition)
-        and excluded.measure in (None, measure)
+        excluded.session is None and excluded.covers(participant=participant, condition=condition, measure=measure)
         for excluded in study.exclusions
     )
 

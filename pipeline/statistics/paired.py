@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import stats
 
@@ -22,7 +24,7 @@ def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -
     elif status is None and negligible(float(np.sum((differences - differences.mean()) ** 2)), both):
         status = NO_ERROR
     if status is not None:
-        return Result(**{**vars(blank), "status": status})
+        return replace(blank, status=status)
     sd = float(np.std(differences, ddof=1))
     mean, error = float(np.mean(differences)), sd / np.sqrt(n)
     statistic, margin = mean / error, float(stats.t.ppf(0.975, n - 1)) * error
@@ -39,5 +41,13 @@ def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -
         "shapiro_p": None if shapiro is None else float(shapiro.pvalue),
     }
     p = float(2 * stats.t.sf(abs(statistic), n - 1))
-    known = {"statistic": float(statistic), "df2": float(n - 1), "p": p, "effect_size": dz, "ci_low": low}
-    return Result(**{**vars(blank), **known, "ci_high": high, "details": details})
+    return replace(
+        blank,
+        statistic=float(statistic),
+        df2=float(n - 1),
+        p=p,
+        effect_size=dz,
+        ci_low=low,
+        ci_high=high,
+        details=details,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ def wilcoxon(
     differences = rounded_differences(first, second)
     status = too_few(n) or (None if np.any(differences) else ALL_ZERO)
     if status is not None:
-        return Result(**{**vars(blank), "status": status})
+        return replace(blank, status=status)
     nonzero = differences != 0
     if zeros == "dropped":
         ranks = stats.rankdata(np.abs(differences[nonzero]))
@@ -49,8 +50,15 @@ def wilcoxon(
         "hodges_lehmann": location,
         "hodges_lehmann_ci": None if interval is None else list(interval),
     }
-    known = {"statistic": w_plus, "p": signed_rank_p(ranks, w_plus), "effect_size": biserial}
-    return Result(**{**vars(blank), **known, "ci_low": low, "ci_high": high, "details": details})
+    return replace(
+        blank,
+        statistic=w_plus,
+        p=signed_rank_p(ranks, w_plus),
+        effect_size=biserial,
+        ci_low=low,
+        ci_high=high,
+        details=details,
+    )
 
 
 def signed_rank_p(ranks: FloatArray, w_plus: float) -> float:
@@ -101,7 +109,7 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
     blank = Result(effect, "chi2", "Friedman, chi-squared approximation, ties corrected", "Kendall's W", n, df1=k - 1)
     status = too_few(n) or degenerate(values)
     if status is not None:
-        return Result(**{**vars(blank), "status": status})
+        return replace(blank, status=status)
     ranks = np.apply_along_axis(stats.rankdata, 1, rounded(values))
     spread = float(np.sum((ranks.sum(axis=0) - n * (k + 1) / 2) ** 2))
     ties = float(np.sum(ranks**2)) - n * k * (k + 1) ** 2 / 4
@@ -114,5 +122,10 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
         "iman_davenport_p": None if f is None else float(stats.f.sf(f, k - 1, (k - 1) * (n - 1))),
     }
     p = float(stats.chi2.sf(statistic, k - 1))
-    known = {"statistic": statistic, "p": p, "effect_size": agreement, "details": details}
-    return Result(**{**vars(blank), **known})
+    return replace(
+        blank,
+        statistic=statistic,
+        p=p,
+        effect_size=agreement,
+        details=details,
+    )

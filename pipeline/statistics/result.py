@@ -41,9 +41,12 @@ def too_few(n: int) -> str | None:
     return {0: NO_COMPLETE, 1: ONE_COMPLETE}.get(n)
 
 
-def rounded(values: FloatArray) -> FloatArray:
-    """Values with round-off taken out, so that 0.3 − 0.2 and 0.2 − 0.1 tie: 12 digits of the largest count."""
-    largest = float(np.max(np.abs(values), initial=0.0))
+def rounded(values: FloatArray, *beside: FloatArray) -> FloatArray:
+    """Values with round-off taken out, so that 0.3 − 0.2 and 0.2 − 0.1 tie.
+
+    12 digits count, of the largest of the values and of what they were made from.
+    """
+    largest = max(float(np.max(np.abs(array), initial=0.0)) for array in (beside or (values,)))
     if largest == 0:
         return values
     quantum = 10.0 ** (np.floor(np.log10(largest)) - 11)
@@ -53,12 +56,7 @@ def rounded(values: FloatArray) -> FloatArray:
 
 def rounded_differences(first: FloatArray, second: FloatArray) -> FloatArray:
     """first − second, zero and tied where the data's decimals say so."""
-    largest = max(float(np.max(np.abs(first), initial=0.0)), float(np.max(np.abs(second), initial=0.0)))
-    if largest == 0:
-        return first - second
-    quantum = 10.0 ** (np.floor(np.log10(largest)) - 11)
-    result: FloatArray = np.rint((first - second) / quantum) * quantum
-    return result
+    return rounded(first - second, first, second)
 
 
 def negligible(sum_of_squares: float, values: FloatArray) -> bool:

@@ -192,8 +192,6 @@ def _take_record(walk: Walk, opcode: int, body: bytes) -> None:
         else:
             _take_message_record(walk, opcode, body)
     except BROKEN as error:
-        if isinstance(error, SessionError):
-            raise
         name = Opcode(opcode).name.lower().replace("_", " ") if opcode in set(Opcode) else f"kind {opcode}"
         walk.faults.append(f"a record ({name}) cannot be read: {str(error) or type(error).__name__}")
         walk.unknown_loss = True
@@ -242,8 +240,6 @@ def _take_chunk(walk: Walk, body: bytes) -> None:
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             raise ValueError("its checksum does not fit its bytes")
     except (ValueError, zstandard.ZstdError, RuntimeError, EOFError) as error:
-        if isinstance(error, SessionError):
-            raise
         walk.last_chunk_damaged = True
         walk.faults.append(f"chunk {walk.chunks} is damaged and left out: {error}")
         return
