@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -59,6 +60,11 @@ class Column:
 
     title: str
     numeric: bool = True
+
+
+def columns(titles: Sequence[str], texts: int) -> tuple[Column, ...]:
+    """Columns of which the first `texts` hold text and the others numbers."""
+    return tuple(Column(title, index >= texts) for index, title in enumerate(titles))
 
 
 @dataclass(frozen=True)

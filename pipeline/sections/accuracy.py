@@ -10,7 +10,7 @@ import pandas as pd
 
 from fusion_core import FloatArray, Samples, accuracy
 from pipeline import figures, recording, tables
-from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table
+from pipeline.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.figures import View
 from pipeline.recording import Recording
 from pipeline.sections.material import Material, Row
@@ -77,7 +77,7 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         "table-accuracy",
         f"Accuracy of each estimator against the reference, means over {counted(n, 'session')} ({where}). Lower is"
         " better in all columns but the third, which should be near 95 %.",
-        tuple(Column(title, index > 0) for index, title in enumerate(titles)),
+        columns(titles, 1),
         cells,
         "RMSE: root mean square distance to the reference. Stated SD: the error the estimator says it makes. In 95 % "
         "interval: share of instants and axes where the reference is within 1.96 stated SDs. Lag: the shift that fits "
@@ -117,7 +117,7 @@ def _session_table(rows: list[Row]) -> Table:
     return Table(
         "table-accuracy-sessions",
         f"The same for each session, the lag with its 95 % interval.{more}",
-        tuple(Column(title, index > 1) for index, title in enumerate(titles)),
+        columns(titles, 2),
         cells,
         "Intervals of the lag: moving-block bootstrap, blocks of 0.5 s.",
     )

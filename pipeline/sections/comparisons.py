@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.document.model import Column, Paragraph, Section, Table
+from pipeline.document.model import Paragraph, Section, Table, columns
 from pipeline.sections.material import Material, Row
 from pipeline.wording import (
     NOTHING,
@@ -46,13 +46,13 @@ def section(material: Material) -> Section | None:
     if not rows:
         return None
     tests = list(dict.fromkeys(row["test"] for row in rows))
-    columns = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NOTHING, "") for row in rows)]
+    filled = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NOTHING, "") for row in rows)]
     table = Table(
         "table-comparisons",
         f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
         f" if there were none; the study's level is {100 * material.study.alpha:g} %.",
-        tuple(Column(title, index > 2) for index, (title, _) in enumerate(columns)),
-        tuple(tuple(cell(row) for _, cell in columns) for row in rows),
+        columns([title for title, _ in filled], 3),
+        tuple(tuple(cell(row) for _, cell in filled) for row in rows),
         "Only participants with a value in every condition count (n). Difference: first minus second condition, of the "
         "means; reduction: relative to the first.",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pipeline import figures
-from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table
+from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.sections.material import Material, Row, safe_name
 from pipeline.wording import (
     comparison_sentence,
@@ -96,7 +96,7 @@ def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Ta
         for row in rows
     )
     caption = "Means over participants, each participant one value in each condition."
-    return Table(table_id, caption, tuple(Column(title, index > 1) for index, title in enumerate(titles)), cells)
+    return Table(table_id, caption, columns(titles, 2), cells)
 
 
 def _measured(material: Material, measure: str) -> list[Block]:
@@ -192,7 +192,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     return Table(
         f"table-{safe_name(questionnaire)}-tests",
         caption,
-        tuple(Column(name, index not in (0, 1)) for index, name in enumerate(titles)),
+        columns(titles, 2),
         cells,
         note,
     )
@@ -221,7 +221,7 @@ def _shown(material: Material) -> Table:
         "table-shown",
         "What each estimator would have shown at the moments of selection: its distance from the targets. People "
         "steered by what was displayed, so the displayed estimator has the advantage.",
-        tuple(Column(title, index > 1) for index, title in enumerate(titles)),
+        columns(titles, 2),
         cells,
         '"recorded" is where the participants selected.',
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import figures, tables
-from pipeline.document.model import Block, Column, Paragraph, Section, Table
+from pipeline.document.model import Block, Column, Paragraph, Section, Table, columns
 from pipeline.sections.material import Material
 from pipeline.wording import NOTHING, counted, measure_label, number
 
@@ -124,7 +124,7 @@ def _noise(material: Material) -> list[Block]:
         Table(
             "table-noise",
             "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",
-            tuple(Column(title, index not in (0, 1, 2)) for index, title in enumerate(titles)),
+            columns(titles, 3),
             cells,
             "Still: the reference moves slower than 20 mm/s; without a reference, the accelerations vary little.",
         ),
@@ -136,10 +136,7 @@ def _agreement_table(material: Material) -> Table:
         "table-replay",
         "How far what was displayed is from what the estimator gives when it is run again over the same log. Zero, up "
         "to rounding, means that the log shows what it says it showed.",
-        tuple(
-            Column(title, index > 1)
-            for index, title in enumerate(("Session", "Estimator", "Samples", "Largest (mm)", "Root mean square (mm)"))
-        ),
+        columns(("Session", "Estimator", "Samples", "Largest (mm)", "Root mean square (mm)"), 2),
         tuple(
             (
                 row["session"],
@@ -176,7 +173,7 @@ def _exclusions(material: Material) -> list[Block]:
         Table(
             "table-exclusions",
             f"Everything that is missing or was left out, and why ({counted(len(rows), 'entry', 'entries')}).{more}",
-            tuple(Column(title, False) for title in titles),
+            columns(titles, len(titles)),
             cells,
         )
     ]
