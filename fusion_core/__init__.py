@@ -3,11 +3,18 @@
 NumPy, SciPy and Numba only: no files, sockets, clocks or DataFrames. The README has the notation table.
 """
 
+# ruff: noqa: E402 - before anything is compiled
+from fusion_core.compilation import keep_apart
+
+keep_apart()
+
 from fusion_core.estimator import Estimator, replay_loop
 from fusion_core.filters import Holt, OneEuro, Raw
-from fusion_core.kalman import FusionKalman, PositionKalman
+from fusion_core.fusion_kalman import FusionKalman
+from fusion_core.position_kalman import PositionKalman
 from fusion_core.samples import FloatArray, Sample, Samples, Track
-from fusion_core.sensors import OPERATORS, Sensor
+from fusion_core.sensors import OPERATORS, Sensor, Term
+from fusion_core.smoother import fixed_lag, smooth
 from fusion_core.window_gp import WindowGP
 
 ESTIMATORS: dict[str, type[Raw | OneEuro | Holt | PositionKalman | WindowGP | FusionKalman]] = {
@@ -33,7 +40,10 @@ __all__ = [
     "Sample",
     "Samples",
     "Sensor",
+    "Term",
     "Track",
     "WindowGP",
+    "fixed_lag",
     "replay_loop",
+    "smooth",
 ]

@@ -1,10 +1,17 @@
-"""From the phone's frame to the tracker's: orientation and gravity."""
+"""From the phone's frame to the tracker's: orientation, heading and gravity."""
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
-from fusion_core.samples import FloatArray
+from fusion_core.fusion_kalman import FusionKalman
+from fusion_core.samples import FloatArray, Samples
+from fusion_core.sensors import Sensor
+
+_HEADING_WALK_PER_SQRT_S = 0.02  # of the heading's cosine and sine: a gyroscope drifts
+_LEVEL_BIAS_SD_MM_S2 = 300.0  # 2° of tilt, or an accelerometer's own
+_LEVEL_BIAS_WALK_MM_S2 = 30.0
 
 
 def rotate(quaternion_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
@@ -23,8 +30,95 @@ def rotate(quaternion_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
     return turned
 
 
+def rotations(quaternion_xyzw: FloatArray) -> FloatArray:
+    """Rotation matrices (n, 3, 3) of quaternions (n, 4): each turns a column from the body's to the tracker's frame."""
+    columns = [rotate(quaternion_xyzw, np.broadcast_to(unit, (len(quaternion_xyzw), 3))) for unit in np.eye(3)]
+    return np.stack(columns, axis=2)
+
+
 def tracker_acceleration(
     specific_force_mm_s2: FloatArray, quaternion_xyzw: FloatArray, gravity_mm_s2: FloatArray
 ) -> FloatArray:
     """Acceleration (n, 3) in the tracker frame: a = R f + g. At rest f points up and a is zero."""
     return rotate(quaternion_xyzw, specific_force_mm_s2) + gravity_mm_s2
+
+
+def carried(
+    time: FloatArray, quaternion_xyzw: FloatArray, angular_velocity_rad_s: FloatArray, longest_s: float = 1.0
+) -> FloatArray:
+    """Orientations (n, 4) with the unknown ones (NaN) carried on from the last known by the gyroscope (n, 3).
+
+    For up to `longest_s`, in which a gyroscope drifts by a degree or two; beyond it they stay unknown. `time` (n,)
+    rises.
+    """
+    from scipy.spatial.transform import Rotation
+
+    found = quaternion_xyzw.copy()
+    known: npt.NDArray[np.bool_] = np.isfinite(found[:, 3])
+    last = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+    for row in np.flatnonzero(~known & (last >= 0)):
+        step_s = time[row] - time[row - 1]
+        if time[row] - time[last[row]] <= longest_s and np.isfinite(found[row - 1, 3]):
+            mid = (angular_velocity_rad_s[row - 1] + angular_velocity_rad_s[row]) / 2
+            found[row] = (Rotation.from_quat(found[row - 1]) * Rotation.from_rotvec(mid * step_s)).as_quat()
+    return found
+
+
+def level(gravity_mm_s2: FloatArray) -> FloatArray:
+    """The least rotation (4,) that turns a frame whose z points up into the tracker's, where gravity is as given."""
+    from scipy.spatial.transform import Rotation
+
+    up = -gravity_mm_s2 / np.linalg.norm(gravity_mm_s2)
+    axis = np.cross([0.0, 0.0, 1.0], up)
+    sine, cosine = float(np.linalg.norm(axis)), float(up[2])
+    if sine < 1e-12:
+        return np.array([0.0, 0.0, 0.0, 1.0]) if cosine > 0 else np.array([1.0, 0.0, 0.0, 0.0])
+    turned: FloatArray = Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_quat()
+    return turned
+
+
+def heading(
+    tracker: Samples, tracker_sensor: Sensor, acceleration: Samples, acceleration_sensor: Sensor
+) -> tuple[FloatArray, FloatArray]:
+    """By what angle about the vertical, and SD (n,) in rad, accelerations are turned against the tracker.
+
+    Both in frames whose z points up, positions (m, 3) in mm and accelerations (n, 3) in mm/s² without gravity. What
+    is known at the arrival of each acceleration, from the motion itself: the cosine and sine of the angle enter an
+    acceleration linearly, so they are constants of the fusion filter beside its bias. NaN before the first position;
+    the SD is large until the hand has moved.
+    """
+    east, north = acceleration.value[:, 0], acceleration.value[:, 1]
+    coupling = np.zeros((len(acceleration), 3, 5))
+    coupling[:, :3, :3] = np.eye(3)
+    coupling[:, 0, 3], coupling[:, 1, 3] = -east, -north
+    coupling[:, 0, 4], coupling[:, 1, 4] = north, -east
+    vertical = acceleration.value * np.array([0.0, 0.0, 1.0])
+    sensors = {"tracker": tracker_sensor, "imu": acceleration_sensor}
+    readings = {"tracker": tracker, "imu": Samples(acceleration.time, acceleration.arrival, vertical)}
+    steps = FusionKalman(sensors).event_time.with_constants(
+        np.array([_LEVEL_BIAS_SD_MM_S2] * 3 + [1.0] * 2),
+        np.array([_LEVEL_BIAS_WALK_MM_S2] * 3 + [_HEADING_WALK_PER_SQRT_S] * 2),
+    )
+    couplings = {"tracker": np.zeros((len(tracker), 3, 5)), "imu": coupling}
+    mean, covariance = steps.constants(readings, couplings, acceleration.arrival)
+    cosine, sine = mean[:, 3], mean[:, 4]
+    length = np.maximum(np.hypot(cosine, sine), 1e-9)
+    angle = np.arctan2(sine, cosine)
+    across = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+    variance = np.einsum("ni,nij,nj->n", across, covariance[:, 3:, 3:], across)
+    return angle, np.sqrt(variance) / length
+
+
+def headed(quaternion_xyzw: FloatArray, angle_rad: FloatArray) -> FloatArray:
+    """Orientations (n, 4) turned about the vertical by angles (n,)."""
+    from scipy.spatial.transform import Rotation
+
+    about_z = np.zeros((len(angle_rad), 3))
+    about_z[:, 2] = angle_rad
+    turned: FloatArray = (Rotation.from_rotvec(about_z) * Rotation.from_quat(quaternion_xyzw)).as_quat()
+    return turned
+
+
+def nearest(time: FloatArray, wanted: FloatArray) -> npt.NDArray[np.int64]:
+    """The index of the newest of rising times that is not after each wanted one; 0 where there is none."""
+    return np.maximum(np.searchsorted(time, wanted, side="right") - 1, 0)

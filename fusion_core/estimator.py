@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +30,26 @@ class Estimator(Protocol):
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
         """What the estimator would have shown at `times`, each from the samples that had arrived by then."""
+
+
+def require_readings(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> None:
+    """ValueError that names the sensor whose readings do not have its dimension."""
+    for name, sensor in sensors.items():
+        if name in samples and samples[name].value.shape[1] != sensor.dimension:
+            raise ValueError(
+                f"{name}: readings must have shape (n, {sensor.dimension}), as its dimension says, "
+                f"got {samples[name].value.shape}"
+            )
+
+
+def require_reading(name: str, sensor: Sensor, sample: Sample) -> None:
+    """ValueError unless a reading has its sensor's dimension and is finite."""
+    if sample.value.shape != (sensor.dimension,):
+        raise ValueError(
+            f"{name}: a reading must have shape ({sensor.dimension},), as its dimension says, got {sample.value.shape}"
+        )
+    if not (isfinite(sample.time) and isfinite(sample.arrival) and isfinite(sample.value.sum())):
+        raise ValueError(f"{name}: a reading must be finite, got {sample.value} at {sample.time} s")
 
 
 def arrivals(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> Iterator[tuple[str, Sample]]:
@@ -62,17 +83,3 @@ def replay_loop(estimator: Estimator, samples: Mapping[str, Samples], times: Flo
 def unknown(dimension: int) -> tuple[FloatArray, FloatArray]:
     """Mean and SD before there is anything to say."""
     return np.full(dimension, np.nan), np.full(dimension, np.nan)
-
-
-def require_positive(**values: float) -> None:
-    """ValueError that names the parameter unless every value is finite and above zero."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be a number above 0, got {value}")
-
-
-def require_not_negative(**values: float) -> None:
-    """ValueError that names the parameter unless every value is finite and zero or more."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} must be a number, 0 or more, got {value}")

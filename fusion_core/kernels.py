@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusion_core.estimator import require_positive
+from fusion_core.checks import require_positive
 from fusion_core.samples import FloatArray
 
 IntArray = npt.NDArray[np.int64]

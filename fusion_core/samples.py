@@ -15,17 +15,21 @@ class Sample:
     """One sensor reading.
 
     `time` is when it was true (s), `arrival` when it could first be used (s), `value` has shape (d,) in the
-    operator's unit: mm, mm/s or mm/s².
+    operator's unit: mm, mm/s or mm/s². `rotation` (d, 3), where it is known, turned the reading from its own body's
+    frame into the tracker's: in the body's frame a bias stays what it is.
     """
 
     time: float
     arrival: float
     value: FloatArray
+    rotation: FloatArray | None = None
 
 
 @dataclass(frozen=True)
 class Samples:
     """A sensor's readings in order of arrival: `time` (n,), `arrival` (n,), both in s, `value` (n, d).
+
+    `rotation` (n, d, 3), where it is known, turned the readings from their own body's frame into the tracker's.
 
     Raises ValueError where shapes disagree, a figure is not finite or arrivals go backwards.
     """
@@ -33,6 +37,7 @@ class Samples:
     time: FloatArray
     arrival: FloatArray
     value: FloatArray
+    rotation: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -41,7 +46,10 @@ class Samples:
                 "Samples need time (n,), arrival (n,) and value (n, d), got "
                 f"{self.time.shape}, {self.arrival.shape} and {self.value.shape}"
             )
-        if not (np.isfinite(self.time).all() and np.isfinite(self.arrival).all() and np.isfinite(self.value).all()):
+        if self.rotation is not None and self.rotation.shape != (*self.value.shape, 3):
+            raise ValueError(f"rotation must be (n, d, 3) = {(*self.value.shape, 3)}, got {self.rotation.shape}")
+        figures = (self.time, self.arrival, self.value, *(() if self.rotation is None else (self.rotation,)))
+        if not all(np.isfinite(figure).all() for figure in figures):
             raise ValueError("Samples must be finite; leave a reading out rather than pass NaN or infinity")
         if n > 1 and np.any(np.diff(self.arrival) < 0):
             raise ValueError("Samples must be in order of arrival; sort them by `arrival` first")
@@ -50,7 +58,8 @@ class Samples:
         return len(self.time)
 
     def __getitem__(self, index: int) -> Sample:
-        return Sample(float(self.time[index]), float(self.arrival[index]), self.value[index])
+        rotation = None if self.rotation is None else self.rotation[index]
+        return Sample(float(self.time[index]), float(self.arrival[index]), self.value[index], rotation)
 
 
 @dataclass(frozen=True)

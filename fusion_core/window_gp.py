@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from fusion_core.estimator import replay_loop, require_positive, unknown
+from fusion_core import window_steps
+from fusion_core.checks import require_not_negative, require_one_of, require_positive
+from fusion_core.estimator import replay_loop, require_reading, require_readings, unknown
 from fusion_core.kernels import IntArray, SquaredExponential
 from fusion_core.samples import FloatArray, Sample, Samples, Track
-from fusion_core.sensors import Sensor, position_sensor
+from fusion_core.sensors import Sensor, Term, position_sensor, require_fit
 
+_ACCELERATION = 2
 _CHUNK_NUMBERS = 4_000_000  # covariance entries held at once: 32 MB
+_MOST_SETS = 64  # of patterns
+_MOST_PATTERNS = 4096  # of regular windows whose weights are remembered
+Pattern = tuple[int, int, int, int]
+"""A regular window: how many positions and other readings, and how many ns ago the newest of each was measured."""
 
 
 @dataclass(frozen=True)
@@ -29,52 +36,124 @@ class Window:
 class WindowGP:
     """Position now from the last `window` positions and every other reading since the oldest of them.
 
-    The mean of the prior is an unknown constant (`mean="constant"`) or zero, as the paper prints it. With a
-    position sensor alone this is the paper's position-only GP. `horizon_s` bounds the window in a pause of the
-    tracker: readings older than that are left out.
+    The mean of the prior is an unknown constant (`mean="constant"`), the average of the window's positions
+    (`"window"`), or zero, as the paper prints it. Accelerations are exact second derivatives or, with
+    `derivative="finite_difference"`, the paper's second difference (18) of positions `difference_step_s` apart. With
+    `bias_sd_mm_s2` above 0 an accelerometer may be off by a constant over the window. With a position sensor alone
+    this is the paper's position-only GP. `horizon_s` bounds the window in a pause of the tracker: readings older than
+    that are left out.
 
-    Raises ValueError for a window below 1, parameters not above 0, or sensors without a position among them.
+    Where every sensor's `rate_hz` is stated, a window whose readings keep to it takes weights computed once for all
+    such windows (`path="auto"`); `"event_time"` computes those of each window from its own times. The two agree to
+    1e-6 mm.
+
+    Raises ValueError for a window below 1, parameters not above 0, sensors that do not fit together, or one that is
+    later than the horizon.
     """
 
     sensors: Mapping[str, Sensor]
     window: int = 5
     signal_variance_mm2: float = 5.66e4
     inverse_scale_s2: float = 4.19
-    mean: Literal["constant", "zero"] = "constant"
+    mean: Literal["constant", "window", "zero"] = "constant"
+    derivative: Literal["exact", "finite_difference"] = "exact"
+    difference_step_s: float = 1 / 90
+    bias_sd_mm_s2: float = 0.0
     horizon_s: float = 2.0
+    path: Literal["auto", "event_time"] = "auto"
 
     def __post_init__(self) -> None:
-        position_sensor(self.sensors)
+        require_fit(self.sensors)
         if self.window < 1:
             raise ValueError(f"window must be 1 or more positions, got {self.window}")
-        if self.mean not in ("constant", "zero"):
-            raise ValueError(f'mean must be "constant" or "zero", got {self.mean!r}')
-        require_positive(horizon_s=self.horizon_s)
+        require_one_of("mean", self.mean, ("constant", "window", "zero"))
+        require_one_of("derivative", self.derivative, ("exact", "finite_difference"))
+        require_one_of("path", self.path, ("auto", "event_time"))
+        require_positive(horizon_s=self.horizon_s, difference_step_s=self.difference_step_s)
+        require_not_negative(bias_sd_mm_s2=self.bias_sd_mm_s2)
         SquaredExponential(self.signal_variance_mm2, self.inverse_scale_s2)
+        for name, sensor in self.sensors.items():
+            if sensor.latency_s > self.horizon_s:
+                raise ValueError(
+                    f"horizon_s must cover the latency of every sensor: {name} is {sensor.latency_s} s late, "
+                    f"horizon_s is {self.horizon_s}"
+                )
 
     @cached_property
     def _kernel(self) -> SquaredExponential:
         return SquaredExponential(self.signal_variance_mm2, self.inverse_scale_s2)
 
-    def gains(self, lag: FloatArray, order: IntArray, noise_variance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    @cached_property
+    def _tracker(self) -> str:
+        return position_sensor(self.sensors)
+
+    @property
+    def _dimension(self) -> int:
+        return self.sensors[self._tracker].dimension
+
+    def _terms(self, name: str) -> tuple[Term, ...]:
+        """What a sensor observes, with the paper's second difference where it is asked for."""
+        sensor = self.sensors[name]
+        if sensor.order != _ACCELERATION or self.derivative == "exact":
+            return sensor.terms
+        step = self.difference_step_s
+        return tuple(Term(weight / step**2, 0, at * step) for weight, at in ((1.0, -1), (-2.0, 0), (1.0, 1)))
+
+    def gains(self, lag: FloatArray, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         """The weights of the readings in the estimate of "now", and its variance (eqs. 23 and 24).
 
-        `lag` (…, m) is each reading's time minus now in s, `order` (m,) its derivative, `noise_variance` (m,).
-        Returns weights (…, m) and variance (…). With the constant mean the weights of positions sum to 1.
+        `lag` (…, m) is each reading's time minus now in s, `names` the m sensors. Returns weights (…, m) and variance
+        (…). With a constant mean the weights of positions sum to 1.
         """
-        kernel = self._kernel
+        terms = [(row, term) for row, name in enumerate(names) for term in self._terms(name)]
+        owner = np.array([row for row, _ in terms])
+        order = np.array([term.derivative for _, term in terms])
+        weight = np.array([term.weight for _, term in terms])
+        at = lag[..., owner] + np.array([term.at_s for _, term in terms])
         now, zero = np.zeros((*lag.shape[:-1], 1)), np.zeros(1, np.int64)
-        among = kernel.covariance(lag, order, lag, order) + np.diag(noise_variance)
-        with_now = kernel.covariance(lag, order, now, zero)
-        constant = np.broadcast_to(np.where(order == 0, 1.0, 0.0)[:, None], with_now.shape)
-        solved = np.linalg.solve(among, np.concatenate([with_now, constant], axis=-1))
-        weights, constant_weights = solved[..., 0], solved[..., 1]
-        variance = self.signal_variance_mm2 - np.sum(with_now[..., 0] * weights, axis=-1)
+        among = self._kernel.covariance(at, order, at, order)
+        with_now = self._kernel.covariance(at, order, now, zero)
+        observe = np.zeros((len(names), len(terms)))
+        observe[owner, np.arange(len(terms))] = weight
+        if not np.array_equal(observe, np.eye(len(names))):
+            among, with_now = observe @ among @ observe.T, observe @ with_now
+        constant = observe @ (order == 0)
+        solved = self._solved(among + self._noise(names), with_now, constant)
+        return self._with_mean(*solved, with_now[..., 0], constant, names)
+
+    def _noise(self, names: Sequence[str]) -> FloatArray:
+        """The readings' own covariance: noise, and what an accelerometer's bias makes its readings share."""
+        noise: FloatArray = np.diag([self.sensors[name].noise_sd ** 2 for name in names]).astype(np.float64)
+        if self.bias_sd_mm_s2 > 0:
+            for biased in {name for name in names if self.sensors[name].order == _ACCELERATION}:
+                mask = np.array([name == biased for name in names])
+                noise += self.bias_sd_mm_s2**2 * np.outer(mask, mask)
+        return noise
+
+    @staticmethod
+    def _solved(among: FloatArray, with_now: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
+        columns = np.broadcast_to(constant[:, None], with_now.shape)
+        solved = np.linalg.solve(among, np.concatenate([with_now, columns], axis=-1))
+        return solved[..., 0], solved[..., 1]
+
+    def _with_mean(
+        self,
+        weights: FloatArray,
+        constant_weights: FloatArray,
+        with_now: FloatArray,
+        constant: FloatArray,
+        names: Sequence[str],
+    ) -> tuple[FloatArray, FloatArray]:
+        """Weights and variance with what the prior's mean adds to them."""
+        variance = self.signal_variance_mm2 - np.sum(with_now * weights, axis=-1)
+        missing = 1.0 - weights @ constant
         if self.mean == "constant":
-            missing = 1.0 - np.sum(constant[..., 0] * weights, axis=-1)
-            precision = np.sum(constant[..., 0] * constant_weights, axis=-1)
+            precision = constant_weights @ constant
             weights = weights + constant_weights * (missing / precision)[..., None]
             variance = variance + missing**2 / precision
+        elif self.mean == "window":
+            is_position = np.array([name == self._tracker for name in names])
+            weights = weights + missing[..., None] * (is_position / is_position.sum())
         return weights, variance
 
     def start(self) -> Window:
@@ -85,7 +164,8 @@ class WindowGP:
         """The window with one more reading; a reading of a sensor not in use changes nothing."""
         if sensor not in self.sensors:
             return state
-        if self.sensors[sensor].order != 0:
+        require_reading(sensor, self.sensors[sensor], sample)
+        if sensor != self._tracker:
             return self._trimmed(replace(state, others=(*state.others, (sensor, sample))), sample.arrival)
         positions = sorted((*state.positions, sample), key=lambda reading: reading.time)
         return self._trimmed(replace(state, positions=tuple(positions[-self.window :])), sample.arrival)
@@ -103,70 +183,172 @@ class WindowGP:
 
     def predict(self, state: Window, time: float) -> tuple[FloatArray, FloatArray]:
         """The position at `time`, from the window."""
-        dimension = self.sensors[position_sensor(self.sensors)].dimension
         if not state.positions:
-            return unknown(dimension)
+            return unknown(self._dimension)
         since = max(state.positions[0].time, time - self.horizon_s)
-        others = [other for other in state.others if other[1].time >= since]
-        readings = [*state.positions, *(sample for _, sample in others)]
-        sensors = [self.sensors[position_sensor(self.sensors)]] * len(state.positions)
-        sensors += [self.sensors[name] for name, _ in others]
-        lag = np.array([reading.time - time for reading in readings])
-        order = np.array([sensor.order for sensor in sensors])
-        weights, variance = self.gains(lag, order, np.array([sensor.noise_sd**2 for sensor in sensors]))
-        origin = state.positions[-1].value if self.mean == "constant" else np.zeros(dimension)
-        values = np.array([reading.value for reading in readings])
-        mean = origin + weights @ (values - np.where(order == 0, 1.0, 0.0)[:, None] * origin)
-        return mean, np.full(dimension, np.sqrt(variance))
+        readings = [(self._tracker, sample) for sample in state.positions]
+        readings += [(name, sample) for name, sample in state.others if sample.time >= since]
+        mean, sd = np.empty(self._dimension), np.empty(self._dimension)
+        origin = state.positions[-1].value if self.mean != "zero" else np.zeros(self._dimension)
+        for axes in self._alike:
+            chosen = [(name, sample) for name, sample in readings if axes[0] in self._sees[name]]
+            names = tuple(name for name, _ in chosen)
+            weights, variance = self._weights(names, np.array([sample.time for _, sample in chosen]), time)
+            constant = np.array([self._constant[name] for name in names])
+            for axis in axes:
+                values = np.array([sample.value[self._sees[name].index(axis)] for name, sample in chosen])
+                mean[axis] = origin[axis] + weights @ (values - constant * origin[axis])
+                sd[axis] = np.sqrt(variance)
+        return mean, sd
+
+    @cached_property
+    def _sees(self) -> dict[str, tuple[int, ...]]:
+        return {name: sensor.sees(self._dimension) for name, sensor in self.sensors.items()}
+
+    @cached_property
+    def _constant(self) -> dict[str, float]:
+        """What each sensor reads of a hand that stays at 1 mm."""
+        return {name: sum(t.weight for t in self._terms(name) if t.derivative == 0) for name in self.sensors}
+
+    @cached_property
+    def _alike(self) -> list[list[int]]:
+        """Axes that the same sensors see, and that therefore have the same weights."""
+        groups: dict[tuple[str, ...], list[int]] = {}
+        for axis in range(self._dimension):
+            groups.setdefault(tuple(name for name, axes in self._sees.items() if axis in axes), []).append(axis)
+        return list(groups.values())
+
+    def _weights(self, names: tuple[str, ...], measured: FloatArray, now: float) -> tuple[FloatArray, FloatArray]:
+        """Weights and variance of one window: those of its pattern where it is regular."""
+        if self._regular_names is not None:
+            n_positions = names.count(self._tracker)
+            rates = [float(self.sensors[name].rate_hz or 0.0) for name in self._regular_names]
+            if window_steps.is_regular(measured, n_positions, rates[0], rates[-1]):
+                newest = int(window_steps.in_ns(now - measured[n_positions - 1]))
+                last = int(window_steps.in_ns(now - measured[-1])) if len(names) > n_positions else 0
+                return self._of_pattern((n_positions, len(names) - n_positions, newest, last))
+        return self.gains(measured - now, names)
+
+    @cached_property
+    def _regular_names(self) -> tuple[str, ...] | None:
+        """The tracker and the one other sensor, if they are all and have rates; None where paths do not differ."""
+        names = (self._tracker, *(name for name in self.sensors if name != self._tracker))
+        rated = all(sensor.rate_hz is not None for sensor in self.sensors.values())
+        return names if self.path == "auto" and len(names) <= 2 and rated and len(self._alike) == 1 else None
+
+    @cached_property
+    def _patterns(self) -> dict[Pattern, tuple[FloatArray, FloatArray]]:
+        return {}
+
+    def _of_pattern(self, pattern: Pattern) -> tuple[FloatArray, FloatArray]:
+        """Weights and variance of a regular window, remembered: they depend on nothing else."""
+        found = self._patterns.get(pattern)
+        if found is None:
+            names = self._regular_names or ()
+            n_positions, n_others, newest, last = pattern
+            lag = -newest * 1e-9 - np.arange(n_positions)[::-1] / float(self.sensors[names[0]].rate_hz or 1.0)
+            if n_others:
+                steps = np.arange(n_others)[::-1] / float(self.sensors[names[-1]].rate_hz or 1.0)
+                lag = np.concatenate([lag, -last * 1e-9 - steps])
+            found = self.gains(lag, (names[0],) * n_positions + (names[-1],) * n_others)
+            if len(self._patterns) < _MOST_PATTERNS:
+                self._patterns[pattern] = found
+        return found
+
+    @cached_property
+    def _stacked(self) -> dict[bytes, tuple[FloatArray, FloatArray]]:
+        return {}
+
+    def _of_patterns(self, patterns: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Weights (k, m), padded with zeros, and SDs (k,) of regular windows; the sets met before are remembered."""
+        key = patterns.tobytes()
+        found = self._stacked.get(key)
+        if found is None:
+            weights = np.zeros((len(patterns), int(patterns[:, :2].sum(axis=1).max(initial=1))))
+            spread = np.empty(len(patterns))
+            for row, (n_positions, n_others, newest, last) in enumerate(patterns.tolist()):
+                one, variance = self._of_pattern((n_positions, n_others, newest, last))
+                weights[row, : len(one)], spread[row] = one, np.sqrt(variance)
+            found = weights, spread
+            if len(self._stacked) < _MOST_SETS:
+                self._stacked[key] = found
+        return found
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-        """All windows of equal size at once; streams whose readings overtake each other take the plain loop."""
+        """All windows at once; streams whose readings overtake each other, or are many, take the plain loop."""
+        require_readings(self.sensors, samples)
         used = {name: samples[name] for name in self.sensors if name in samples}
-        names = [name for name in used if self.sensors[name].order != 0]
-        in_order = all(np.all(np.diff(stream.time) >= 0) for stream in used.values())
-        if not in_order or len(names) > 1 or len(used) - len(names) != 1:
+        names = [name for name in used if name != self._tracker]
+        in_order = all(np.all(stream.time[1:] >= stream.time[:-1]) for stream in used.values())
+        if not in_order or len(names) > 1 or self._tracker not in used or len(self._alike) > 1:
             return replay_loop(self, samples, times)
-        tracker = self.sensors[position_sensor(self.sensors)]
-        mean = np.full((len(times), tracker.dimension), np.nan)
-        variance = np.full(len(times), np.nan)
-        for rows, lag, values, order, noise_variance in self._windows(used, names, times):
-            weights, variance[rows] = self.gains(lag, order, noise_variance)
-            is_position = np.where(order == 0, 1.0, 0.0)[None, :, None]
-            newest = values[:, order == 0][:, -1]
-            origin = newest if self.mean == "constant" else np.zeros_like(newest)
-            centred = values - is_position * origin[:, None, :]
+        times = np.asarray(times, dtype=np.float64)
+        frames = used[self._tracker]
+        others = used[names[0]] if names else Samples(np.empty(0), np.empty(0), np.empty((0, self._dimension)))
+        spans = window_steps.spans(
+            times, frames.time, frames.arrival, others.time, others.arrival, self.window, self.horizon_s
+        )
+        mean = np.full((len(times), self._dimension), np.nan)
+        sd = np.full((len(times), self._dimension), np.nan)
+        left = np.flatnonzero(spans[1] > 0)
+        if self._regular_names is not None and len(self._regular_names) == len(used):
+            left = self._regular_windows(frames, others, times, spans, mean, sd)
+        for rows, weights, variance, values, constant in self._windows(frames, others, names, times, spans, left):
+            newest = frames.value[spans[1, rows] - 1]
+            origin = newest if self.mean != "zero" else np.zeros_like(newest)
+            centred = values - constant[None, :, None] * origin[:, None, :]
             mean[rows] = origin + (weights[:, None, :] @ centred)[:, 0]
-        return Track(times, mean, np.repeat(np.sqrt(variance)[:, None], tracker.dimension, axis=1))
+            sd[rows] = np.sqrt(variance)[:, None]
+        return Track(times, mean, sd)
+
+    def _regular_windows(
+        self,
+        frames: Samples,
+        others: Samples,
+        times: FloatArray,
+        spans: IntArray,
+        mean: FloatArray,
+        sd: FloatArray,
+    ) -> IntArray:
+        """Fills the rows of regular windows by the weights of their patterns; returns the rows that are left."""
+        names = self._regular_names or ()
+        rates = [float(self.sensors[name].rate_hz or 1.0) for name in names]
+        which, patterns = window_steps.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
+        weights, spread = self._of_patterns(patterns)
+        window_steps.apply(
+            which,
+            spans,
+            weights,
+            spread,
+            np.ascontiguousarray(frames.value.T, dtype=np.float64),
+            np.ascontiguousarray(others.value.T, dtype=np.float64),
+            mean,
+            sd,
+        )
+        return np.flatnonzero((which < 0) & (spans[1] > 0))
 
     def _windows(
-        self, used: Mapping[str, Samples], names: list[str], times: FloatArray
-    ) -> Iterator[tuple[IntArray, FloatArray, FloatArray, IntArray, FloatArray]]:
-        """Groups of windows of one size: rows of `times`, lags (k, m), values (k, m, d), order (m,), noise (m,)."""
-        frames = used[position_sensor(self.sensors)]
-        tracker = self.sensors[position_sensor(self.sensors)]
-        last = np.searchsorted(frames.arrival, times, side="right")
-        first = np.maximum(last - self.window, 0)
-        known = np.flatnonzero(last > 0)
-        begin, end = np.zeros(len(times), np.int64), np.zeros(len(times), np.int64)
-        if names:
-            other = used[names[0]]
-            since = np.maximum(frames.time[np.minimum(first, len(frames) - 1)], times - self.horizon_s)
-            end = np.searchsorted(other.arrival, times, side="right")
-            begin = np.minimum(np.searchsorted(other.time, since, side="left"), end)
-        sizes = np.stack([last - first, end - begin], axis=1)[known]
+        self,
+        frames: Samples,
+        others: Samples,
+        names: list[str],
+        times: FloatArray,
+        spans: IntArray,
+        wanted: IntArray,
+    ) -> Iterator[tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]]:
+        """Groups of windows of one size: rows of `times`, weights (k, m), variances, values (k, m, d), constants."""
+        first, last, begin, end = spans
+        sizes = np.stack([last - first, end - begin], axis=1)[wanted]
         for n_positions, n_others in np.unique(sizes, axis=0):
-            group = known[(sizes[:, 0] == n_positions) & (sizes[:, 1] == n_others)]
-            order, noise_variance = np.zeros(n_positions, np.int64), np.full(n_positions, tracker.noise_sd**2)
-            if n_others:
-                sensor = self.sensors[names[0]]
-                order = np.append(order, np.full(n_others, sensor.order))
-                noise_variance = np.append(noise_variance, np.full(n_others, sensor.noise_sd**2))
-            step = max(1, int(_CHUNK_NUMBERS // len(order) ** 2))
+            group = wanted[(sizes[:, 0] == n_positions) & (sizes[:, 1] == n_others)]
+            sensors = [self._tracker] * n_positions + names * n_others
+            constant = np.array([self._constant[name] for name in sensors])
+            step = max(1, int(_CHUNK_NUMBERS // len(sensors) ** 2))
             for rows in np.split(group, np.arange(step, len(group), step)):
                 picked = first[rows, None] + np.arange(n_positions)
                 time, values = frames.time[picked], frames.value[picked]
                 if n_others:
                     picked = begin[rows, None] + np.arange(n_others)
-                    time = np.concatenate([time, other.time[picked]], axis=1)
-                    values = np.concatenate([values, other.value[picked]], axis=1)
-                yield rows, time - times[rows, None], values, order, noise_variance
+                    time = np.concatenate([time, others.time[picked]], axis=1)
+                    values = np.concatenate([values, others.value[picked]], axis=1)
+                yield rows, *self.gains(time - times[rows, None], sensors), values, constant

@@ -55,6 +55,19 @@ def check(
 
 
 @app.command()
+def fit(
+    studies: Studies,
+    first: Annotated[float, typer.Option(min=5, metavar="S", help="Seconds of each session to fit on.")] = 30.0,
+    jobs: Jobs = None,
+    cache: CacheFolder = None,
+) -> None:
+    """Say what a study's recordings tell of its noise, latency and other parameters, as lines for study.yaml."""
+    from pipeline.commands import fit as command
+
+    command.fit_studies(studies, first, jobs, cache)
+
+
+@app.command()
 def simulate(studies: Studies) -> None:
     """Write the logs of a study's `simulation:` block into the study folder."""
     from pipeline.commands import simulate as command

@@ -1,29 +1,55 @@
-"""A session's tables as fusion_core knows them: sensors, samples, the reference, and the instants to be shown at."""
+"""A session's tables as fusion_core knows them: samples, the reference, and the instants to be shown at."""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields
-from functools import cache
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from fusion_core import ESTIMATORS, Estimator, FloatArray, Samples, Sensor
-from fusion_core.alignment import rotate, tracker_acceleration
+from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, Track, smooth
+from fusion_core.alignment import nearest, rotate
+from fusion_core.calibration import Body
 from pipeline import tables
-from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study import AccelerationStream, PositionStream, ReferenceStream, Study
+from pipeline.estimators import build_estimator, sensor, sensors
+from pipeline.phone import Phone, aligned, phone
+from pipeline.study import (
+    AccelerationStream,
+    DisplayStream,
+    LinearStream,
+    ReferenceStream,
+    Stream,
+    Study,
+    VelocityStream,
+)
+
+SMOOTHED = "smoothed"  # the name of the reference that a study without one gets
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Mounted:
+    """What is known of a phone's mounting from `from_s` on: samples that take it into account.
+
+    Positions are those of the accelerometer; `arm_mm` (n, d) at `time` leads from it back to what the tracker sees.
+    """
+
+    from_s: float
+    imu: str
+    samples: dict[str, Samples]
+    time: FloatArray
+    arm_mm: FloatArray
 
 
 @dataclass(frozen=True)
 class Recording:
     """One session. Times are seconds since `origin_ns`; `times` are the instants every estimator is asked for.
 
-    `samples` holds the sensors, the analysed axes only; `reference` is in the tracker's frame and clock.
+    `samples` holds the sensors, the analysed axes only; `reference` is in the tracker's frame and clock; `phones` says
+    where orientations came from.
     """
 
     origin_ns: int
@@ -31,6 +57,8 @@ class Recording:
     times: FloatArray
     reference: Samples | None
     display: Samples | None
+    phones: dict[str, Phone] = field(default_factory=dict)
+    mounted: Mounted | None = None
 
     def to_ns(self, time: FloatArray) -> np.ndarray[Any, np.dtype[np.int64]]:
         """Seconds since the origin as the tables' nanoseconds."""
@@ -39,44 +67,142 @@ class Recording:
 
 def load(study: Study, entry: Path) -> Recording:
     """A session's recording from its ingested tables."""
-    positions, imu = tables.read("positions", entry), tables.read("imu", entry)
-    stamps = pd.concat([positions["arrival_ns"], imu["arrival_ns"]])
+    imu = tables.read("imu", entry)
+    others = {name: tables.read(name, entry) for name in ("positions", "readings")}
+    stamps = pd.concat([others["positions"]["arrival_ns"], imu["arrival_ns"]])
     origin_ns = int(stamps.min()) if len(stamps) else 0
-    axes = ["xyz".index(axis) for axis in study.axes]
-    samples: dict[str, Samples] = {}
-    reference = display = None
+    whole: dict[str, Samples] = {}
     for name, stream in study.streams.items():
-        rows = imu if stream.kind == "acceleration" else positions
-        rows = rows[rows["stream"] == name]
-        if isinstance(stream, AccelerationStream):
-            samples[name] = _accelerations(rows, stream, origin_ns, axes)
-            continue
-        value = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(np.float64)
-        if isinstance(stream, ReferenceStream) and len(value):
-            value = rotate(np.array(stream.rotation_xyzw), value) + np.array(stream.translation_mm)
-        late = stream.stamp == "arrival" or stream.kind != "position"
-        read = _samples(rows, value[:, axes], origin_ns, stream.latency_s if late else 0.0)
-        if isinstance(stream, PositionStream):
-            samples[name] = read
-        elif isinstance(stream, ReferenceStream):
-            reference = read if len(read) else None
-        else:
-            display = read if len(read) else None
-    return Recording(origin_ns, samples, _instants(study, imu, positions, origin_ns), reference, display)
+        if not isinstance(stream, AccelerationStream):
+            rows = others["readings" if isinstance(stream, VelocityStream | LinearStream) else "positions"]
+            whole[name] = _vectors(rows[rows["stream"] == name], stream, origin_ns)
+    phones = _phones(study, imu, origin_ns, whole)
+    samples = {
+        name: _of_axes(phones[name].body.acceleration() if name in phones else whole[name], study, name)
+        for name in study.sensor_streams
+    }
+    return Recording(
+        origin_ns,
+        samples,
+        _instants(study, imu, others["positions"], origin_ns),
+        _only(study, ReferenceStream, whole),
+        _only(study, DisplayStream, whole),
+        phones,
+        _mounted(study, samples, whole, phones),
+    )
 
 
-def _samples(rows: pd.DataFrame, value: FloatArray, origin_ns: int, latency_s: float) -> Samples:
+def _vectors(rows: pd.DataFrame, stream: Stream, origin_ns: int) -> Samples:
+    """All three axes of a stream of vectors, in the tracker's frame and clock."""
+    columns = ["x_mm", "y_mm", "z_mm"] if "x_mm" in rows else list(_AXES)
+    value = rows[columns].to_numpy(np.float64)
+    if isinstance(stream, ReferenceStream) and len(value):
+        value = rotate(np.array(stream.rotation_xyzw), value) + np.array(stream.translation_mm)
+    late = stream.stamp == "arrival" or stream.kind in ("reference", "display")
+    return tables.samples(*_times(rows, stream.latency_s if late else 0.0), value, origin_ns)
+
+
+def _times(rows: pd.DataFrame, latency_s: float) -> tuple[Any, Any]:
     time_ns, arrival_ns = rows["time_ns"].to_numpy(np.int64), rows["arrival_ns"].to_numpy(np.int64)
-    return tables.samples(time_ns - round(latency_s / tables.NANOSECONDS), arrival_ns, value, origin_ns)
+    return time_ns - round(latency_s / tables.NANOSECONDS), arrival_ns
 
 
-def _accelerations(rows: pd.DataFrame, stream: AccelerationStream, origin_ns: int, axes: list[int]) -> Samples:
-    """In the tracker frame; those of unknown orientation are left out (the table `quality` counts them)."""
-    known = rows[rows["qw"].notna()]
-    force = known[["ax_mm_s2", "ay_mm_s2", "az_mm_s2"]].to_numpy(np.float64)
-    turn = known[["qx", "qy", "qz", "qw"]].to_numpy(np.float64)
-    value = tracker_acceleration(force, turn, np.array(stream.gravity_mm_s2))
-    return _samples(known, value[:, axes], origin_ns, stream.latency_s if stream.stamp == "arrival" else 0.0)
+def _phones(study: Study, imu: pd.DataFrame, origin_ns: int, whole: dict[str, Samples]) -> dict[str, Phone]:
+    """Every stream of accelerations, all three axes."""
+    tracker = None
+    if study.tracker is not None:
+        tracker = whole[study.tracker], _of_space(sensor(study, study.sensor_streams[study.tracker]))
+    found = {}
+    for name, stream in study.sensor_streams.items():
+        if isinstance(stream, AccelerationStream):
+            rows = imu[imu["stream"] == name]
+            time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamp == "arrival" else 0.0)
+            times = (time_ns - origin_ns) * tables.NANOSECONDS, (arrival_ns - origin_ns) * tables.NANOSECONDS
+            imu_readings = phone(rows, times, _of_space(sensor(study, stream)))
+            logged = rows[["qx", "qy", "qz", "qw"]].to_numpy(np.float64)
+            found[name] = aligned(imu_readings, logged, stream, tracker)
+    return found
+
+
+def _of_space(of_axes: Sensor) -> Sensor:
+    """The sensor of all three axes."""
+    return Sensor(of_axes.operator, of_axes.noise_sd, of_axes.latency_s, 3, of_axes.rate_hz)
+
+
+def _of_axes(samples: Samples, study: Study, name: str) -> Samples:
+    """A sensor's readings, its own axes of those that are analysed."""
+    index = [_AXES.index(axis) for axis in study.axes_of(name)]
+    rotation = None if samples.rotation is None else samples.rotation[:, index]
+    return Samples(samples.time, samples.arrival, samples.value[:, index], rotation)
+
+
+def _only(study: Study, kind: type, whole: dict[str, Samples]) -> Samples | None:
+    """The one stream of a kind, of the analysed axes; None where there is none, or it is empty."""
+    index = [_AXES.index(axis) for axis in study.axes]
+    for name, stream in study.streams.items():
+        if isinstance(stream, kind) and len(whole[name]):
+            return Samples(whole[name].time, whole[name].arrival, whole[name].value[:, index])
+    return None
+
+
+def _mounted(
+    study: Study, samples: dict[str, Samples], whole: dict[str, Samples], phones: dict[str, Phone]
+) -> Mounted | None:
+    """The samples as they are once the mounting of the first phone that says so is known."""
+    for name, found in phones.items():
+        if found.calibrated is None or found.lever_arm_mm is None:
+            continue
+        index = [_AXES.index(axis) for axis in study.axes]
+        arm = found.calibrated.rotation @ found.lever_arm_mm
+        corrected = dict(samples)
+        corrected[name] = _of_axes(found.calibrated.acceleration(), study, name)
+        for stream, sensing in study.sensor_streams.items():
+            if sensing.kind == "position":
+                moved = _less(whole[stream], found.calibrated, arm)
+                corrected[stream] = _of_axes(moved, study, stream)
+        return Mounted(found.mounted_from_s, name, corrected, found.calibrated.time, arm[:, index])
+    return None
+
+
+def _less(positions: Samples, body: Body, arm: FloatArray) -> Samples:
+    """Positions less the lever arm as the body held it when each was measured."""
+    value = positions.value - arm[nearest(body.time, positions.time)]
+    return Samples(positions.time, positions.arrival, value)
+
+
+def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track:
+    """What the study's estimator of that name would have shown at `times`, which rise."""
+    estimator: Estimator = build_estimator(study, name)
+    track = estimator.replay(loaded.samples, times)
+    known = loaded.mounted
+    if known is None or known.imu not in estimator.sensors or not np.any(times > known.from_s):
+        return track
+    after = times > known.from_s
+    better = estimator.replay(known.samples, times[after])
+    mean, sd = track.mean.copy(), track.sd.copy()
+    mean[after] = better.mean + known.arm_mm[nearest(known.time, times[after])]
+    sd[after] = better.sd
+    return Track(times, mean, sd)
+
+
+def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
+    """What estimates are held against, and its name: the recorded reference, else all readings smoothed."""
+    recorded = study.stream_of_kind("reference")
+    if recorded is not None:
+        return None if loaded.reference is None else (recorded, loaded.reference)
+    if study.tracker is None or not study.estimators or not len(loaded.samples[study.tracker]):
+        return None
+    fixed = loaded.mounted if loaded.mounted is not None and loaded.mounted.from_s == -np.inf else None
+    found = smooth(FusionKalman(_in_time(study)), fixed.samples if fixed else loaded.samples, loaded.times)
+    value = found.mean + (fixed.arm_mm[nearest(fixed.time, loaded.times)] if fixed else 0.0)
+    known = np.isfinite(value).all(axis=1)
+    return SMOOTHED, Samples(loaded.times[known], loaded.times[known], value[known])
+
+
+def _in_time(study: Study) -> dict[str, Sensor]:
+    """The sensors that observe one moment at a time, as a Kalman filter needs them."""
+    found = sensors(study)
+    return {name: one for name, one in found.items() if not any(term.at_s for term in one.terms)}
 
 
 def _instants(study: Study, imu: pd.DataFrame, positions: pd.DataFrame, origin_ns: int) -> FloatArray:
@@ -86,61 +212,6 @@ def _instants(study: Study, imu: pd.DataFrame, positions: pd.DataFrame, origin_n
     arrival = np.unique(rows["arrival_ns"].to_numpy(np.int64))
     times: FloatArray = (arrival - origin_ns) * tables.NANOSECONDS
     return times
-
-
-def sensors(study: Study) -> dict[str, Sensor]:
-    """The study's sensors by stream name, of the analysed axes."""
-    return {
-        name: Sensor(
-            "position" if isinstance(stream, PositionStream) else "acceleration",
-            stream.noise_sd_mm if isinstance(stream, PositionStream) else stream.noise_sd_mm_s2,
-            stream.latency_s,
-            len(study.axes),
-        )
-        for name, stream in study.sensor_streams.items()
-    }
-
-
-def build_estimator(study: Study, name: str) -> Estimator:
-    """The study's estimator of that name; PipelineError that says which key or value is wrong."""
-    settings = study.estimators[name]
-    where = f"study.yaml: estimators.{name}"
-    if settings.type not in ESTIMATORS:
-        raise PipelineError(f'{where}: type "{settings.type}" is not known{did_you_mean(settings.type, ESTIMATORS)}')
-    kind = ESTIMATORS[settings.type]
-    types = {field.name: field.type for field in fields(kind) if field.name != "sensors"}
-    used = {n: s for n, s in sensors(study).items() if settings.use is None or n in settings.use}
-    parameters = {}
-    for key, value in settings.parameters.items():
-        if key not in types:
-            raise PipelineError(f'{where}: unknown key "{key}"{did_you_mean(key, types)}')
-        parameters[key] = _converted(kind, key, value, where)
-    try:
-        return kind(used, **parameters)
-    except ValueError as error:
-        raise PipelineError(f"{where}: {error}") from None
-
-
-@cache
-def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
-    """What turns a parameter of study.yaml into the type its dataclass states."""
-    from typing import get_type_hints
-
-    strict = ConfigDict(allow_inf_nan=False)
-    hints = get_type_hints(kind)
-    return {
-        field.name: TypeAdapter(hints[field.name], config=strict) for field in fields(kind) if field.name != "sensors"
-    }
-
-
-def _converted(kind: type, key: str, value: Any, where: str) -> Any:
-    if isinstance(value, bool):
-        raise PipelineError(f'{where}: "{key}": should not be {str(value).lower()}')
-    try:
-        return _adapters(kind)[key].validate_python(value)
-    except ValidationError as error:
-        fault = error.errors()[0]["msg"]
-        raise PipelineError(f'{where}: "{key}": {fault[0].lower()}{fault[1:]} (found {value!r})') from None
 
 
 def seeded(*names: str) -> np.random.Generator:

@@ -21,6 +21,7 @@ LISTS = (
     "quality",
     "exclusions",
     "sensor_noise",
+    "phones",
     "shown_at_selection",
     "accuracy_means",
     "printed",

@@ -47,19 +47,70 @@ class _Stream(Frozen):
     latency_s: Seconds = 0.0
 
 
-class PositionStream(_Stream):
+Axis = Literal["x", "y", "z"]
+Axes = Annotated[tuple[Axis, ...], Field(min_length=1)]
+
+
+class _Sensor(_Stream):
+    rate_hz: Positive | None = None
+
+
+class PositionStream(_Sensor):
     """A tracker. `stamp: arrival` says that it stamps on delivery: measured at stamp − latency_s."""
 
     kind: Literal["position"]
     noise_sd_mm: Positive = 8.0
+    axes: Axes | None = None
 
 
-class AccelerationStream(_Stream):
-    """A phone's IMU: body-frame specific force, turned into the tracker frame by the orientation in the log."""
+class VelocityStream(_Sensor):
+    """A sensor of the hand's velocity, such as optical flow."""
+
+    kind: Literal["velocity"]
+    noise_sd_mm_s: Positive
+    axes: Axes | None = None
+
+
+class OperatorTerm(Frozen):
+    """`weight` times a derivative of the position, `at_s` after the reading's own time."""
+
+    weight: Finite
+    derivative: Annotated[int, Field(ge=0, le=2)] = 0
+    at_s: Finite = 0.0
+
+
+class LinearStream(_Sensor):
+    """A sensor of a sum of terms: an operator of the user's own."""
+
+    kind: Literal["linear"]
+    noise_sd: Positive
+    operator: Annotated[tuple[OperatorTerm, ...], Field(min_length=1)]
+    axes: Axes | None = None
+
+
+class AccelerationStream(_Sensor):
+    """A phone's IMU: body-frame specific force, turned into the tracker frame by its orientation.
+
+    How it is mounted is given (`mounting_xyzw`, `lever_arm_mm`), or learned from each session's first `calibrate_s`.
+    """
 
     kind: Literal["acceleration"]
     gravity_mm_s2: Vector
     noise_sd_mm_s2: Positive = 100.0
+    mounting_xyzw: tuple[Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 1.0)
+    lever_arm_mm: Vector = (0.0, 0.0, 0.0)
+    calibrate_s: Seconds = 0.0
+
+    @model_validator(mode="after")
+    def _one_way(self) -> AccelerationStream:
+        if not sum(part**2 for part in self.mounting_xyzw) > 0:
+            raise ValueError("mounting_xyzw is all zeros; no rotation is [0, 0, 0, 1]")
+        if not sum(part**2 for part in self.gravity_mm_s2) > 0:
+            raise ValueError("gravity_mm_s2 is all zeros; at rest it is some 9807 mm/s² downwards")
+        given = any(self.mounting_xyzw[:3]) or any(self.lever_arm_mm)
+        if self.calibrate_s and given:
+            raise ValueError("gives mounting_xyzw or lever_arm_mm, and calibrate_s to learn them; keep one")
+        return self
 
 
 class ReferenceStream(_Stream):
@@ -82,7 +133,19 @@ class DisplayStream(_Stream):
     kind: Literal["display"]
 
 
-Stream = Annotated[PositionStream | AccelerationStream | ReferenceStream | DisplayStream, Field(discriminator="kind")]
+Sensing = PositionStream | VelocityStream | LinearStream | AccelerationStream
+Stream = Annotated[
+    PositionStream | VelocityStream | LinearStream | AccelerationStream | ReferenceStream | DisplayStream,
+    Field(discriminator="kind"),
+]
+KINDS: dict[object, type[Frozen]] = {
+    "position": PositionStream,
+    "velocity": VelocityStream,
+    "linear": LinearStream,
+    "acceleration": AccelerationStream,
+    "reference": ReferenceStream,
+    "display": DisplayStream,
+}
 
 
 class Events(Frozen):
@@ -160,7 +223,7 @@ class Study(Frozen):
     conditions: Annotated[tuple[Id, ...], Field(min_length=1)]
     participants: str | None = None
     sessions: str | None = None
-    axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
+    axes: Axes = ("x", "y", "z")
     streams: Mapping[str, Stream] = {}
     events: Events | None = None
     display: Display | None = None
@@ -193,6 +256,7 @@ class Study(Frozen):
                 raise ValueError(f'comparisons: within of "{comparison.measure}" needs "condition", and no name twice')
             if len(comparison.within) > 3 or (len(comparison.within) > 1 and comparison.test != "rm_anova"):
                 raise ValueError(f"comparisons: {comparison.test} does not take within: {list(comparison.within)}")
+        self._sensors_fit()
         for kind in ("reference", "display"):
             named = [name for name, stream in self.streams.items() if stream.kind == kind]
             if len(named) > 1:
@@ -203,10 +267,31 @@ class Study(Frozen):
             raise ValueError("names no data; give sessions, trials, questionnaires or measures")
         return self
 
+    def _sensors_fit(self) -> None:
+        for name, stream in self.sensor_streams.items():
+            axes = None if isinstance(stream, AccelerationStream) else stream.axes
+            if axes is not None:
+                _unique(f"streams.{name}.axes", axes)
+                for axis in axes:
+                    _known(f"streams.{name}.axes", axis, self.axes)
+            if isinstance(stream, AccelerationStream) and stream.calibrate_s and self.tracker is None:
+                raise ValueError(f"streams.{name}: calibrate_s needs a stream of kind position to learn from")
+
     @property
-    def sensor_streams(self) -> dict[str, PositionStream | AccelerationStream]:
+    def sensor_streams(self) -> dict[str, Sensing]:
         """The streams an estimator may use."""
-        return {n: s for n, s in self.streams.items() if isinstance(s, PositionStream | AccelerationStream)}
+        return {n: s for n, s in self.streams.items() if isinstance(s, Sensing)}
+
+    @property
+    def tracker(self) -> str | None:
+        """The name of the first stream of whole positions."""
+        whole = (n for n, s in self.streams.items() if isinstance(s, PositionStream) and s.axes is None)
+        return next(whole, None)
+
+    def axes_of(self, name: str) -> tuple[str, ...]:
+        """The analysed axes that a sensor's stream sees."""
+        stream = self.sensor_streams[name]
+        return self.axes if isinstance(stream, AccelerationStream) else stream.axes or self.axes
 
     def stream_of_kind(self, kind: str) -> str | None:
         """The name of the first stream of a kind."""
@@ -337,18 +422,14 @@ def parse(model: type[_Model], content: dict[str, Any], path: Path) -> _Model:
 
 def _explained(fault: Any, model: type[BaseModel]) -> str:
     """One fault of pydantic's in the user's words."""
-    location = [
-        part
-        for part in fault["loc"]
-        if part not in ("position", "acceleration", "reference", "display", "reach") or part is fault["loc"][0]
-    ]
+    location = [part for part in fault["loc"] if part not in (*KINDS, "reach") or part is fault["loc"][0]]
     field = ".".join(str(part) for part in location)
     if fault["type"] == "extra_forbidden":
         return f'unknown key "{field}"{did_you_mean(str(location[-1]), _keys_at(model, fault["loc"][:-1]))}'
     if fault["type"] == "missing":
         return f'"{field}" is missing'
     if fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        return f'"{field}" needs a kind: position, acceleration, reference or display'
+        return f'"{field}" needs a kind: {", ".join(str(kind) for kind in KINDS)}'
     message = fault["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
     found = fault.get("input")
@@ -358,12 +439,6 @@ def _explained(fault: Any, model: type[BaseModel]) -> str:
 
 def _keys_at(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
     """The keys that are known where an unknown one stood."""
-    kinds: dict[object, type[BaseModel]] = {
-        "position": PositionStream,
-        "acceleration": AccelerationStream,
-        "reference": ReferenceStream,
-        "display": DisplayStream,
-    }
     nested: dict[object, type[BaseModel]] = {
         "events": Events,
         "display": Display,
@@ -372,7 +447,7 @@ def _keys_at(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
         "simulation": ReachSimulation,
     }
     if location and model is Study:
-        model = kinds[location[-1]] if location[0] == "streams" else nested.get(location[0], model)
+        model = KINDS[location[-1]] if location[0] == "streams" else nested.get(location[0], model)
     return list(model.model_fields)
 
 

@@ -23,6 +23,13 @@ def _schema(*columns: tuple[str, pa.DataType]) -> pa.Schema:
 
 TABLES: Mapping[str, pa.Schema] = {
     "positions": _schema(("session", _TEXT), ("stream", _TEXT), ("time_ns", _TIME), ("arrival_ns", _TIME), *_POSITION),
+    "readings": _schema(
+        ("session", _TEXT),
+        ("stream", _TEXT),
+        ("time_ns", _TIME),
+        ("arrival_ns", _TIME),
+        *[(axis, _FLOAT) for axis in "xyz"],
+    ),
     "imu": _schema(
         ("session", _TEXT),
         ("stream", _TEXT),
@@ -52,6 +59,19 @@ TABLES: Mapping[str, pa.Schema] = {
         ("jitter_ms", _FLOAT),
         ("latency_s", _FLOAT),
         ("note", _TEXT),
+    ),
+    "phones": _schema(
+        ("session", _TEXT),
+        ("stream", _TEXT),
+        ("in_log", _COUNT),
+        ("carried", _COUNT),
+        ("found", _COUNT),
+        ("left_out", _COUNT),
+        ("calibrated_until_s", _FLOAT),
+        *[(f"mounting_{axis}_deg", _FLOAT) for axis in "xyz"],
+        *[(f"mounting_sd_{axis}_deg", _FLOAT) for axis in "xyz"],
+        *[(f"lever_arm_{axis}_mm", _FLOAT) for axis in "xyz"],
+        *[(f"lever_arm_sd_{axis}_mm", _FLOAT) for axis in "xyz"],
     ),
     "tracks": _schema(
         ("session", _TEXT),

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+
+# Workers of the tests share the processors; threads of a numeric library on top of them wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -11,17 +11,7 @@ import yaml
 
 from fusion_core import ESTIMATORS
 from pipeline import tables
-from pipeline.study import (
-    AccelerationStream,
-    Comparison,
-    Display,
-    PositionStream,
-    ReferenceStream,
-    Study,
-    _Stream,
-    load_study,
-    parse,
-)
+from pipeline.study import KINDS, Comparison, Display, Frozen, OperatorTerm, Study, load_study, parse
 from pipeline.study_tables import MEASURE_REQUIRED, MEASURE_RESERVED, RATING_REQUIRED, TRIAL_OPTIONAL, TRIAL_REQUIRED
 from tests.conftest import CLONE
 
@@ -44,7 +34,8 @@ def test_every_key_of_a_study_is_in_the_reference() -> None:
     assert {re.findall(r"`(\w+)`", line)[0] for line in table.splitlines() if line.startswith("| `")} == set(
         Study.model_fields
     )
-    for model in (PositionStream, AccelerationStream, ReferenceStream, _Stream, Display, Comparison):
+    models: list[type[Frozen]] = [*KINDS.values(), OperatorTerm, Display, Comparison]
+    for model in models:
         for key in model.model_fields:
             assert f"`{key}`" in REFERENCE, key
 
@@ -82,9 +73,10 @@ def test_the_example_of_fusion_core_runs() -> None:
 
 
 def test_units_are_in_the_names_of_columns() -> None:
-    bare = {"value", "statistic", "sd", "mean", "median", "residual"}  # in the unit of their measure or stream
+    of_measure, of_stream = {"value", "statistic", "sd", "mean", "median"}, {"residual", "x", "y", "z"}
+    bare = of_measure | of_stream  # in the unit of theirs
     dimensionless = {"p", "p_adjusted", "df1", "df2", "effect_size", "reduction", "coverage_95", "ci_low", "ci_high"}
-    units = ("_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95")
+    units = ("_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95", "_deg")
     for name, schema in tables.TABLES.items():
         for column in schema:
             if str(column.type) == "double" and column.name not in bare | dimensionless:

@@ -12,12 +12,18 @@ from fusion_core import FloatArray, Samples, accuracy
 from pipeline import figures, recording, tables
 from pipeline.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.figures import View
-from pipeline.recording import Recording
+from pipeline.recording import SMOOTHED, Recording
 from pipeline.sections.material import Material, Row
 from pipeline.wording import NOTHING, counted, number, percent, seconds
 
 _VIEW_S = 4.0  # long enough for a reach, short enough to see single frames
 _ROWS_MAX = 120
+
+
+_SMOOTHED = (
+    " Estimates are held against all readings smoothed, before and after each instant, by the fusion filter. That"
+    " leaves out whatever all sensors have wrong together, and is kinder to estimators that resemble it."
+)
 
 
 def section(material: Material) -> Section | None:
@@ -27,6 +33,8 @@ def section(material: Material) -> Section | None:
     rows = material.rows("accuracy")
     blocks: list[Block] = [Paragraph(_method(material))]
     if rows:
+        if any(row["reference"] == SMOOTHED for row in rows):
+            blocks.append(Paragraph((Strong("No reference was recorded."), _SMOOTHED)))
         blocks.append(_summary_table(material, rows))
         blocks.append(_error_figure(material, pd.DataFrame(rows)))
     else:

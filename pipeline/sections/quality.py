@@ -7,7 +7,7 @@ import pandas as pd
 
 from pipeline import figures, tables
 from pipeline.document.model import Block, Column, Paragraph, Section, Table, columns
-from pipeline.sections.material import Material
+from pipeline.sections.material import Material, Row
 from pipeline.wording import NOTHING, counted, measure_label, number
 
 _ROWS_MAX = 120  # a page stays readable; tables/quality.csv has them all
@@ -26,6 +26,10 @@ def section(material: Material) -> Section:
                     ("No session holds a still stretch of a second or more, so the sensors' noise cannot be told.",)
                 )
             )
+    if any(row["in_log"] == 0 or row["carried"] or row["left_out"] for row in material.rows("phones")):
+        blocks.append(_orientation_table(material))
+    if any(row["calibrated_until_s"] is not None for row in material.rows("phones")):
+        blocks.append(_mounting_table(material))
     agreement = material.rows("replay_agreement")
     if agreement:
         blocks.append(_agreement_table(material))
@@ -79,6 +83,52 @@ def _quality_table(material: Material) -> Table:
 
 def _milliseconds(seconds: float | None) -> str:
     return NOTHING if seconds is None else number(1000 * seconds, 0 if seconds >= 0.01 else 1)
+
+
+def _orientation_table(material: Material) -> Table:
+    """Where orientations came from, where not all of them stood in the logs."""
+    cells = tuple(
+        (row["session"], row["stream"], *(f"{row[key]}" for key in ("in_log", "carried", "found", "left_out")))
+        for row in material.rows("phones")[:_ROWS_MAX]
+    )
+    titles = ("Session", "Stream", "In the log", "Carried on", "Found", "Left out")
+    return Table(
+        "orientations",
+        "Where the orientation of each acceleration came from. Carried on: by the gyroscope from the last known one,"
+        " for up to a second. Found: tilt by gyroscope and accelerometer, heading from how the tracker's positions"
+        " move. Left out: not known, so the acceleration was not used.",
+        columns(titles, 2),
+        cells,
+    )
+
+
+def _mounting_table(material: Material) -> Table:
+    """What was learned of each phone's mounting."""
+    learned = [row for row in material.rows("phones") if row["calibrated_until_s"] is not None]
+
+    def three(row: Row, key: str, unit: str, digits: int) -> str:
+        pairs = ((row[f"{key}_{a}_{unit}"], row[f"{key}_sd_{a}_{unit}"]) for a in "xyz")
+        return ", ".join(f"{number(value, digits)} ± {number(1.96 * sd, digits)}" for value, sd in pairs)
+
+    cells = tuple(
+        (
+            row["session"],
+            row["stream"],
+            number(row["calibrated_until_s"], 1),
+            three(row, "mounting", "deg", 1),
+            three(row, "lever_arm", "mm", 0),
+        )
+        for row in learned[:_ROWS_MAX]
+    )
+    titles = ("Session", "Stream", "Learned until (s)", "Mounting error x, y, z (°)", "Lever arm x, y, z (mm)")
+    return Table(
+        "mountings",
+        "How each accelerometer sits on the body that the tracker sees, learned from the beginning of the session and"
+        " used from then on: the small rotation of its axes, and the way from it to the point that is seen, with 95 %"
+        " intervals.",
+        columns(titles, len(titles)),
+        cells,
+    )
 
 
 def _noise(material: Material) -> list[Block]:

@@ -10,11 +10,14 @@ import pandas as pd
 
 from fusion_core import FloatArray, Samples, accuracy, noise
 from pipeline import recording, tables
+from pipeline.estimators import sensors
+from pipeline.phone import described
 from pipeline.recording import Recording
 from pipeline.stage import Outcome, Work
 from pipeline.study import Study
 from pipeline.trials import selections_by_trial
 
+_UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}
 _SETTLED_S = 1.0  # after the first frame's arrival: the grid of accuracy begins there
 Row = dict[str, Any]
 
@@ -27,9 +30,12 @@ def run(work: Work) -> Outcome:
     tracks: dict[str, pd.DataFrame] = {}
     for name, part in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False):
         tracks[str(name)] = part
-    rows = [_accuracy(work, loaded, name, rows) for name, rows in tracks.items()]
+    reference = recording.reference(study, loaded)
+    rows = [_accuracy(work, loaded, reference, name, rows) for name, rows in tracks.items()]
     tables.write("accuracy", tables.frame("accuracy", [row for row in rows if row]), work.out)
     tables.write("replay_agreement", tables.frame("replay_agreement", _agreement(work, loaded)), work.out)
+    phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]
+    tables.write("phones", tables.frame("phones", phones), work.out)
     measured, residuals = _noise(study, session.id, loaded)
     tables.write("sensor_noise", tables.frame("sensor_noise", measured), work.out)
     tables.write("noise_residuals", residuals, work.out)
@@ -43,12 +49,14 @@ def _mean_and_sd(rows: pd.DataFrame, axes: tuple[str, ...]) -> tuple[FloatArray,
     return mean, rows[[f"sd_{axis}_mm" for axis in axes]].to_numpy(np.float64)
 
 
-def _accuracy(work: Work, loaded: Recording, estimator: str, rows: pd.DataFrame) -> Row | None:
+def _accuracy(
+    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, rows: pd.DataFrame
+) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
-    study, reference = work.study, loaded.reference
-    tracker = study.stream_of_kind("position")
-    if reference is None or tracker is None or len(loaded.samples[tracker]) == 0:
+    study, tracker = work.study, work.study.tracker
+    if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
         return None
+    name, reference = named
     time = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
     truth = accuracy.interpolate(reference, time)
     on_grid = (time >= loaded.samples[tracker].arrival[0] + _SETTLED_S) & np.isfinite(truth).all(axis=1)
@@ -62,7 +70,7 @@ def _accuracy(work: Work, loaded: Recording, estimator: str, rows: pd.DataFrame)
         "study": work.study_name,
         "session": work.session.id,
         "estimator": estimator,
-        "reference": study.stream_of_kind("reference"),
+        "reference": name,
         "rmse_mm": accuracy.rmse(mean, truth),
         "sd_mm": accuracy.stated_sd(sd),
         "coverage_95": accuracy.coverage_95(mean, sd, truth),
@@ -79,7 +87,7 @@ def _agreement(work: Work, loaded: Recording) -> list[Row]:
     shown = work.study.shown.get(work.session.condition or "")
     if shown is None or loaded.display is None:
         return []
-    replayed = recording.build_estimator(work.study, shown).replay(loaded.samples, loaded.display.time)
+    replayed = recording.show(work.study, shown, loaded, loaded.display.time)
     apart = np.linalg.norm(replayed.mean - loaded.display.value, axis=1)
     apart = apart[np.isfinite(apart)]
     row: Row = {"session": work.session.id, "estimator": shown, "n": len(apart)}
@@ -93,7 +101,7 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd
     rows: list[Row] = []
     residuals = []
     stretch = _still(study, loaded)
-    for name, sensor in recording.sensors(study).items():
+    for name, sensor in sensors(study).items():
         samples = loaded.samples[name]
         left = noise.residuals(samples, *stretch) if stretch else np.empty((0, sensor.dimension))
         if stretch is None or len(left) == 0:
@@ -102,7 +110,7 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd
             {
                 "session": session,
                 "stream": name,
-                "unit": "mm" if sensor.operator == "position" else "mm/s²",
+                "unit": _UNITS[study.sensor_streams[name].kind],
                 "begin_s": stretch[0],
                 "end_s": stretch[1],
                 "n": len(left),
@@ -110,7 +118,7 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd
                 "stated_sd": sensor.noise_sd,
             }
         )
-        for index, axis in enumerate(study.axes):
+        for index, axis in enumerate(study.axes_of(name)):
             part = pd.DataFrame({"residual": left[:, index]}).assign(session=session, stream=name, axis=axis)
             residuals.append(tables.as_table("noise_residuals", part))
     return rows, pd.concat(residuals) if residuals else tables.frame("noise_residuals", [])

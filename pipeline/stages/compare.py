@@ -14,8 +14,8 @@ from scipy import stats
 
 from pipeline import results, study_tables, tables
 from pipeline.errors import PipelineError, did_you_mean
+from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
-from pipeline.recording import build_estimator
 from pipeline.stage import Outcome, Work
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.multiplicity import adjusted
@@ -27,7 +27,7 @@ from pipeline.wording import measure_order
 
 Row = dict[str, Any]
 PAIRWISE = ("t_paired", "wilcoxon")
-_SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise")
+_SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones")
 
 
 def run(work: Work) -> Outcome:

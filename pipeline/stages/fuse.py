@@ -15,7 +15,7 @@ def run(work: Work) -> Outcome:
     loaded = recording.load(study, work.entry("ingest"))
     parts = []
     for name in study.estimators if len(loaded.times) else ():
-        track = recording.build_estimator(study, name).replay(loaded.samples, loaded.times)
+        track = recording.show(study, name, loaded, loaded.times)
         known = np.isfinite(track.mean).all(axis=1)
         columns = {
             "session": work.session.id,

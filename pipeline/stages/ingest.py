@@ -19,13 +19,15 @@ from pipeline.study import Session, Stream, Study
 
 Row = dict[str, Any]
 MM_PER_M = 1000.0
-_NEEDED = ("position", "acceleration")  # without these a session has nothing to fuse
+_NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
 _DAY_NS = 86_400e9
 _SAME_CLOCK_S = 3600.0
 _LATE_S = 0.5  # what an estimator remembers by default
 _CONTENT = {
     "acceleration": "acceleration",
     "position": "position",
+    "velocity": "position",
+    "linear": "position",
     "reference": "position",
     "display": "position",
 }
@@ -42,8 +44,7 @@ def run(work: Work) -> Outcome:
     in_part = list(log.faults)
     quality: list[Row] = []
     left_out: list[Row] = []
-    positions: list[pd.DataFrame] = []
-    imu: list[pd.DataFrame] = []
+    found: dict[str, list[pd.DataFrame]] = {"positions": [], "readings": [], "imu": []}
     for name, stream in study.streams.items():
         readings = _stream(log, name, stream, in_part)
         if readings is None:
@@ -57,13 +58,14 @@ def run(work: Work) -> Outcome:
         quality.append(quality_row(session.id, name, readings, notes))
         if finite.read < readings.read:
             left_out.append(quality[-1])
-        (imu if stream.kind == "acceleration" else positions).append(_table(session.id, name, stream, finite))
+        table = {"acceleration": "imu", "velocity": "readings", "linear": "readings"}.get(stream.kind, "positions")
+        found[table].append(_table(session.id, name, stream, finite))
     events, row, repeated = _events(log, study, session.id, in_part)
     if row is not None:
         quality.append(row)
         if repeated:
             left_out.append(row)
-    for name, parts in (("positions", positions), ("imu", imu)):
+    for name, parts in found.items():
         if parts:
             tables.write(name, pd.concat(parts), work.out)
     tables.write("events", events, work.out)
@@ -141,10 +143,8 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
         )
     if stream.kind == "acceleration" and keep.any():
         unknown = int(np.isnan(readings.values[keep, 6]).sum())
-        if unknown == keep.sum():
-            notes.append("no orientation in the log, so no acceleration in the tracker frame")
-        elif unknown:
-            notes.append(f"{unknown} samples of unknown orientation, not fused")
+        if unknown:
+            notes.append(f"{unknown} samples without an orientation in the log")
     return Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep]), notes
 
 
@@ -159,13 +159,15 @@ def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.Da
     }
     values = readings.values[order]
     for index, axis in enumerate("xyz"):
-        column = f"a{axis}_mm_s2" if stream.kind == "acceleration" else f"{axis}_mm"
+        own = stream.kind in ("velocity", "linear")
+        column = f"a{axis}_mm_s2" if stream.kind == "acceleration" else axis if own else f"{axis}_mm"
         columns[column] = values[:, index] * MM_PER_M
     if stream.kind == "acceleration":
         columns |= {f"g{axis}_rad_s": values[:, 3 + index] for index, axis in enumerate("xyz")}
         columns |= {f"q{axis}": values[:, 6 + index] for index, axis in enumerate("xyzw")}
         return tables.as_table("imu", pd.DataFrame(columns))
-    return tables.as_table("positions", pd.DataFrame(columns))
+    own = stream.kind in ("velocity", "linear")
+    return tables.as_table("readings" if own else "positions", pd.DataFrame(columns))
 
 
 def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[pd.DataFrame, Row | None, int]:

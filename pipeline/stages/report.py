@@ -19,6 +19,7 @@ _FROM_COMPARE = (
     "accuracy",
     "replay_agreement",
     "sensor_noise",
+    "phones",
     "accuracy_means",
     "shown_at_selection",
     "quality",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fusion_core import FusionKalman, PositionKalman, Sample, Samples, Sensor
-from fusion_core.kalman import wiener_acceleration
+from fusion_core.position_kalman import wiener_acceleration
 
 TRACKER = Sensor("position", 8.0, 0.1, 1)
 IMU = Sensor("acceleration", 100.0, 0.0, 1)
@@ -31,12 +31,17 @@ def test_process_noise_adds_up_over_steps() -> None:
     np.testing.assert_allclose(half @ half_noise @ half.T + half_noise, whole_noise, rtol=1e-12)
 
 
-def dense_posterior(estimator: FusionKalman, readings: list[tuple[Sensor, Sample]], now: float) -> tuple[float, float]:
-    """Mean and SD of the position at `now` by one least-squares problem over all states at once.
+def dense_posterior(
+    estimator: FusionKalman, readings: list[tuple[Sensor, Sample]], now: float, at: float | None = None
+) -> tuple[float, float]:
+    """Mean and SD of the position at `now`, or at `at`, by one least-squares problem over all states at once.
 
-    States stand at the times of the readings and at `now`; rows are the first state's prior, the process between
-    neighbours, and the readings, each divided by its SD.
+    States stand at the times of the readings, at `at` and at `now`; rows are the first state's prior, the process
+    between neighbours, and the readings, each divided by its SD.
     """
+    if at is not None:  # a reading that says nothing
+        nothing = Sensor("position", 1e6, 0.0, 1), Sample(at, at, np.zeros(1))
+        readings = sorted([*readings, nothing], key=lambda item: item[1].time)
     times = [reading.time for _, reading in readings] + [now]
     n = len(times)
     rows, right = [], []
@@ -67,7 +72,7 @@ def dense_posterior(estimator: FusionKalman, readings: list[tuple[Sensor, Sample
         add(block, noise + 1e-16 * np.eye(4), np.zeros(4))
     for index, (sensor, reading) in enumerate(readings[1:], 1):
         block = np.zeros((1, 4 * n))
-        block[0, 4 * index + sensor.order] = 1
+        block[0, 4 * index + (sensor.order or 0)] = 1
         if sensor.order == 2:
             block[0, 4 * index + 3] = 1
         add(block, np.array([[sensor.noise_sd**2]]), reading.value)
@@ -75,13 +80,14 @@ def dense_posterior(estimator: FusionKalman, readings: list[tuple[Sensor, Sample
     q, r = np.linalg.qr(matrix)
     solution = np.linalg.solve(r, q.T @ values)
     covariance = np.linalg.inv(r)
-    return float(solution[4 * (n - 1)]), float(np.linalg.norm(covariance[4 * (n - 1)]))
+    wanted = 4 * (n - 1 if at is None else times.index(at))
+    return float(solution[wanted]), float(np.linalg.norm(covariance[wanted]))
 
 
 def test_fusion_is_the_posterior_of_all_readings_whatever_their_order_of_arrival() -> None:
     random = np.random.default_rng(5)
     sensors = {"tracker": TRACKER, "imu": IMU}
-    estimator = FusionKalman(sensors, history_s=2.0)
+    estimator = FusionKalman(sensors, history_s=2.0, gate_sd=0.0, adaptation=0.0)
     frames = np.arange(0, 0.5, 1 / 30)
     forces = np.arange(0.004, 0.6, 1 / 90)
     arrivals = [("tracker", Sample(t, t + 0.1, random.normal(50, 8, 1))) for t in frames]

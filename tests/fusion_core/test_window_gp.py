@@ -6,22 +6,20 @@ import numpy as np
 import pytest
 from scipy.special import eval_hermite
 
-from fusion_core import Samples, Sensor, WindowGP
+from fusion_core import Samples, Sensor, Term, WindowGP
 
 TRACKER = Sensor("position", 8.0, 0.1, 1)
 IMU = Sensor("acceleration", 100.0, 0.0, 1)
 BOTH = {"tracker": TRACKER, "imu": IMU}
 
 
-def paper_window(fused: bool, length: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lags, orders and noise of the paper's window at a frame's delivery: 30 and 90 Hz, 0.1 s late, l_a = 3L + 7."""
+def paper_window(fused: bool, length: int = 5) -> tuple[np.ndarray, list[str]]:
+    """Lags and sensors of the paper's window at a frame's delivery: 30 and 90 Hz, 0.1 s late, l_a = 3L + 7."""
     lag = -0.1 - np.arange(length)[::-1] / 30
-    order = np.zeros(length, np.int64)
-    if fused:
-        count = 3 * length + 9 - 2
-        lag = np.concatenate([lag, -np.arange(count)[::-1] / 90])
-        order = np.concatenate([order, np.full(count, 2)])
-    return lag, order, np.where(order == 0, 64.0, 1e4)
+    if not fused:
+        return lag, ["tracker"] * length
+    count = 3 * length + 9 - 2
+    return np.concatenate([lag, -np.arange(count)[::-1] / 90]), ["tracker"] * length + ["imu"] * count
 
 
 @pytest.mark.parametrize(
@@ -36,9 +34,9 @@ def test_sd_at_now_with_the_papers_parameters(fused: bool, mean: str, sd_mm: flo
 
 @pytest.mark.parametrize("fused", [False, True])
 def test_position_gains_sum_to_one_with_a_constant_mean(fused: bool) -> None:
-    lag, order, noise = paper_window(fused)
-    weights, _ = WindowGP(BOTH).gains(lag, order, noise)
-    assert weights[order == 0].sum() == pytest.approx(1.0, abs=1e-9)
+    lag, names = paper_window(fused)
+    weights, _ = WindowGP(BOTH).gains(lag, names)
+    assert weights[:5].sum() == pytest.approx(1.0, abs=1e-9)
 
 
 def test_exact_derivatives_agree_with_the_wide_grid() -> None:
@@ -59,6 +57,8 @@ def test_exact_derivatives_agree_with_the_wide_grid() -> None:
     sd = np.sqrt(5.66e4 - with_now @ np.linalg.solve(observed, with_now))
     _, variance = WindowGP(BOTH, mean="zero").gains(*paper_window(fused=True, length=length))
     assert float(np.sqrt(variance)) == pytest.approx(float(sd), abs=0.2)
+    _, on_grid = WindowGP(BOTH, mean="zero", derivative="finite_difference").gains(*paper_window(True, length))
+    assert float(np.sqrt(on_grid)) == pytest.approx(float(sd), rel=1e-6)
 
 
 def test_a_slow_posterior_written_out_gives_the_same_estimate() -> None:
@@ -127,7 +127,7 @@ def test_a_pause_of_a_minute_neither_fails_nor_grows() -> None:
     ("parameters", "message"),
     [
         ({"window": 0}, "window must be 1 or more"),
-        ({"mean": "median"}, 'mean must be "constant" or "zero"'),
+        ({"mean": "median"}, "mean must be constant or window or zero, got 'median'"),
         ({"signal_variance_mm2": -1.0}, "signal_variance_mm2 must be a number above 0, got -1.0"),
         ({"inverse_scale_s2": float("nan")}, "inverse_scale_s2 must be a number above 0"),
     ],
@@ -140,3 +140,124 @@ def test_parameters_out_of_range_are_named(parameters: dict[str, object], messag
 def test_without_a_position_sensor_there_is_nothing_to_estimate() -> None:
     with pytest.raises(ValueError, match="needs a position sensor, got imu"):
         WindowGP({"imu": IMU})
+
+
+def test_the_average_of_the_window_is_a_mean_too() -> None:
+    """Far away positions alone are answered by their average and what the prior makes of the rest."""
+    at = Samples(np.arange(5) / 30, np.arange(5) / 30, np.array([[1000.0], [1001.0], [999.0], [1002.0], [998.0]]))
+    only = {"tracker": TRACKER}
+    own = WindowGP(only, mean="window").replay({"tracker": at}, np.array([0.2]))
+    less = Samples(at.time, at.arrival, at.value - 1000.0)
+    zero = WindowGP(only, mean="zero").replay({"tracker": less}, np.array([0.2]))
+    assert own.mean[0, 0] == pytest.approx(1000.0 + zero.mean[0, 0], abs=1e-9)
+
+
+def test_an_unknown_bias_over_the_window_costs_nothing() -> None:
+    """With σ_b²·11ᵀ beside the noise of accelerations and σ_b large, an offset of theirs changes nothing (method)."""
+    frames, forces = np.arange(30) / 30, np.arange(100) / 90
+
+    def shown(offset_mm_s2: float, bias_sd_mm_s2: float) -> float:
+        samples = {
+            "tracker": Samples(frames, frames + 0.1, np.zeros((30, 1))),
+            "imu": Samples(forces, forces, np.full((100, 1), offset_mm_s2)),
+        }
+        estimator = WindowGP(BOTH, window=20, bias_sd_mm_s2=bias_sd_mm_s2)
+        return float(estimator.replay(samples, np.array([1.05])).mean[0, 0])
+
+    assert abs(shown(300.0, 0.0)) > 4.0
+    assert shown(300.0, 1e5) == pytest.approx(shown(0.0, 1e5), abs=1e-3)
+
+
+RATED = {
+    "tracker": Sensor("position", 8.0, 0.1, 3, rate_hz=30),
+    "imu": Sensor("acceleration", 100.0, 0.0, 3, rate_hz=90),
+}
+
+
+def regular(seconds: float = 6.0) -> tuple[dict[str, Samples], np.ndarray]:
+    """A regular recording, its stamps in whole nanoseconds, of a hand that moves at up to 1 m/s."""
+    random = np.random.default_rng(8)
+    frames, forces = (np.round(np.arange(0, seconds, 1 / rate), 9) for rate in (30, 90))
+    position = 300 * np.sin(3 * frames[:, None] + np.arange(3)) + random.normal(0, 8, (len(frames), 3))
+    acceleration = -2700 * np.sin(3 * forces[:, None] + np.arange(3)) + random.normal(0, 100, (len(forces), 3))
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, position),
+        "imu": Samples(forces, forces, acceleration),
+    }
+    return samples, forces
+
+
+def test_weights_of_regular_windows_are_those_of_their_own_times_to_a_millionth() -> None:
+    samples, times = regular()
+    auto, own = WindowGP(RATED), WindowGP(RATED, path="event_time")
+    fast, slow = auto.replay(samples, times), own.replay(samples, times)
+    np.testing.assert_allclose(fast.mean, slow.mean, atol=1e-6)
+    np.testing.assert_allclose(fast.sd, slow.sd, atol=1e-6)
+    assert 0 < len(auto._patterns) < 50
+    assert not own._patterns
+
+
+def test_an_irregular_stretch_takes_its_own_times() -> None:
+    """A dropped frame leaves the fixed weights, and comes back to them once the window is regular again."""
+    samples, times = regular()
+    keep = np.arange(len(samples["tracker"])) != 90
+    tracker = samples["tracker"]
+    samples["tracker"] = Samples(tracker.time[keep], tracker.arrival[keep], tracker.value[keep])
+    fast = WindowGP(RATED).replay(samples, times)
+    slow = WindowGP(RATED, path="event_time").replay(samples, times)
+    np.testing.assert_allclose(fast.mean, slow.mean, atol=1e-6)
+
+
+def test_a_displacement_is_an_operator_of_the_users_own() -> None:
+    """Optical flow between two frames observes p(t) − p(t − 33 ms); in a window it stands for the velocity."""
+    step = 1 / 30
+    flow = Sensor((Term(1.0), Term(-1.0, at_s=-step)), 0.5, 0.0, 1)
+    sensors = {"tracker": TRACKER, "flow": flow}
+    frames = np.arange(0, 2, step)
+    truth = 200 * frames
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, truth[:, None]),
+        "flow": Samples(frames, frames, np.full((len(frames), 1), 200 * step)),
+    }
+    now = np.array([1.9])
+    with_flow = WindowGP(sensors).replay(samples, now)
+    without = WindowGP({"tracker": TRACKER}).replay(samples, now)
+    assert with_flow.mean[0, 0] == pytest.approx(380.0, abs=2.0)
+    assert with_flow.sd[0, 0] < 0.5 * without.sd[0, 0]
+
+
+def test_a_sensor_of_one_axis_leaves_the_others_as_they_are() -> None:
+    flow = Sensor("velocity", 5.0, 0.0, 1, axes=(1,))
+    sensors = {"tracker": Sensor("position", 8.0, 0.1, 3), "flow": flow}
+    frames = np.arange(0, 1, 1 / 30)
+    path = np.stack([np.zeros_like(frames), 300 * frames, np.zeros_like(frames)], axis=1)
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, path),
+        "flow": Samples(frames, frames, np.full((len(frames), 1), 300.0)),
+    }
+    now = np.array([0.95])
+    both = WindowGP(sensors).replay(samples, now)
+    alone = WindowGP({"tracker": sensors["tracker"]}).replay(samples, now)
+    np.testing.assert_allclose(both.mean[0, [0, 2]], alone.mean[0, [0, 2]], atol=1e-9)
+    np.testing.assert_allclose(both.sd[0, [0, 2]], alone.sd[0, [0, 2]], atol=1e-9)
+    assert both.sd[0, 1] < 0.6 * both.sd[0, 0]
+    assert both.mean[0, 1] == pytest.approx(285.0, abs=3.0)
+
+
+def test_two_trackers_are_better_than_one() -> None:
+    sensors = {"tracker": TRACKER, "second": Sensor("position", 4.0, 0.05, 1)}
+    frames = np.arange(0, 1, 1 / 30)
+    still = np.zeros((len(frames), 1))
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, still),
+        "second": Samples(frames + 0.01, frames + 0.06, still),
+    }
+    now = np.array([1.0])
+    assert (
+        WindowGP(sensors).replay(samples, now).sd[0, 0] < WindowGP({"tracker": TRACKER}).replay(samples, now).sd[0, 0]
+    )
+
+
+def test_a_sensor_later_than_the_horizon_is_an_error() -> None:
+    with pytest.raises(ValueError, match=r"horizon_s must cover .* tracker is 3.0 s late, horizon_s is 2.0"):
+        WindowGP({"tracker": Sensor("position", 8.0, 3.0, 1)})

@@ -12,6 +12,7 @@ import pytest
 
 from fusion_core import replay_loop
 from pipeline import recording, tables
+from pipeline.estimators import build_estimator
 from pipeline.formats.mcap import Message
 from pipeline.stage import Work
 from pipeline.stages import ingest
@@ -74,7 +75,7 @@ def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, stea
     loaded = recording.load(loaded_study, out)
     selected = (EPOCH_NS + 1_800_000_000 - loaded.origin_ns) * tables.NANOSECONDS
     emitted = loaded.times[loaded.times <= selected + 1e-9].max()
-    track = replay_loop(recording.build_estimator(loaded_study, "fusion"), loaded.samples, np.array([emitted]))
+    track = replay_loop(build_estimator(loaded_study, "fusion"), loaded.samples, np.array([emitted]))
     expected = np.hypot(track.mean[0, 0] - 100, track.mean[0, 1] - 500)
     assert float(row[5]) == pytest.approx(expected, abs=1e-6)
 
@@ -89,7 +90,7 @@ def test_replay_agreement_is_zero_where_the_log_shows_what_it_says(folder: Folde
     out.mkdir()
     ingest.run(Work("t", study, root, out, tuple(find_sessions(root, study).sessions)))
     loaded = recording.load(study, out)
-    track = recording.build_estimator(study, "fusion").replay(loaded.samples, loaded.times)
+    track = build_estimator(study, "fusion").replay(loaded.samples, loaded.times)
     for time, mean in zip(track.time, track.mean, strict=True):
         if np.isfinite(mean).all():
             at = loaded.origin_ns + round(time * 1e9)
@@ -219,7 +220,7 @@ def test_no_usable_session_and_no_tables_is_an_error(folder: Folder, steadyhand:
     assert "no session can be used:\n  P1_a: not an MCAP file" in ran.err
 
 
-def test_accelerations_of_unknown_orientation_are_left_out_and_counted(study: Path, steadyhand: Steadyhand) -> None:
+def test_unknown_orientations_are_carried_on_and_counted(study: Path, steadyhand: Steadyhand) -> None:
     def forget(index: int, message: Message) -> Message:
         assert message.values is not None
         unknown = np.concatenate([message.values[:6], [np.nan] * 4])
@@ -228,7 +229,9 @@ def test_accelerations_of_unknown_orientation_are_left_out_and_counted(study: Pa
     write_session(study / "data" / "P1_a.mcap", moved(session_messages(), "/phone/imu", forget))
     assert steadyhand("compare", study).code == 0
     row = next(r for r in steadyhand.results()["quality"] if r["session"] == "P1_a" and r["stream"] == "imu")
-    assert "90 samples of unknown orientation, not fused" in row["note"]
+    assert "90 samples without an orientation in the log" in row["note"]
+    phone = next(r for r in steadyhand.results()["phones"] if r["session"] == "P1_a")
+    assert (phone["in_log"], phone["carried"], phone["left_out"]) == (270, 89, 1)  # the first has none before it
 
 
 def test_quality_of_a_known_stream(study: Path, steadyhand: Steadyhand) -> None:

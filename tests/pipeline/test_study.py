@@ -49,7 +49,7 @@ MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\nP2,a,m,2\nP
             MINIMAL + "streams: {t: {topic: /t, kind: position, latncy_s: 1}}\n",
             'unknown key "streams.t.latncy_s"; did you mean "latency_s"?',
         ),
-        (MINIMAL + "streams: {t: {topic: /t, kind: velocity}}\n", '"streams.t" needs a kind: position'),
+        (MINIMAL + "streams: {t: {topic: /t, kind: speed}}\n", '"streams.t" needs a kind: position, velocity'),
         (MINIMAL + "streams: {i: {topic: /i, kind: acceleration}}\n", '"streams.i.gravity_mm_s2" is missing'),
         (
             MINIMAL + STREAMS + "estimators: {e: {type: raw, use: [trakcer]}}\n",

@@ -1,0 +1,77 @@
+"""The event-time path over whole streams, compiled: what would have been shown at each time, or a fixed lag later."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fusion_core.event_steps import JERK_PSD, History, Model, Readings, begin, insert, oldest_needed, write_expected
+from fusion_core.motion import position_step
+from fusion_core.samples import FloatArray
+from fusion_core.smoothing_steps import smoothed_at
+
+
+@njit(cache=True)
+def _shift_down(history: History, first: int, count: int) -> None:
+    for row in range(first, count):
+        history.time[row - first] = history.time[row]
+        history.sensor[row - first] = history.sensor[row]
+        history.value[row - first] = history.value[row]
+        history.coupling[row - first] = history.coupling[row]
+        history.mean[row - first] = history.mean[row]
+        history.covariance[row - first] = history.covariance[row]
+        history.adapted[row - first] = history.adapted[row]
+
+
+@njit(cache=True)
+def replay(
+    model: Model,
+    readings: Readings,
+    arrival: FloatArray,
+    times: FloatArray,
+    history: History,
+    history_s: float,
+    lag_s: float,
+    constants: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD (n, dimension) at `times`, which rise, of readings in order of arrival, the first a position.
+
+    With `lag_s` above 0 each is of the position that long before its time, in view of all that has arrived.
+    `constants` takes mean (n, constants) and covariance (n, constants, constants) of these, unless they are empty.
+    `history` is room to work in: more rows than readings ever stand in `history_s`.
+    """
+    dimension = len(model.axes)
+    mean, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
+    recent, adapted, of_position = history.time, history.adapted, np.zeros(len(model.states))
+    oldest, count, upcoming = 0, 0, 0
+    for index in range(len(times)):
+        while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
+            time, sensor = readings.time[upcoming], readings.sensor[upcoming]
+            value, coupling = readings.value[upcoming], readings.coupling[upcoming]
+            if count == 0:
+                recent[0], history.sensor[0], history.value[0], history.coupling[0] = time, sensor, value, coupling
+                begin(model, history)
+                count = 1
+            else:
+                if count == len(recent):
+                    _shift_down(history, oldest, count)
+                    oldest, count = 0, count - oldest
+                if insert(model, history, oldest, count, time, sensor, value, coupling) > oldest:
+                    count += 1
+                    oldest = oldest_needed(recent, oldest, count, history_s)
+            upcoming += 1
+        if count > 0:
+            if len(constants[0]):
+                begins = len(model.states) * dimension
+                constants[0][index] = history.mean[count - 1, begins:]
+                constants[1][index] = history.covariance[count - 1, begins:, begins:]
+            wanted, row = times[index] - lag_s, count - 1
+            if wanted < recent[row] and lag_s > 0.0:
+                if wanted >= recent[oldest]:
+                    mean[index], sd[index] = smoothed_at(model, history, oldest, count, wanted)
+                continue
+            noise = position_step(model.motion, max(wanted - recent[row], 0.0), adapted[row, JERK_PSD], of_position)
+            write_expected(
+                model.states, model.axes, history.mean, history.covariance, row, of_position, noise, mean, sd, index
+            )
+    return mean, sd

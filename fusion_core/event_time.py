@@ -1,0 +1,226 @@
+"""The event-time path of Kalman fusion: every reading at the time it was measured, whenever it arrives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fusion_core import event_replay, event_steps
+from fusion_core.estimator import unknown
+from fusion_core.event_steps import History, Model, Readings
+from fusion_core.samples import FloatArray, Sample, Samples, Track
+from fusion_core.sensors import Sensor, position_sensor
+
+_COMPILED: set[tuple[int, ...]] = set()  # what this process has compiled, or read from where it is kept
+
+
+@dataclass(frozen=True)
+class Recent:
+    """The recent readings with the moments after each; `waiting` holds those from before the first position."""
+
+    history: History | None = None
+    waiting: tuple[tuple[str, Sample], ...] = ()
+    too_late: int = 0
+
+
+@dataclass(frozen=True)
+class EventTime:
+    """The estimator's steps over a history of readings; `in_body_frame` says where the bias is constant."""
+
+    sensors: Mapping[str, Sensor]
+    model: Model
+    in_body_frame: bool
+    history_s: float
+
+    @property
+    def dimension(self) -> int:
+        """Of the position."""
+        return len(self.model.axes)
+
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.sensors)}
+
+    def _coupling(self, name: str, rotation: FloatArray | None) -> FloatArray:
+        """How a bias enters a reading, (d, constants) or (n, d, constants): turned; not at all without a bias."""
+        if not self.model.biased[self._index[name]]:
+            return np.zeros((self.dimension, len(self.model.constants)))
+        if rotation is None or not self.in_body_frame:
+            return np.eye(self.dimension, len(self.model.constants))
+        return np.ascontiguousarray(rotation)
+
+    def _row(self, capacity: int) -> History:
+        return event_steps.empty_history(capacity, self.dimension, len(self.model.constants), len(self.model.states))
+
+    def _whole(self, name: str, value: FloatArray) -> FloatArray:
+        """A reading's values at their axes of the position, (…, d)."""
+        sensor = self.sensors[name]
+        if sensor.axes is None:
+            return np.ascontiguousarray(value, dtype=np.float64)
+        whole = np.zeros((*value.shape[:-1], self.dimension))
+        whole[..., list(sensor.axes)] = value
+        return whole
+
+    def start(self) -> Recent:
+        """Nothing seen. What a reading needs is compiled by now."""
+        if self._signature not in _COMPILED:
+            _COMPILED.add(self._signature)
+            self._try_out()
+        return Recent()
+
+    @property
+    def _signature(self) -> tuple[int, ...]:
+        """What compiled code depends on."""
+        return len(self.model.states), len(self.model.axes), len(self.model.constants)
+
+    def _try_out(self) -> None:
+        history = self._row(1)
+        event_steps.begin(self.model, history)
+        event_steps.inserted(self.model, history, self._row(2), 0.01, 0, history.value[0], history.coupling[0])
+        event_steps.oldest_needed(history.time, 0, 1, self.history_s)
+        event_steps.expect(self.model, history, 0, 0.01)
+
+    def update(self, state: Recent, sensor: str, sample: Sample) -> Recent:
+        """The reading put in at its measurement time, and what came after it gone through again."""
+        if state.history is None:
+            return self._first(state, sensor, sample)
+        return self._next(state, state.history, sensor, sample)
+
+    def _next(self, state: Recent, history: History, sensor: str, sample: Sample) -> Recent:
+        count = len(history.time)
+        room = self._row(count + 1)
+        value, coupling = self._whole(sensor, sample.value), self._coupling(sensor, sample.rotation)
+        at = event_steps.inserted(self.model, history, room, sample.time, self._index[sensor], value, coupling)
+        if at == 0:
+            return replace(state, too_late=state.too_late + 1)
+        oldest = event_steps.oldest_needed(room.time, 0, count + 1, self.history_s)
+        return Recent(History._make(column[oldest:] for column in room), (), state.too_late)
+
+    def _first(self, state: Recent, sensor: str, sample: Sample) -> Recent:
+        """Start at the first position; other readings wait for it."""
+        if sensor != position_sensor(self.sensors):
+            waiting = [w for w in state.waiting if w[1].time > sample.time - self.history_s]
+            return Recent(None, (*waiting, (sensor, sample)), state.too_late)
+        first = self._row(1)
+        first.time[0], first.sensor[0] = sample.time, self._index[sensor]
+        first.value[0] = sample.value
+        event_steps.begin(self.model, first)
+        started = Recent(first, (), state.too_late)
+        for name, reading in state.waiting:
+            if reading.time > sample.time:
+                started = self.update(started, name, reading)
+        return started
+
+    def predict(self, state: Recent, time: float) -> tuple[FloatArray, FloatArray]:
+        """The newest moments, moved on to `time`."""
+        if state.history is None:
+            return unknown(self.dimension)
+        found: tuple[FloatArray, FloatArray] = event_steps.expect(
+            self.model, state.history, len(state.history.time) - 1, time
+        )
+        return found
+
+    def replay(self, samples: Mapping[str, Samples], times: FloatArray, lag_s: float = 0.0) -> Track:
+        """The same steps in one compiled loop; with `lag_s`, of the position that long before each time."""
+        biases = len(self.model.constants)
+        nothing = np.empty((0, biases)), np.empty((0, biases, biases))
+        return Track(times, *self._run(*self._readings(samples), times, lag_s, nothing))
+
+    def constants(
+        self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray], times: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean (n, constants) and covariance (n, constants, constants) of the constants as known at `times`.
+
+        `couplings` (m, d, constants), by sensor, say how far each enters its m readings. NaN before the first position.
+        """
+        count = len(self.model.constants)
+        mean, covariance = np.full((len(times), count), np.nan), np.full((len(times), count, count), np.nan)
+        self._run(*self._readings(samples, couplings), times, 0.0, (mean, covariance))
+        return mean, covariance
+
+    def _run(
+        self,
+        readings: Readings,
+        arrival: FloatArray,
+        times: FloatArray,
+        lag_s: float,
+        constants: tuple[FloatArray, FloatArray],
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean and SD at `times`, in any order; `constants` are filled if there is room for them, for rising times."""
+        order = np.argsort(times, kind="stable")
+        mean, sd = np.full((2, len(times), self.dimension), np.nan)
+        most = _most_within(np.sort(readings.time), self.history_s)
+        room, rising = self._row(2 * most + 8), np.asarray(times, dtype=np.float64)[order]
+        mean[order], sd[order] = event_replay.replay(
+            self.model, readings, arrival, rising, room, self.history_s, lag_s, constants
+        )
+        return mean, sd
+
+    def filtered(self, samples: Mapping[str, Samples]) -> History | None:
+        """All readings from the first position on in order of measurement, with the moments after each."""
+        readings, _ = self._readings(samples)
+        if len(readings.time) == 0:
+            return None
+        by_time = np.argsort(readings.time[1:], kind="stable") + 1
+        later = by_time[readings.time[by_time] >= readings.time[0]]
+        rows = np.concatenate([[0], later])
+        history = self._row(len(rows))
+        for column, read in zip(history[:4], readings, strict=True):
+            column[:] = read[rows]
+        event_steps.begin(self.model, history)
+        event_steps.take_in(self.model, history, 1, len(rows))
+        return history
+
+    def with_constants(self, initial_sd: FloatArray, walk: FloatArray) -> EventTime:
+        """The same filter with other constants than a bias: their SD before any reading, and per √s (constants,)."""
+        model = self.model._replace(
+            constants=(0,) * len(initial_sd),
+            initial_constant_variance=np.square(initial_sd, dtype=np.float64),
+            constant_psd=np.square(walk, dtype=np.float64),
+        )
+        return replace(self, model=model)
+
+    def _readings(
+        self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray] | None = None
+    ) -> tuple[Readings, FloatArray]:
+        """All readings in order of arrival from the first position on, those that waited for it after it."""
+        names = [name for name in self.sensors if name in samples and len(samples[name])]
+        count, begin = sum(len(samples[name]) for name in names), 0
+        value, coupling = (
+            np.empty((count, self.dimension)),
+            np.empty((count, self.dimension, len(self.model.constants))),
+        )
+        rows, arrival = Readings(np.empty(count), np.empty(count, np.int64), value, coupling), np.empty(count)
+        for name in names:
+            stream, part = samples[name], slice(begin, begin + len(samples[name]))
+            begin = part.stop
+            rows.time[part], rows.sensor[part], arrival[part] = stream.time, self._index[name], stream.arrival
+            rows.value[part] = self._whole(name, stream.value)
+            rows.coupling[part] = couplings[name] if couplings else self._coupling(name, stream.rotation)
+        order = np.argsort(arrival, kind="stable")
+        order = self._from_first(rows.time[order], rows.sensor[order], order)
+        chosen = Readings._make(column[order] for column in rows)
+        begins = arrival[order[0]] if len(order) else np.inf
+        return chosen, np.maximum(arrival[order], begins)
+
+    def _from_first(self, time: FloatArray, sensor: Any, order: Any) -> Any:
+        """The order without what came before the first position, but for what was measured after it."""
+        positions = np.flatnonzero(sensor == self._index[position_sensor(self.sensors)])
+        if len(positions) == 0:
+            return order[:0]
+        first = int(positions[0])
+        waiting = np.arange(first)
+        newest_later = np.maximum.accumulate(time[:first][::-1])[::-1]
+        kept = waiting[(time[:first] > time[first]) & (time[:first] > newest_later - self.history_s)]
+        return order[np.concatenate([[first], kept, np.arange(first + 1, len(order))])]
+
+
+def _most_within(time: FloatArray, span_s: float) -> int:
+    """The largest number of readings that stand within a span."""
+    if len(time) == 0:
+        return 0
+    return int(np.max(np.arange(len(time)) + 1 - np.searchsorted(time, time - span_s, side="left")))

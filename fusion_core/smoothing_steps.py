@@ -1,0 +1,99 @@
+"""Smoothing, compiled: what later readings say of an earlier moment (Rauch, Tung and Striebel 1965)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fusion_core.event_steps import JERK_PSD, History, Model
+from fusion_core.motion import step
+from fusion_core.samples import FloatArray
+
+
+@njit(cache=True)
+def whole_step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatArray]:
+    """Transition and process noise over `dt` seconds of all states of all axes, (size, size) each."""
+    states, dimension = len(model.states), len(model.axes)
+    size = states * dimension + len(model.constants)
+    one, noise = np.empty((states, states)), np.empty((states, states))
+    step(model.motion, dt, jerk_psd, one, noise)
+    transition, added = np.eye(size), np.zeros((size, size))
+    for axis in range(dimension):
+        for state in range(states):
+            for other in range(states):
+                transition[state * dimension + axis, other * dimension + axis] = one[state, other]
+                added[state * dimension + axis, other * dimension + axis] = noise[state, other]
+    for constant in range(len(model.constants)):
+        added[states * dimension + constant, states * dimension + constant] = model.constant_psd[constant] * dt
+    return transition, added
+
+
+@njit(cache=True)
+def step_back(
+    model: Model,
+    mean: FloatArray,
+    covariance: FloatArray,
+    dt: float,
+    jerk_psd: float,
+    later_mean: FloatArray,
+    later_covariance: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Filtered moments in view of smoothed moments `dt` seconds later."""
+    transition, noise = whole_step(model, dt, jerk_psd)
+    expected = transition @ covariance @ transition.T + noise
+    for state in range(len(mean)):
+        expected[state, state] += 1e-12 * (1.0 + expected[state, state])  # a step of no length has no noise
+    gain = np.linalg.solve(expected, transition @ covariance).T
+    smoothed = mean + gain @ (later_mean - transition @ mean)
+    spread = covariance + gain @ (later_covariance - expected) @ gain.T
+    return smoothed, (spread + spread.T) / 2.0
+
+
+@njit(cache=True)
+def _at(
+    model: Model, history: History, row: int, time: float, later_mean: FloatArray, later_covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD of the position at `time`, between a row and the next, whose smoothed moments are given."""
+    jerk_psd = history.adapted[row, JERK_PSD]
+    transition, noise = whole_step(model, time - history.time[row], jerk_psd)
+    mean = transition @ history.mean[row]
+    covariance = transition @ history.covariance[row] @ transition.T + noise
+    rest = history.time[row + 1] - time
+    mean, covariance = step_back(model, mean, covariance, rest, jerk_psd, later_mean, later_covariance)
+    return mean[: len(model.axes)].copy(), np.sqrt(np.diag(covariance)[: len(model.axes)])
+
+
+@njit(cache=True)
+def smoothed_at(model: Model, history: History, oldest: int, count: int, time: float) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD (dimension,) of the position at `time`, within the rows from `oldest` to `count`."""
+    mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
+    row = count - 2
+    while row > oldest and history.time[row] > time:
+        dt = history.time[row + 1] - history.time[row]
+        mean, covariance = step_back(
+            model, history.mean[row], history.covariance[row], dt, history.adapted[row, JERK_PSD], mean, covariance
+        )
+        row -= 1
+    return _at(model, history, row, time, mean, covariance)
+
+
+@njit(cache=True)
+def smooth(model: Model, history: History, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD (n, dimension) at `times`, which rise, in view of all rows; NaN outside them."""
+    dimension = len(model.axes)
+    found, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
+    count, index = len(history.time), len(times) - 1
+    mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
+    while index >= 0 and times[index] >= history.time[count - 1]:
+        if times[index] == history.time[count - 1]:
+            found[index], sd[index] = mean[:dimension], np.sqrt(np.diag(covariance)[:dimension])
+        index -= 1
+    for row in range(count - 2, -1, -1):
+        while index >= 0 and times[index] >= history.time[row]:
+            found[index], sd[index] = _at(model, history, row, times[index], mean, covariance)
+            index -= 1
+        dt = history.time[row + 1] - history.time[row]
+        mean, covariance = step_back(
+            model, history.mean[row], history.covariance[row], dt, history.adapted[row, JERK_PSD], mean, covariance
+        )
+    return found, sd

@@ -1,0 +1,91 @@
+"""`fit`: print what a study's recordings say its parameters are, as a block to paste into study.yaml."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipeline import recording
+from pipeline.commands import console
+from pipeline.commands.run import for_each
+from pipeline.errors import PipelineError
+from pipeline.fitting import Fit, Parameter, fit
+from pipeline.runner import Result
+from pipeline.stages import STAGES
+
+_INGEST = STAGES[:1]
+
+
+def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache: Path | None) -> None:
+    """Fit each study; the highest of the exit codes."""
+
+    def then(folder: Path, result: Result) -> int:
+        recordings = {
+            session: recording.load(result.study, entry.folder) for session, entry in result.entries["ingest"].items()
+        }
+        if not recordings:
+            raise PipelineError(f"{folder}: has no logs to fit to")
+        try:
+            found = fit(result.study, recordings, first_s)
+        except PipelineError as error:
+            raise PipelineError(f"{folder}: {error}") from None
+        for line in _lines(result.name, found, first_s, recordings):
+            console.say(line)
+        return result.exit_code
+
+    sys.exit(for_each(studies, _INGEST, jobs, cache, then))
+
+
+def _lines(name: str, found: Fit, first_s: float, recordings: dict[str, recording.Recording]) -> Iterator[str]:
+    yield f"# {name}: fitted on the first {first_s:g} s of {len(recordings)} sessions; paste what you trust."
+    yield from _block(found.parameters)
+    for stream, (mean, half) in found.gravity_mm_s2.items():
+        values = ", ".join(f"{value:.0f}" for value in mean)
+        yield f"# streams.{stream}.gravity_mm_s2 by the mean specific force: [{values}] ± {float(np.max(half)):.0f}"
+    yield from _mountings(recordings)
+    for row in found.parameters:
+        if not row.fitted.told:
+            yield (
+                f"# The data cannot tell {row.where}.{row.key}: anything from {_short(row.fitted.low)} to"
+                f" {_short(row.fitted.high)} fits; {_short(row.stated)} was kept."
+            )
+    if found.scores:
+        yield "# On the rest of each session, RMSE in mm as set -> as fitted:"
+    for score in found.scores:
+        yield f"#   {score.session}  {score.estimator}: {score.stated_rmse_mm:.1f} -> {score.fitted_rmse_mm:.1f}"
+
+
+def _block(parameters: Sequence[Parameter]) -> Iterator[str]:
+    """YAML, section by section, each value with its interval."""
+    told = [row for row in parameters if row.fitted.told]
+    for section in dict.fromkeys(row.where.split(".", 1)[0] for row in told):
+        yield f"{section}:"
+        for where in dict.fromkeys(row.where for row in told if row.where.startswith(f"{section}.")):
+            yield f"  {where.split('.', 1)[1]}:"
+            for row in told:
+                if row.where == where:
+                    interval = f"{_short(row.fitted.low)} to {_short(row.fitted.high)}"
+                    yield f"    {row.key}: {_short(row.fitted.value)}  # {interval}; was {_short(row.stated)}"
+
+
+def _short(value: float) -> str:
+    """Three digits, as YAML reads a number."""
+    text = f"{value:.3g}"
+    return text if "e" not in text else f"{float(text):.2e}"
+
+
+def _mountings(recordings: dict[str, recording.Recording]) -> Iterator[str]:
+    """What `calibrate_s` learned, session by session."""
+    for session, loaded in recordings.items():
+        for stream, phone in loaded.phones.items():
+            if phone.calibration is None:
+                continue
+            learned = phone.calibration
+            degrees, half = np.degrees(learned.mounting_rad), 1.96 * np.degrees(learned.mounting_sd_rad)
+            angles = ", ".join(f"{value:.2f} ± {one:.2f}" for value, one in zip(degrees, half, strict=True))
+            pairs = zip(learned.lever_arm_mm, 1.96 * learned.lever_arm_sd_mm, strict=True)
+            arm = ", ".join(f"{value:.0f} ± {one:.0f}" for value, one in pairs)
+            yield f"# {session}: {stream} is mounted at [{angles}] degrees, lever arm [{arm}] mm"

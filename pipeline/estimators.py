@@ -1,0 +1,78 @@
+"""study.yaml's streams as sensors, and its estimators built from them."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cache
+from typing import Any
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from fusion_core import ESTIMATORS, Estimator, Sensor, Term
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.study import AccelerationStream, LinearStream, PositionStream, Sensing, Study
+
+
+def sensor(study: Study, stream: Sensing) -> Sensor:
+    """A stream's sensor, of the analysed axes."""
+    axes = None if isinstance(stream, AccelerationStream) else stream.axes
+    seen = None if axes is None else tuple(study.axes.index(axis) for axis in axes)
+    dimension = len(study.axes) if seen is None else len(seen)
+    operator: str | tuple[Term, ...] = stream.kind
+    if isinstance(stream, PositionStream):
+        noise_sd = stream.noise_sd_mm
+    elif isinstance(stream, AccelerationStream):
+        noise_sd = stream.noise_sd_mm_s2
+    elif isinstance(stream, LinearStream):
+        noise_sd = stream.noise_sd
+        operator = tuple(Term(term.weight, term.derivative, term.at_s) for term in stream.operator)
+    else:
+        noise_sd = stream.noise_sd_mm_s
+    return Sensor(operator, noise_sd, stream.latency_s, dimension, stream.rate_hz, seen)
+
+
+def sensors(study: Study) -> dict[str, Sensor]:
+    """The study's sensors by stream name, of the analysed axes."""
+    return {name: sensor(study, stream) for name, stream in study.sensor_streams.items()}
+
+
+def build_estimator(study: Study, name: str) -> Estimator:
+    """The study's estimator of that name; PipelineError that says which key or value is wrong."""
+    settings = study.estimators[name]
+    where = f"study.yaml: estimators.{name}"
+    if settings.type not in ESTIMATORS:
+        raise PipelineError(f'{where}: type "{settings.type}" is not known{did_you_mean(settings.type, ESTIMATORS)}')
+    kind = ESTIMATORS[settings.type]
+    types = {field.name: field.type for field in fields(kind) if field.name != "sensors"}
+    used = {n: s for n, s in sensors(study).items() if settings.use is None or n in settings.use}
+    parameters = {}
+    for key, value in settings.parameters.items():
+        if key not in types:
+            raise PipelineError(f'{where}: unknown key "{key}"{did_you_mean(key, types)}')
+        parameters[key] = _converted(kind, key, value, where)
+    try:
+        return kind(used, **parameters)
+    except ValueError as error:
+        raise PipelineError(f"{where}: {error}") from None
+
+
+@cache
+def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
+    """What turns a parameter of study.yaml into the type its dataclass states."""
+    from typing import get_type_hints
+
+    strict = ConfigDict(allow_inf_nan=False)
+    hints = get_type_hints(kind)
+    return {
+        field.name: TypeAdapter(hints[field.name], config=strict) for field in fields(kind) if field.name != "sensors"
+    }
+
+
+def _converted(kind: type, key: str, value: Any, where: str) -> Any:
+    if isinstance(value, bool):
+        raise PipelineError(f'{where}: "{key}": should not be {str(value).lower()}')
+    try:
+        return _adapters(kind)[key].validate_python(value)
+    except ValidationError as error:
+        fault = error.errors()[0]["msg"]
+        raise PipelineError(f'{where}: "{key}": {fault[0].lower()}{fault[1:]} (found {value!r})') from None

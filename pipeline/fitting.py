@@ -1,0 +1,211 @@
+"""What a study's recordings say its parameters are: fitted on the first part of each session, scored on the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, WindowGP
+from fusion_core.accuracy import interpolate, rmse
+from fusion_core.likelihood import Fitted, foretold, foretold_by, maximise
+from pipeline.errors import PipelineError
+from pipeline.estimators import build_estimator, sensors
+from pipeline.recording import Recording
+from pipeline.study import Study
+
+_IMU_PRIOR = 0.7  # SD of the logarithm: a factor of two. Smooth motion alone cannot tell an accelerometer's noise
+_FREE = float("inf")
+_SETTLED_S = 1.0  # before it no estimate is scored, as in the table `accuracy`
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One fitted figure: where it stands in study.yaml, what stands there now, and what the data say."""
+
+    where: str
+    key: str
+    stated: float
+    fitted: Fitted
+
+
+@dataclass(frozen=True)
+class Score:
+    """An estimator on the part that was not fitted: RMSE in mm as set and as fitted; None without a reference."""
+
+    session: str
+    estimator: str
+    stated_rmse_mm: float
+    fitted_rmse_mm: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters, scores, and by phone gravity (3,) in mm/s² with the half widths of its interval."""
+
+    parameters: tuple[Parameter, ...]
+    scores: tuple[Score, ...]
+    gravity_mm_s2: Mapping[str, tuple[FloatArray, FloatArray]]
+
+
+def fit(study: Study, recordings: Mapping[str, Recording], first_s: float) -> Fit:
+    """Noise and latency of the sensors, then the parameters of every fusion_kalman and window_gp of the study.
+
+    Raises PipelineError where there is nothing to fit.
+    """
+    if study.tracker is None:
+        raise PipelineError("study.yaml: streams: fitting needs a stream of kind position")
+    parts = [_part(loaded.samples, -np.inf, _begin(study, loaded) + first_s) for loaded in recordings.values()]
+    parts = [part for part in parts if len(part[study.tracker])]
+    if not parts:
+        raise PipelineError(f"no session has positions in its first {first_s:g} s")
+    fitted = _sensors(study, parts)
+    known = _with(sensors(study), fitted)
+    latency = next((p.fitted.value for p in fitted if p.key == "latency_s"), None)
+    shifted = [_late(study, part, latency) for part in parts]
+    estimators: dict[str, Estimator] = {}
+    for name in study.estimators:
+        stated = build_estimator(study, name)
+        used = {key: known[key] for key in stated.sensors}
+        rows, estimators[name] = _estimator(name, stated, used, shifted)
+        fitted += rows
+    scores = []
+    for session, loaded in recordings.items():
+        later = loaded.times[loaded.times >= _begin(study, loaded) + first_s + _SETTLED_S]
+        scores += _scores(study, session, loaded, estimators, later, _late(study, loaded.samples, latency))
+    return Fit(tuple(fitted), tuple(scores), _gravity(recordings, first_s))
+
+
+def _begin(study: Study, loaded: Recording) -> float:
+    frames = loaded.samples[study.tracker or ""]
+    return float(frames.arrival[0]) if len(frames) else 0.0
+
+
+def _part(samples: Mapping[str, Samples], since: float, until: float) -> dict[str, Samples]:
+    """What arrived in a stretch."""
+    found = {}
+    for name, stream in samples.items():
+        kept = (stream.arrival >= since) & (stream.arrival < until)
+        rotation = None if stream.rotation is None else stream.rotation[kept]
+        found[name] = Samples(stream.time[kept], stream.arrival[kept], stream.value[kept], rotation)
+    return found
+
+
+def _late(study: Study, samples: Mapping[str, Samples], latency_s: float | None) -> dict[str, Samples]:
+    """With the tracker's readings measured as long before their stamps as `latency_s` says."""
+    found, name = dict(samples), study.tracker or ""
+    if latency_s is not None:
+        by = latency_s - study.sensor_streams[name].latency_s
+        found[name] = replace(found[name], time=found[name].time - by)
+    return found
+
+
+def _sensors(study: Study, parts: Sequence[Mapping[str, Samples]]) -> list[Parameter]:
+    """Latency and noise of the tracker, noise of the accelerometer, by the fusion filter with all its own free."""
+    tracker, imu = study.tracker or "", study.stream_of_kind("acceleration")
+    stated, plain = sensors(study), _plain(study)
+    wanted = [(f"streams.{tracker}", "noise_sd_mm", stated[tracker].noise_sd, _FREE)]
+    if imu is not None:
+        wanted.append((f"streams.{imu}", "noise_sd_mm_s2", stated[imu].noise_sd, _IMU_PRIOR))
+        if stated[tracker].latency_s > 0:
+            wanted.append((f"streams.{tracker}", "latency_s", stated[tracker].latency_s, _FREE))
+    own = [plain.jerk_psd_mm2_s5, plain.bias_walk_mm_s2_per_sqrt_s]
+
+    def blocks(values: FloatArray) -> FloatArray:
+        changed = dict(stated)
+        changed[tracker] = replace(stated[tracker], noise_sd=float(values[0]))
+        if imu is not None:
+            changed[imu] = replace(stated[imu], noise_sd=float(values[1]))
+        latency = float(values[2]) if len(wanted) > 2 else None
+        used = {name: changed[name] for name in plain.sensors}
+        filter_ = replace(plain, sensors=used, jerk_psd_mm2_s5=float(values[-2]), bias_walk_mm_s2_per_sqrt_s=values[-1])
+        return np.concatenate([foretold(filter_, _late(study, part, latency)) for part in parts])
+
+    found = maximise(blocks, [row[2] for row in wanted] + own, [row[3] for row in wanted] + [_FREE, _FREE])
+    return [Parameter(where, key, value, one) for (where, key, value, _), one in zip(wanted, found, strict=False)]
+
+
+def _plain(study: Study) -> FusionKalman:
+    """The study's first fusion_kalman, or one of defaults, without gate and adaptation: likelihood needs one model."""
+    used = {n: s for n, s in sensors(study).items() if not any(term.at_s for term in s.terms)}
+    built = (build_estimator(study, name) for name in study.estimators)
+    found = next((one for one in built if isinstance(one, FusionKalman)), FusionKalman(used))
+    return replace(found, gate_sd=0.0, adaptation=0.0, path="event_time", prior="wiener")
+
+
+def _with(stated: Mapping[str, Sensor], fitted: Sequence[Parameter]) -> dict[str, Sensor]:
+    """The sensors with their fitted noise."""
+    found = dict(stated)
+    for row in fitted:
+        name = row.where.removeprefix("streams.")
+        if row.key.startswith("noise") and row.fitted.told:
+            found[name] = replace(found[name], noise_sd=row.fitted.value)
+    return found
+
+
+def _estimator(
+    name: str, stated: Estimator, used: dict[str, Sensor], parts: Sequence[Mapping[str, Samples]]
+) -> tuple[list[Parameter], Estimator]:
+    """The fitted parameters of one estimator, and the estimator with those that the data tell."""
+    where = f"estimators.{name}"
+    if isinstance(stated, FusionKalman) and stated.prior == "wiener":
+        plain = replace(stated, sensors=used, gate_sd=0.0, adaptation=0.0, path="event_time")
+        keys = ["jerk_psd_mm2_s5", "bias_walk_mm_s2_per_sqrt_s"]
+        score: Any = foretold
+    elif isinstance(stated, WindowGP):
+        plain, score = replace(stated, sensors=used), foretold_by  # type: ignore[assignment]
+        keys = ["signal_variance_mm2", "inverse_scale_s2"]
+    else:
+        return [], stated
+    start = [float(getattr(stated, key)) for key in keys]
+
+    def blocks(values: FloatArray) -> FloatArray:
+        tried = replace(plain, **dict(zip(keys, map(float, values), strict=True)))  # type: ignore[arg-type]
+        return np.concatenate([score(tried, part) for part in parts])
+
+    found = maximise(blocks, start, [_FREE] * len(keys))
+    told = {key: one.value for key, one in zip(keys, found, strict=True) if one.told}
+    rows = [Parameter(where, key, value, one) for key, value, one in zip(keys, start, found, strict=True)]
+    return rows, replace(stated, sensors=used, **told)  # type: ignore[arg-type]
+
+
+def _scores(
+    study: Study,
+    session: str,
+    loaded: Recording,
+    estimators: Mapping[str, Estimator],
+    times: FloatArray,
+    samples: Mapping[str, Samples],
+) -> list[Score]:
+    """Each estimator as stated and as fitted, on `samples` of the fitted latency, at `times` that were not fitted."""
+    if loaded.reference is None:
+        return []
+    truth = interpolate(loaded.reference, times)
+    known = np.isfinite(truth).all(axis=1)
+    rows = []
+    for name, better in estimators.items():
+        stated = build_estimator(study, name).replay(loaded.samples, times).mean
+        fitted = better.replay(samples, times).mean
+        on = known & np.isfinite(stated).all(axis=1) & np.isfinite(fitted).all(axis=1)
+        if on.any():
+            rows.append(Score(session, name, rmse(stated[on], truth[on]), rmse(fitted[on], truth[on])))
+    return rows
+
+
+def _gravity(recordings: Mapping[str, Recording], first_s: float) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Minus the mean specific force in the tracker's frame: over a session a hand stays where it is."""
+    means: dict[str, list[FloatArray]] = {}
+    for loaded in recordings.values():
+        for name, phone in loaded.phones.items():
+            body = phone.body
+            early = body.time < (body.time[0] if len(body.time) else 0.0) + first_s
+            turned = np.einsum("nij,nj->ni", body.rotation[early], body.force_mm_s2[early])
+            blocks = ((body.time[early] - body.time[:1]) // 5.0).astype(int) if early.any() else np.empty(0, int)
+            means.setdefault(name, []).extend(-turned[blocks == block].mean(axis=0) for block in np.unique(blocks))
+    return {
+        name: (np.mean(rows, axis=0), 1.96 * np.std(rows, axis=0, ddof=1) / np.sqrt(len(rows)))
+        for name, rows in means.items()
+        if len(rows) > 1
+    }
