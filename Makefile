@@ -32,7 +32,8 @@ lint: .venv/installed ## ruff, mypy strict, import-linter
 	@$(python) -m mypy
 	@.venv/bin/lint-imports
 
-bench: .venv/installed ## how fast, as ratios in one run
+bench: .venv/installed ## how fast, as ratios in one run, beside other libraries
+	@sh tools/make-peers
 	@$(python) -m tests.benchmarks $(ARGS)
 
 lock: .venv/installed ## bring requirements.lock up to date with pyproject.toml

@@ -86,13 +86,13 @@ def empty_history(capacity: int, dimension: int, constants: int, states: int) ->
     """Room for `capacity` readings."""
     size = states * dimension + constants
     return History(
-        np.zeros(capacity),
-        np.zeros(capacity, np.int64),
-        np.zeros((capacity, dimension)),
-        np.zeros((capacity, dimension, constants)),
-        np.zeros((capacity, size)),
-        np.zeros((capacity, size, size)),
-        np.zeros((capacity, ADAPTED)),
+        np.empty(capacity),
+        np.empty(capacity, np.int64),
+        np.empty((capacity, dimension)),
+        np.empty((capacity, dimension, constants)),
+        np.empty((capacity, size)),
+        np.empty((capacity, size, size)),
+        np.empty((capacity, ADAPTED)),
     )
 
 
@@ -491,12 +491,29 @@ def oldest_needed(time: FloatArray, oldest: int, count: int, history_s: float) -
 
 @njit(cache=True)
 def inserted(
-    model: Model, history: History, room: History, time: float, sensor: int, value: FloatArray, coupling: FloatArray
+    model: Model,
+    history: History,
+    room: History,
+    time: float,
+    sensor: int,
+    value: FloatArray,
+    coupling: FloatArray,
+    history_s: float,
 ) -> int:
-    """`history` copied into `room`, which has one row more, with one more reading. Where it went; 0: too late."""
-    count = len(history.time)
+    """`history` copied into `room`, which has one row more, with one more reading.
+
+    Returns the oldest row that is still needed; −1 where the reading came too late.
+    """
+    count = at = len(history.time)
+    while at > 0 and history.time[at - 1] > time + SAME_S:
+        at -= 1
     room.time[:count], room.sensor[:count] = history.time, history.sensor
     room.value[:count], room.coupling[:count] = history.value, history.coupling
-    room.mean[:count], room.covariance[:count] = history.mean, history.covariance
-    room.adapted[:count] = history.adapted
-    return insert(model, room, 0, count, time, sensor, value, coupling)
+    room.mean[:at], room.covariance[:at], room.adapted[:at] = (
+        history.mean[:at],
+        history.covariance[:at],
+        history.adapted[:at],
+    )
+    if insert(model, room, 0, count, time, sensor, value, coupling) == 0:
+        return -1
+    return oldest_needed(room.time, 0, count + 1, history_s)

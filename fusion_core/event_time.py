@@ -48,10 +48,18 @@ class EventTime:
     def _coupling(self, name: str, rotation: FloatArray | None) -> FloatArray:
         """How a bias enters a reading, (d, constants) or (n, d, constants): turned; not at all without a bias."""
         if not self.model.biased[self._index[name]]:
-            return np.zeros((self.dimension, len(self.model.constants)))
+            return self._nothing
         if rotation is None or not self.in_body_frame:
-            return np.eye(self.dimension, len(self.model.constants))
+            return self._as_it_is
         return np.ascontiguousarray(rotation)
+
+    @cached_property
+    def _nothing(self) -> FloatArray:
+        return np.zeros((self.dimension, len(self.model.constants)))
+
+    @cached_property
+    def _as_it_is(self) -> FloatArray:
+        return np.eye(self.dimension, len(self.model.constants))
 
     def _row(self, capacity: int) -> History:
         return event_steps.empty_history(capacity, self.dimension, len(self.model.constants), len(self.model.states))
@@ -79,9 +87,11 @@ class EventTime:
 
     def _try_out(self) -> None:
         history = self._row(1)
+        history.time[0] = history.sensor[0] = 0
+        value, coupling = np.zeros(self.dimension), np.zeros((self.dimension, len(self.model.constants)))
+        history.value[0], history.coupling[0] = value, coupling
         event_steps.begin(self.model, history)
-        event_steps.inserted(self.model, history, self._row(2), 0.01, 0, history.value[0], history.coupling[0])
-        event_steps.oldest_needed(history.time, 0, 1, self.history_s)
+        event_steps.inserted(self.model, history, self._row(2), 0.01, 0, value, coupling, self.history_s)
         event_steps.expect(self.model, history, 0, 0.01)
 
     def update(self, state: Recent, sensor: str, sample: Sample) -> Recent:
@@ -91,14 +101,12 @@ class EventTime:
         return self._next(state, state.history, sensor, sample)
 
     def _next(self, state: Recent, history: History, sensor: str, sample: Sample) -> Recent:
-        count = len(history.time)
-        room = self._row(count + 1)
+        room, index = self._row(len(history.time) + 1), self._index[sensor]
         value, coupling = self._whole(sensor, sample.value), self._coupling(sensor, sample.rotation)
-        at = event_steps.inserted(self.model, history, room, sample.time, self._index[sensor], value, coupling)
-        if at == 0:
+        oldest = event_steps.inserted(self.model, history, room, sample.time, index, value, coupling, self.history_s)
+        if oldest < 0:
             return replace(state, too_late=state.too_late + 1)
-        oldest = event_steps.oldest_needed(room.time, 0, count + 1, self.history_s)
-        return Recent(History._make(column[oldest:] for column in room), (), state.too_late)
+        return Recent(History._make([column[oldest:] for column in room]), (), state.too_late)
 
     def _first(self, state: Recent, sensor: str, sample: Sample) -> Recent:
         """Start at the first position; other readings wait for it."""
@@ -107,7 +115,7 @@ class EventTime:
             return Recent(None, (*waiting, (sensor, sample)), state.too_late)
         first = self._row(1)
         first.time[0], first.sensor[0] = sample.time, self._index[sensor]
-        first.value[0] = sample.value
+        first.value[0], first.coupling[0] = sample.value, self._coupling(sensor, sample.rotation)
         event_steps.begin(self.model, first)
         started = Recent(first, (), state.too_late)
         for name, reading in state.waiting:
