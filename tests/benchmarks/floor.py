@@ -136,7 +136,10 @@ def draw_settling(path: Path, runs: int = RUNS) -> None:
         style = ("-", (0, (5, 2)), (0, (1, 1)))[index]
         axes.semilogy(time[shown], spread, color=colour, linestyle=style, label=label)
     axes.axhline(FLOOR_MM, color="black", linewidth=0.8)
-    axes.annotate("floor: posterior SD with all the past", (MOVES_AT_S, FLOOR_MM), ha="right", va="top", fontsize=8)
+    axes.set_ylim(2.5, 50)
+    axes.annotate(
+        "floor: posterior SD with all the past", (MOVES_AT_S, 0.94 * FLOOR_MM), ha="right", va="top", fontsize=8
+    )
     axes.set(xlabel="time since the first frame arrived (s)", ylabel=f"RMSE of {runs} runs, one axis (mm)")
     axes.set_yticks([3, 5, 10, 20, 50], ["3", "5", "10", "20", "50"])
     axes.minorticks_off()
