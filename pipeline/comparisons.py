@@ -4,135 +4,159 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from pipeline import cells
+from pipeline import cells, model_rows
+from pipeline.cells import Asked, Cells
 from pipeline.errors import PipelineError, did_you_mean
+from pipeline.statistics import OK, diagnostics, pairs
 from pipeline.statistics.anova import rm_anova
+from pipeline.statistics.art import art_anova
+from pipeline.statistics.bayes import bayes_t
+from pipeline.statistics.crossover import crossover
+from pipeline.statistics.equivalence import tost
+from pipeline.statistics.mixed import mixed_model
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
+from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import FloatArray, Result
-from pipeline.study import Comparison, Study
+from pipeline.study import Study
 from pipeline.wording import measure_order
 
 Row = dict[str, Any]
-PAIRWISE = ("t_paired", "wilcoxon")
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What one entry asks of one measure."""
-
-    study: Study
-    entry: Comparison
-    measure: str
-    measures: pd.DataFrame
-
-
 Answer = tuple[list[Row], list[Row]]
 """Rows of `comparisons`, and the exclusions that came of incomplete participants."""
 
 
-def compared(study: Study, measures: pd.DataFrame) -> Answer:
+def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> Answer:
     """Every row of `comparisons`, and every exclusion that came of them, each once."""
     rows: list[Row] = []
     left_out: list[Row] = []
     if study.comparisons and len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons: need two conditions or more, and conditions lists one")
-    for entry in study.comparisons:
-        family: list[list[Row]] = []
-        for measure in _matching(entry, sorted(set(measures["measure"]), key=measure_order)):
-            found, incomplete = _TESTS[entry.test](Asked(study, entry, measure, measures))
-            family.append(found)
+    for asked in everything_asked(study, measures, observations):
+        found: list[Row] = []
+        for one in asked:
+            answer, incomplete = _TESTS[one.entry.test](one)
+            found += answer
             left_out += incomplete
-        if entry.test in PAIRWISE and len(study.conditions) > 2:
-            for pairs in family:
-                _adjust(entry, pairs)
-        else:
-            _adjust(entry, [row for measured in family for row in measured])
-        rows += [row for measured in family for row in measured]
+        _adjust(found)
+        rows += found
+    for row in rows:
+        row["details"] = json.dumps(row["details"]) if row["details"] else None
     unique = {tuple(sorted(row.items())): row for row in left_out}
     return rows, list(unique.values())
 
 
-def _matching(entry: Comparison, known: Sequence[str]) -> list[str]:
+def everything_asked(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> Iterator[list[Asked]]:
+    """What each entry asks, a measure each."""
+    known = sorted(set(measures["measure"]), key=measure_order)
+    for entry in study.comparisons:
+        named = _matching(entry.measure, known)
+        yield [Asked(study, entry, measure, measures, observations) for measure in named]
+
+
+def _matching(wanted: str, known: Sequence[str]) -> list[str]:
     """The measures an entry names; `*` stands for scales, never for a total."""
-    if "*" in entry.measure:
-        pattern = ".*".join(re.escape(piece) for piece in entry.measure.split("*"))
+    if "*" in wanted:
+        pattern = ".*".join(re.escape(piece) for piece in wanted.split("*"))
         found = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
     else:
-        found = [name for name in known if name == entry.measure]
+        found = [name for name in known if name == wanted]
     if not found:
-        raise PipelineError(
-            f'study.yaml: comparisons: there is no measure "{entry.measure}" in the'
-            f" data{did_you_mean(entry.measure, known)}"
-        )
+        hint = did_you_mean(wanted, known)
+        raise PipelineError(f'study.yaml: comparisons: there is no measure "{wanted}" in the data{hint}')
     return found
 
 
 def _anova(asked: Asked) -> Answer:
-    """A row an effect."""
-    if len(asked.entry.within) == 1:
-        return _whole(asked, lambda values: rm_anova(values, ["condition"])[0])
-    values, left_out = cells.by_factor(asked.study, asked.entry, asked.measure, asked.measures)
-    return [_row(asked, result) for result in rm_anova(values, asked.entry.within)], left_out
+    """A row an effect, and the pairs that follow up those of more than two levels."""
+    found = cells.by_factor(asked) if len(asked.entry.within) > 1 else cells.by_condition(asked)
+    rows = [_row(asked, result) for result in rm_anova(found.values, asked.entry.within)]
+    if found.values.shape[1:] == (2,):
+        (pair,) = pairs.of_conditions(found.values, found.levels[0])
+        rows = [_diagnosed({**rows[0], **_change(pair)}, pair, found)]
+    if asked.entry.follow_up != "none":
+        for pair in pairs.follow_ups(found.values, asked.entry.within, found.levels):
+            row = _pair_row(asked, t_paired(pair.first, pair.second, pair.effect), pair, found)
+            rows.append({**row, "adjust": asked.entry.follow_up})
+    return rows, found.left_out
+
+
+def _art(asked: Asked) -> Answer:
+    found = cells.by_factor(asked) if len(asked.entry.within) > 1 else cells.by_condition(asked)
+    return [_row(asked, result) for result in art_anova(found.values, asked.entry.within)], found.left_out
 
 
 def _friedman(asked: Asked) -> Answer:
-    return _whole(asked, friedman)
+    found = cells.by_condition(asked)
+    row = _row(asked, friedman(found.values))
+    compared = pairs.of_conditions(found.values, found.levels[0])
+    return [{**row, **_change(compared[0])} if len(compared) == 1 else row], found.left_out
 
 
-def _whole(asked: Asked, test: Callable[[FloatArray], Result]) -> Answer:
-    """One row over all conditions."""
-    values, left_out = cells.by_condition(asked.study, asked.entry, asked.measure, asked.measures)
-    return [_row(asked, test(values), values if values.shape[1] == 2 else None)], left_out
-
-
-def _wilcoxon(asked: Asked) -> Answer:
-    return _pairs(asked, lambda first, second: wilcoxon(first, second, zeros=asked.entry.zeros))
-
-
-def _t_paired(asked: Asked) -> Answer:
-    return _pairs(asked, t_paired)
-
-
-def _pairs(asked: Asked, test: Callable[[FloatArray, FloatArray], Result]) -> Answer:
+def _pairwise(test: Callable[[Asked, FloatArray, FloatArray], Result]) -> Callable[[Asked], Answer]:
     """A row a pair of conditions."""
-    values, left_out = cells.by_condition(asked.study, asked.entry, asked.measure, asked.measures)
-    rows = [
-        _row(asked, test(values[:, i], values[:, j]), values[:, [i, j]], (first, second))
-        for (i, first), (j, second) in combinations(enumerate(asked.study.conditions), 2)
-    ]
-    return rows, left_out
+
+    def answer(asked: Asked) -> Answer:
+        found = cells.by_condition(asked)
+        compared = pairs.of_conditions(found.values, found.levels[0])
+        rows = [_pair_row(asked, test(asked, pair.first, pair.second), pair, found) for pair in compared]
+        return rows, found.left_out
+
+    return answer
+
+
+def _mixed(asked: Asked) -> Answer:
+    """A row a term, and the pairs of levels of those that have more than two."""
+    found = model_rows.of_model(asked)
+    rows = [_row(asked, result) for result in mixed_model(found.values, found.participants, found.columns, found.terms)]
+    if model_rows.CARRY_OVER in found.columns:
+        rows = [{**row, "method": f"{row['method']}; without first periods, before which nothing came"} for row in rows]
+    kept: list[Row] = []
+    for _, of_term in groupby(rows, key=lambda row: row["effect"]):
+        whole, *levels = of_term
+        kept.append(whole)
+        if asked.entry.follow_up != "none":
+            kept += [{**row, "adjust": asked.entry.follow_up} for row in levels]
+    return kept, found.left_out
+
+
+def _crossover(asked: Asked) -> Answer:
+    """The rows treatment, period and carry-over."""
+    found = model_rows.of_crossover(asked)
+    results = crossover(found.values, found.first_came_first, found.conditions, found.sequences)
+    return [_row(asked, result) for result in results], found.left_out
 
 
 _TESTS: Mapping[str, Callable[[Asked], Answer]] = {
     "rm_anova": _anova,
-    "t_paired": _t_paired,
-    "wilcoxon": _wilcoxon,
+    "art_anova": _art,
     "friedman": _friedman,
+    "t_paired": _pairwise(lambda _, first, second: t_paired(first, second)),
+    "wilcoxon": _pairwise(lambda asked, first, second: wilcoxon(first, second, zeros=asked.entry.zeros)),
+    "tost": _pairwise(lambda asked, first, second: tost(first, second, asked.entry.bounds or (0.0, 0.0))),
+    "bayes_t": _pairwise(lambda asked, first, second: bayes_t(first, second, asked.entry.prior_scale)),
+    "mixed_model": _mixed,
+    "crossover": _crossover,
 }
 """Every test by its name in study.yaml."""
 
 
-def _row(
-    asked: Asked,
-    result: Result,
-    values: FloatArray | None = None,
-    pair: tuple[str, str] | None = None,
-) -> Row:
-    """A result as a row; `values` of two conditions give the mean difference and the reduction."""
-    row: Row = {
+def _row(asked: Asked, result: Result) -> Row:
+    """A result as a row."""
+    return {
         "measure": asked.measure,
         "test": asked.entry.test,
         "effect": result.effect,
-        "contrast": None if pair is None else f"{pair[0]} - {pair[1]}",
+        "contrast": result.contrast,
         "n": result.n,
         "statistic_name": result.statistic_name,
         "statistic": result.statistic,
@@ -146,15 +170,38 @@ def _row(
         "ci_low": result.ci_low,
         "ci_high": result.ci_high,
         "status": result.status,
-        "details": json.dumps(result.details) if result.details else None,
+        "details": dict(result.details),
     }
-    if values is not None and len(values):
-        first, second = (float(mean) for mean in values.mean(axis=0))
-        row["mean_difference"] = first - second
-        row["reduction"] = 1 - second / first if first != 0 else None
-    return row
 
 
-def _adjust(entry: Comparison, rows: list[Row]) -> None:
-    for row, value in zip(rows, adjusted([row["p"] for row in rows], entry.adjust), strict=True):
-        row["p_adjusted"] = value
+def _change(pair: Pair) -> Row:
+    """The mean difference and the reduction of a pair, if anybody is in it."""
+    if not len(pair.first):
+        return {}
+    first, second = float(np.mean(pair.first)), float(np.mean(pair.second))
+    return {"mean_difference": first - second, "reduction": 1 - second / first if first != 0 else None}
+
+
+def _pair_row(asked: Asked, result: Result, pair: Pair, found: Cells) -> Row:
+    """The row of a test of two conditions."""
+    return _diagnosed({**_row(asked, result), **_change(pair), "contrast": pair.contrast}, pair, found)
+
+
+def _diagnosed(row: Row, pair: Pair, found: Cells) -> Row:
+    """The row with what is to be said of the differences that it rests on."""
+    if row["status"] != OK:
+        return row
+    told = diagnostics.differences(pair.first, pair.second, found.participants)
+    return {**row, "details": {**row["details"], **told}}
+
+
+def _adjust(rows: list[Row]) -> None:
+    """Adjust over the measures of an entry, effect by effect; of several pairs of a measure over those pairs."""
+    contrasts = Counter((row["measure"], row["effect"]) for row in rows if row["contrast"] is not None)
+    families: dict[tuple[str, str | None], list[Row]] = {}
+    for row in rows:
+        one_of_several = row["contrast"] is not None and contrasts[row["measure"], row["effect"]] > 1
+        families.setdefault((row["effect"], row["measure"] if one_of_several else None), []).append(row)
+    for family in families.values():
+        for row, value in zip(family, adjusted([row["p"] for row in family], family[0]["adjust"]), strict=True):
+            row["p_adjusted"] = value

@@ -53,6 +53,7 @@ TABLES: Mapping[str, pa.Schema] = {
         ("latency_s", _FLOAT),
         ("note", _TEXT),
     ),
+    "session_orders": _schema(("session", _TEXT), ("order", _TEXT)),  # as the log's facts say it
     "tracks": _schema(
         ("session", _TEXT),
         ("estimator", _TEXT),
@@ -77,6 +78,21 @@ TABLES: Mapping[str, pa.Schema] = {
         ("measure", _TEXT),
         ("value", _FLOAT),
     ),
+    "observations": _schema(
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("factors", _TEXT),
+        ("period", _COUNT),
+        ("sequence", _TEXT),
+        ("measure", _TEXT),
+        ("n", _COUNT),
+        ("value", _FLOAT),
+    ),
+    "orders": _schema(
+        ("participant", _TEXT), ("condition", _TEXT), ("session", _TEXT), ("period", _COUNT), ("source", _TEXT)
+    ),
+    "sequences": _schema(("participant", _TEXT), ("sequence", _TEXT)),
     "descriptives": _schema(
         ("measure", _TEXT),
         ("condition", _TEXT),

@@ -34,7 +34,8 @@ def run(work: Work) -> Outcome:
         "measures": measures,
         "descriptives": tables.frame("descriptives", descriptives(study, measures)),
     }
-    rows, left_out = compared(study, measures)
+    observations = tables.read("observations", measured)
+    rows, left_out = compared(study, measures, observations)
     found["comparisons"] = tables.frame("comparisons", rows)
     left_out += _without_accuracy(work)
     found["exclusions"] = pd.concat(
