@@ -93,6 +93,19 @@ TABLES: Mapping[str, pa.Schema] = {
         ("participant", _TEXT), ("condition", _TEXT), ("session", _TEXT), ("period", _COUNT), ("source", _TEXT)
     ),
     "sequences": _schema(("participant", _TEXT), ("sequence", _TEXT)),
+    "design_check": _schema(
+        ("what", _TEXT),
+        ("measure", _TEXT),
+        ("condition", _TEXT),
+        ("found", _TEXT),
+        ("expected", _TEXT),
+        ("statistic_name", _TEXT),
+        ("statistic", _FLOAT),
+        ("df1", _FLOAT),
+        ("df2", _FLOAT),
+        ("p", _FLOAT),
+        ("remark", _TEXT),
+    ),
     "descriptives": _schema(
         ("measure", _TEXT),
         ("condition", _TEXT),

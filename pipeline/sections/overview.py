@@ -161,6 +161,14 @@ def _is_singular(row: Row) -> bool:
     return bool((row["details"] or {}).get("singular"))
 
 
+def _of_design(material: Material) -> list[Text]:
+    """How many things in the check of the design are not as they should be."""
+    remarked = [row for row in material.rows("design_check") if row["remark"]]
+    if not remarked:
+        return []
+    return [(f"{counted(len(remarked), 'remark')} on the design; see design and participants.",)]
+
+
 def _cautions(material: Material) -> list[Text]:
     study = material.study
     cautions: list[Text] = []
@@ -204,6 +212,7 @@ def _cautions(material: Material) -> list[Text]:
                 " rows as if of different people.",
             )
         )
+    cautions += _of_design(material)
     undefined = sum(row["status"] != "ok" for row in material.rows("comparisons"))
     if undefined:
         cautions.append((f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",))

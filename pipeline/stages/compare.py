@@ -10,7 +10,8 @@ import pandas as pd
 from scipy import stats
 
 from pipeline import results, study_tables, tables
-from pipeline.comparisons import compared
+from pipeline.comparisons import compared, everything_asked
+from pipeline.design_check import findings
 from pipeline.printed import compare_printed
 from pipeline.recording import build_estimator
 from pipeline.stage import Outcome, Work
@@ -37,6 +38,9 @@ def run(work: Work) -> Outcome:
     observations = tables.read("observations", measured)
     rows, left_out = compared(study, measures, observations)
     found["comparisons"] = tables.frame("comparisons", rows)
+    asked = [one for entry in everything_asked(study, measures, observations) for one in entry]
+    checked = findings(study, asked, tables.read("orders", measured), found["trials"], work.sessions)
+    found["design_check"] = tables.frame("design_check", checked)
     left_out += _without_accuracy(work)
     found["exclusions"] = pd.concat(
         [

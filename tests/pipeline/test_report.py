@@ -293,6 +293,7 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         "the conditions are equivalent within the bounds at the 5 % level",
         "the data are 2.20 times as likely under a difference as under none",
         "Bayes factor (JZS, prior scale 0.707): kinect − fusion, BF₁₀ = 2.20",
+        "Design: 1 remark, on effect of the period; see the table.",
         "mixed model: linear mixed model, random intercept, REML, Satterthwaite degrees of freedom",
     ):
         assert sentence in text, sentence
@@ -300,6 +301,8 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         assert TESTS[row["test"]] in text
         assert f"{abs(row['statistic']):.2f}" in text
         assert row["method"] in text
+    for row in steadyhand.results()["design_check"]:
+        assert row["found"] in text
 
 
 def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Folder, steadyhand: Steadyhand) -> None:
