@@ -72,7 +72,8 @@ def _column(asked: Asked, name: str, values: pd.Series) -> Column:
     levels = [level for level in levels if level in set(values) or name == "condition"]
     if len(levels) < 2:
         raise PipelineError(
-            f'study.yaml: comparisons: "{name}" of "{asked.measure}" has one level in the rows of the model'
+            f'study.yaml: comparisons: "{name}" of "{asked.measure}" has one level in the rows of the model; take it'
+            " out of fixed"
         )
     codes = np.array([levels.index(value) for value in values], dtype=np.int64)
     return Factor(tuple(str(level) for level in levels), codes)

@@ -393,6 +393,15 @@ def test_adjusted_p_values_by_hand() -> None:
     assert adjusted(p, "none") == [None] * 4
 
 
+@given(p=st.lists(st.none() | st.floats(0, 1), max_size=12))
+def test_adjusting_keeps_the_order_of_p_and_lowers_none(p: list[float | None]) -> None:
+    for method in ("holm", "bonferroni", "benjamini_hochberg"):
+        found = [(one, changed) for one, changed in zip(p, adjusted(p, method), strict=True) if one is not None]
+        assert all(changed is not None and one <= changed <= 1 for one, changed in found)
+        ordered = [changed for _, changed in sorted(found, key=lambda pair: pair[0])]
+        assert ordered == sorted(ordered, key=lambda changed: changed or 0.0)
+
+
 def test_a_constant_difference_has_no_error_to_test_against() -> None:
     first = np.array([1.0, 5.0, 2.5, 3.0])
     for result in (t_paired(first + 0.1, first), rm_anova(np.column_stack([first + 0.1, first]), ["condition"])[0]):

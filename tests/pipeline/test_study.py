@@ -197,13 +197,18 @@ def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhan
             "needs to know the period, and no data say it; give a column",
         ),
         ("test: crossover", 'crossover of "m" needs to know the period'),
+        (
+            "test: mixed_model, fixed: [condition, hand]",
+            '"hand" of "m" has one level in the rows of the model; take it',
+        ),
         ("test: anova", "comparisons.0.test"),
     ],
 )
 def test_a_comparison_that_cannot_be_is_named(folder: Folder, steadyhand: Steadyhand, entry: str, message: str) -> None:
     settings = f"conditions: [a, b]\nmeasures: measures.csv\ncomparisons: [{{measure: m, {entry}}}]\n"
-    rows = "".join(f"P{person},{condition},m,{person}\n" for person in (1, 2, 3) for condition in "ab")
-    ran = steadyhand("compare", folder(settings, **{"measures.csv": f"participant,condition,measure,value\n{rows}"}))
+    rows = "".join(f"P{person},{condition},m,{person},left\n" for person in (1, 2, 3) for condition in "ab")
+    table = f"participant,condition,measure,value,hand\n{rows}"
+    ran = steadyhand("compare", folder(settings, **{"measures.csv": table}))
     assert ran.code == 2
     assert message in ran.err
 
