@@ -120,6 +120,8 @@ def _computed(path: Path, figure: Figure, table: pd.DataFrame) -> float:
         wanted = getattr(figure, column)
         if wanted is not None:
             rows = rows[rows[column] == wanted]
+    if "contrast" in rows and rows["contrast"].isna().any():
+        rows = rows[rows["contrast"].isna()]  # without what follows them up
     if len(rows) != 1 or figure.column not in rows or rows[figure.column].dtype.kind not in "fi":
         raise PipelineError(
             f'{path}: "{figure.what}" fits {len(rows)} rows of {figure.table} with a column "{figure.column}"; it must '

@@ -25,6 +25,7 @@ LISTS = (
     "shown_at_selection",
     "accuracy_means",
     "printed",
+    "design_check",
 )
 
 

@@ -117,6 +117,19 @@ def _whole_numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
     return values.astype(np.int64)
 
 
+def _periods(path: Path, table: pd.DataFrame) -> pd.Series:
+    """The column period: whole numbers from 1, NA where the cell is empty."""
+    values = _numbers(path, table, "period")
+    for line, value in values.dropna().items():
+        if not (1 <= value < 2**31 and value == round(value)):
+            found = str(table.at[line, "period"])
+            raise PipelineError(
+                f'{path}, row {line}: "period" should be 1 for what came first, 2 for what came next, and so on, found'
+                f' "{found}"'
+            )
+    return values.astype("Int64")
+
+
 def _check_conditions(path: Path, table: pd.DataFrame, conditions: Sequence[str]) -> None:
     for line, condition in table["condition"].items():
         if condition not in conditions:
@@ -168,12 +181,17 @@ def read_questionnaires(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
 
 
 def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
-    """A row a value, NaN where missing, and the names of the further within-factors, each a column of text."""
+    """A row a value, NaN where missing, and the names of the further within-factors, each a column of text.
+
+    The column period, if there, holds whole numbers.
+    """
     table = _read(path, MEASURE_REQUIRED, None)
     factors = [str(name) for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]
     _required_text(path, table, MEASURE_REQUIRED[:3])
     _check_conditions(path, table, conditions)
     table["value"] = _numbers(path, table, "value")
+    if "period" in table:
+        table["period"] = _periods(path, table)
     keys = [*MEASURE_REQUIRED[:3], *factors, *(name for name in ("trial", "period") if name in table)]
     _check_unique(path, table, keys)
     return table, factors

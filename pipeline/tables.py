@@ -73,6 +73,7 @@ TABLES: Mapping[str, pa.Schema] = {
         *[(f"lever_arm_{axis}_mm", _FLOAT) for axis in "xyz"],
         *[(f"lever_arm_sd_{axis}_mm", _FLOAT) for axis in "xyz"],
     ),
+    "session_orders": _schema(("session", _TEXT), ("order", _TEXT)),  # as the log's facts say it
     "tracks": _schema(
         ("session", _TEXT),
         ("estimator", _TEXT),
@@ -96,6 +97,34 @@ TABLES: Mapping[str, pa.Schema] = {
         ("factors", _TEXT),
         ("measure", _TEXT),
         ("value", _FLOAT),
+    ),
+    "observations": _schema(
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("factors", _TEXT),
+        ("period", _COUNT),
+        ("sequence", _TEXT),
+        ("measure", _TEXT),
+        ("n", _COUNT),
+        ("value", _FLOAT),
+    ),
+    "orders": _schema(
+        ("participant", _TEXT), ("condition", _TEXT), ("session", _TEXT), ("period", _COUNT), ("source", _TEXT)
+    ),
+    "sequences": _schema(("participant", _TEXT), ("sequence", _TEXT)),
+    "design_check": _schema(
+        ("what", _TEXT),
+        ("measure", _TEXT),
+        ("condition", _TEXT),
+        ("found", _TEXT),
+        ("expected", _TEXT),
+        ("statistic_name", _TEXT),
+        ("statistic", _FLOAT),
+        ("df1", _FLOAT),
+        ("df2", _FLOAT),
+        ("p", _FLOAT),
+        ("remark", _TEXT),
     ),
     "descriptives": _schema(
         ("measure", _TEXT),

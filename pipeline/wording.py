@@ -34,6 +34,7 @@ _UNITS = {
 _QUESTIONNAIRES = {"nasa_tlx": "NASA-TLX", "sus": "SUS", "ueq": "UEQ"}
 _EFFECT_SIZES = {
     "generalized eta squared": "η²G",
+    "partial eta squared": "η²p",
     "Cohen's d_z": "d_z",
     "matched-pairs rank-biserial": "r_rb",
     "Kendall's W": "W",
@@ -41,7 +42,22 @@ _EFFECT_SIZES = {
 _SCALES = {
     "nasa_tlx": ("mental", "physical", "temporal", "performance", "effort", "frustration"),
 }
-TESTS = {"rm_anova": "rm ANOVA", "t_paired": "paired t", "wilcoxon": "Wilcoxon", "friedman": "Friedman"}
+TESTS = {
+    "rm_anova": "rm ANOVA",
+    "t_paired": "paired t",
+    "wilcoxon": "Wilcoxon",
+    "friedman": "Friedman",
+    "art_anova": "ART ANOVA",
+    "mixed_model": "mixed model",
+    "crossover": "crossover",
+    "tost": "equivalence (TOST)",
+    "bayes_t": "Bayes factor",
+}
+EFFECTS_OF_CONDITION = ("condition", "treatment")
+"""What a test calls the effect of the conditions."""
+_KNOWN_BY_STATISTIC = ("rm_anova", "t_paired", "wilcoxon", "friedman")
+_SEVERAL = "the differences between conditions are"
+_STATISTICS = {"chi2": "χ²", "BF10": "BF₁₀"}
 
 
 def measure_label(measure: str) -> str:
@@ -150,7 +166,7 @@ def degrees(value: float | None) -> str:
     """Degrees of freedom: whole where they are."""
     if value is None:
         return ""
-    return f"{value:.0f}" if float(value).is_integer() else f"{value:.2f}"
+    return f"{value:.0f}" if abs(value - round(value)) < 1e-6 * value else f"{value:.2f}"
 
 
 def statistic(row: Row) -> str:
@@ -159,7 +175,7 @@ def statistic(row: Row) -> str:
         return NOTHING
     value = number(row["statistic"])
     freedom = ", ".join(text for text in (degrees(row["df1"]), degrees(row["df2"])) if text)
-    name = {"chi2": "χ²"}.get(row["statistic_name"], row["statistic_name"])
+    name = _STATISTICS.get(row["statistic_name"], row["statistic_name"])
     return f"{name}({freedom}) = {value}" if freedom else f"{name} = {value}"
 
 
@@ -169,14 +185,22 @@ def effect_size(row: Row) -> str:
         return NOTHING
     name = _EFFECT_SIZES.get(row["effect_size_name"], row["effect_size_name"])
     bounds = interval(row["ci_low"], row["ci_high"])
-    return f"{name} = {_fixed(row['effect_size'], 2)}" + ("" if bounds == NOTHING else f" {bounds}")
+    value = number(row["effect_size"]) if name == "estimate" else _fixed(row["effect_size"], 2)
+    return f"{name} = {value}" + ("" if bounds == NOTHING else f" {bounds}")
 
 
 def contrast(row: Row) -> str:
-    """The pair a row compares, or its effect; typographic."""
-    if row["contrast"] is not None:
-        return str(row["contrast"]).replace(" - ", f" {MINUS} ")
-    return "conditions" if row["effect"] == "condition" else str(row["effect"]).replace(":", " × ")
+    """What a row compares: its pair, at which level of another factor, within which bounds, or its effect."""
+    effect = str(row["effect"]).replace(":", " × ").replace("carry_over", "carry-over")
+    if row["contrast"] is None:
+        return "conditions" if row["effect"] in EFFECTS_OF_CONDITION else effect
+    compared = str(row["contrast"]).replace(" - ", f" {MINUS} ")
+    if ":" in row["effect"] and " | " in compared:
+        return " at ".join(compared.rsplit(" | ", 1))
+    bounds = (row["details"] or {}).get("bounds")
+    if bounds:
+        return f"{compared} within {interval(*bounds)}"
+    return compared if row["effect"] in EFFECTS_OF_CONDITION else f"{effect}: {compared}"
 
 
 def corrected(row: Row) -> str | None:
@@ -197,19 +221,53 @@ def decisive_p(row: Row) -> float | None:
 
 def comparison_sentence(row: Row, with_reduction: bool = True) -> str:
     """One row in APA's manner, without the measure's name."""
-    head = contrast(row) + ", " if row["contrast"] is not None or ":" in row["effect"] else ""
+    head = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f"{contrast(row)}, "
     if row["status"] != "ok":
         return f"{head}{TESTS[row['test']]}: {row['status']} (n = {row['n']})"
-    parts = [f"{head}{statistic(row)}", p_phrase(row["p"])]
-    if corrected(row):
-        parts.append(corrected(row) or "")
-    if row["p_adjusted"] is not None:
-        parts.append(p_phrase(row["p_adjusted"], f"{row['adjust'].capitalize().replace('_', ' ')}-adjusted p"))
-    parts.append(effect_size(row))
-    parts.append(f"n = {row['n']}")
+    named = "" if row["test"] in _KNOWN_BY_STATISTIC else f"{TESTS[row['test']]}: "
+    if row["test"] == "bayes_t":
+        named = f"{TESTS['bayes_t']} (JZS, prior scale {row['details']['prior_scale']:g}): "
+    parts = [f"{named}{head}{evidence(row)}", f"n = {row['n']}"]
+    if (row["details"] or {}).get("singular"):
+        parts.append("singular fit: no variance between participants is found")
     if row["reduction"] is not None and with_reduction:
         parts.append(reduction_phrase(row["reduction"]))
     return ", ".join(parts)
+
+
+def evidence(row: Row) -> str:
+    """Statistic, p values and effect size of a row that is defined."""
+    parts = [statistic(row)]
+    if row["p"] is not None:
+        parts.append(p_phrase(row["p"]))
+    if corrected(row):
+        parts.append(corrected(row) or "")
+    if row["p_adjusted"] is not None:
+        parts.append(p_phrase(row["p_adjusted"], f"{adjustment(row['adjust'])}-adjusted p"))
+    if row["effect_size"] is not None:
+        parts.append(effect_size(row))
+    return ", ".join(parts)
+
+
+def adjustment(method: str) -> str:
+    """A way of adjusting p values by its authors' names."""
+    return {"benjamini_hochberg": "Benjamini-Hochberg"}.get(method, method.capitalize())
+
+
+def verdict(row: Row, alpha: float) -> str:
+    """What a row says at a level of significance."""
+    level = f"at the {100 * alpha:g} % level"
+    p = decisive_p(row)
+    if row["test"] == "bayes_t" and row["statistic"] is not None:
+        times = row["statistic"] if row["statistic"] >= 1 else 1 / row["statistic"]
+        likelier, other = ("a difference", "none") if row["statistic"] >= 1 else ("no difference", "one")
+        return f"the data are {number(times)} times as likely under {likelier} as under {other}"
+    if p is None:
+        return "no test is defined"
+    if row["test"] == "tost":
+        return f"the conditions are {'' if p < alpha else 'not shown to be '}equivalent within the bounds {level}"
+    named = "the difference is" if row["contrast"] is not None or row["reduction"] is not None else _SEVERAL
+    return f"{named} {'' if p < alpha else 'not '}statistically significant {level}"
 
 
 def reduction_phrase(reduction: float) -> str:

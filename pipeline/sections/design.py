@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.document.model import Block, Notice, Paragraph, Section, Strong, Text
+from pipeline.document.model import Block, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.sections.material import ORIGINS, Material, conditions_text
-from pipeline.wording import counted, listing, number
+from pipeline.wording import counted, listing, measure_label, number
 
 
 def section(material: Material) -> Section:
@@ -23,6 +23,7 @@ def section(material: Material) -> Section:
     if study.shown:
         shown = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
         blocks.append(Paragraph((Strong("Display: "), f"{listing(shown)}.")))
+    blocks += _checked(material)
     notes: list[Text] = [(ORIGINS[study.data_origin],)]
     if study.notes.strip():
         notes.append((study.notes.strip(),))
@@ -44,3 +45,37 @@ def _participants(material: Material) -> Text:
     if material.study.participants is None:
         text += "; the study has no participants table, so age and sex are not known"
     return (Strong("Participants: "), text + ".")
+
+
+def _checked(material: Material) -> list[Block]:
+    """What the check of the design found, and in a sentence what of it calls for attention."""
+    rows = material.rows("design_check")
+    if not rows:
+        return []
+    cells = tuple(
+        (
+            row["what"].capitalize(),
+            " ".join(filter(None, (row["condition"], row["measure"] and measure_label(row["measure"])))),
+            row["found"],
+            row["expected"],
+            row["remark"] or "",
+        )
+        for row in rows
+    )
+    remarked = [row["what"] for row in rows if row["remark"]]
+    text = "everything that could be checked is as it should be."
+    if remarked:
+        text = f"{counted(len(remarked), 'remark')}, on {listing(list(dict.fromkeys(remarked)))}; see the table."
+    note = (
+        f"Effects of the period and carry-over are tested singly at the {100 * material.study.alpha:g} % level; that "
+        "none is found does not mean that there is none, least of all for carry-over between few people."
+    )
+    table = Table(
+        "table-design",
+        "The design checked: who met which condition when, and whether it mattered. A comparison within people is fair "
+        "if each condition comes equally often early and late, and equally often after each other one.",
+        columns(("What", "Of", "Found", "Expected", "Remark"), 5),
+        cells,
+        note if any(row["expected"] == "none" for row in rows) else "",
+    )
+    return [Paragraph((Strong("Design: "), text)), table]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from pipeline import figures
 from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.sections.material import Material, Row, safe_name
 from pipeline.wording import (
+    TESTS,
+    adjustment,
     comparison_sentence,
     contrast,
     counted,
     effect_size,
+    evidence,
     interval,
     listing,
     measure_label,
@@ -123,9 +127,25 @@ def _measured(material: Material, measure: str) -> list[Block]:
             measure,
         )
     ]
-    for row in material.comparisons_of(measure):
-        blocks.append(Paragraph((Strong(f"{label}: "), f"{comparison_sentence(row)}.")))
+    for sentence in _sentences(material.comparisons_of(measure)):
+        blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
     return blocks
+
+
+def _sentences(rows: Sequence[Row]) -> Iterator[str]:
+    """A sentence a comparison; the pairs that follow one up share one."""
+    whole = {(row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] == "F"}
+
+    def follows_up(row: Row) -> bool:
+        return row["contrast"] is not None and (row["test"], row["effect"]) in whole
+
+    for (test, _, follows), group in groupby(rows, key=lambda row: (row["test"], row["effect"], follows_up(row))):
+        pairs = list(group)
+        if not follows:
+            yield from (comparison_sentence(row) for row in pairs)
+            continue
+        told = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
+        yield f"follow-up of the {TESTS[test]}, n = {pairs[0]['n']}: {'; '.join(told)}"
 
 
 def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:
@@ -200,9 +220,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
 
 def _families(rows: list[Row]) -> str:
     """How p values were adjusted, and over what."""
-    methods = [
-        name.replace("_", " ").title() for name in dict.fromkeys(row["adjust"] for row in rows) if name != "none"
-    ]
+    methods = [adjustment(name) for name in dict.fromkeys(row["adjust"] for row in rows) if name != "none"]
     if not methods:
         return "no"
     pairs = len({row["contrast"] for row in rows if row["contrast"] is not None}) > 1

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pipeline.document.model import Block, KeyFigure, KeyFigures, Notice, Paragraph, Section, Strong, Text
 from pipeline.sections.material import Material, Row
 from pipeline.wording import (
+    EFFECTS_OF_CONDITION,
     MINUS,
+    adjustment,
     comparison_sentence,
     counted,
     decisive_p,
@@ -16,10 +18,12 @@ from pipeline.wording import (
     percent,
     reduction_phrase,
     statistic,
+    verdict,
 )
 
 _HEADLINES = ("selection_mse_px2", "selection_mse_mm2", "completion_time_s", "trial_time_s")
 _KEY_FIGURES_MAX = 3
+_NOT_OF_CHANCE = ("tost", "bayes_t")  # they answer another question than whether there is a difference
 
 
 def section(material: Material) -> Section:
@@ -49,11 +53,18 @@ def _question(material: Material) -> Text:
     return (Strong("How accurately does each estimator follow the hand? "), f"{people}{compared}.")
 
 
+def _of_conditions(material: Material) -> list[Row]:
+    """The rows that compare all conditions at once: omnibus ones, or the pair where there are two conditions."""
+    return [
+        row
+        for row in material.rows("comparisons")
+        if row["effect"] in EFFECTS_OF_CONDITION and (row["contrast"] is None or len(material.study.conditions) == 2)
+    ]
+
+
 def _headline_rows(material: Material) -> list[Row]:
     """One omnibus row a measure that is no questionnaire's, the well-known measures first."""
-    rows = [row for row in material.rows("comparisons") if "/" not in row["measure"] and row["effect"] == "condition"]
-    if len(material.study.conditions) > 2:
-        rows = [row for row in rows if row["contrast"] is None]
+    rows = [row for row in _of_conditions(material) if "/" not in row["measure"] and row["test"] not in _NOT_OF_CHANCE]
     first = {row["measure"]: row for row in reversed(rows)}
     known = [name for name in _HEADLINES if name in first]
     return [first[name] for name in [*known, *sorted(set(first) - set(known))]]
@@ -97,12 +108,16 @@ def _answers(material: Material) -> list[Text]:
         if row["status"] != "ok":
             answers.append((Strong(f"{label}: "), f"{comparison_sentence(row)}."))
             continue
-        verdict = _verdict(row, material.study.alpha)
         change = ""
         if row["reduction"] is not None:
             first, second = material.study.conditions
             change = f"{reduction_phrase(row['reduction'])} with {second} relative to {first}; "
-        answers.append((Strong(f"{label}: "), f"{change}{verdict} ({comparison_sentence(row, with_reduction=False)})."))
+        said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
+        answers.append((Strong(f"{label}: "), f"{change}{said}."))
+    for row in _of_conditions(material):
+        if row["test"] in _NOT_OF_CHANCE and row["status"] == "ok":
+            said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
+            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
     means = _means(material)
     if means:
@@ -121,21 +136,13 @@ def _answers(material: Material) -> list[Text]:
     return answers
 
 
-def _verdict(row: Row, alpha: float) -> str:
-    p = decisive_p(row)
-    if p is None:
-        return "no test is defined"
-    named = "the difference is" if row["reduction"] is not None else "the differences between conditions are"
-    return f"{named} {'' if p < alpha else 'not '}statistically significant at the {100 * alpha:g} % level"
-
-
 def _ratings(material: Material) -> list[Text]:
     """How many scales of a questionnaire differ, before and after the adjustment, over the rows of one test."""
     answers: list[Text] = []
     alpha = material.study.alpha
     families: dict[tuple[str, str], list[Row]] = {}
-    for row in material.rows("comparisons"):
-        if "/" in row["measure"] and (row["contrast"] is None or len(material.study.conditions) == 2):
+    for row in _of_conditions(material):
+        if "/" in row["measure"] and row["test"] not in _NOT_OF_CHANCE:
             families.setdefault((row["measure"].partition("/")[0], row["test"]), []).append(row)
     for (questionnaire, _), rows in families.items():
         label = measure_label(f"{questionnaire}/x").partition(":")[0]
@@ -143,10 +150,23 @@ def _ratings(material: Material) -> list[Text]:
         text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level taken singly"
         if any(row["p_adjusted"] is not None for row in rows):
             kept = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
-            method = rows[0]["adjust"].replace("_", " ").title() if rows[0]["adjust"] != "holm" else "Holm"
-            text += f", and {len(kept)} after adjusting for {counted(len(rows), 'test')} ({method})"
+            text += (
+                f", and {len(kept)} after adjusting for {counted(len(rows), 'test')} ({adjustment(rows[0]['adjust'])})"
+            )
         answers.append((Strong(f"{label}: "), f"{text}."))
     return answers
+
+
+def _is_singular(row: Row) -> bool:
+    return bool((row["details"] or {}).get("singular"))
+
+
+def _of_design(material: Material) -> list[Text]:
+    """How many things in the check of the design are not as they should be."""
+    remarked = [row for row in material.rows("design_check") if row["remark"]]
+    if not remarked:
+        return []
+    return [(f"{counted(len(remarked), 'remark')} on the design; see design and participants.",)]
 
 
 def _cautions(material: Material) -> list[Text]:
@@ -182,6 +202,17 @@ def _cautions(material: Material) -> list[Text]:
                 f"(the differences between conditions vary unequally) for {names}: judge by the Greenhouse-Geisser p.",
             )
         )
+    singular = [measure_label(row["measure"]) for row in material.rows("comparisons") if _is_singular(row)]
+    if singular:
+        names = listing(list(dict.fromkeys(singular)))
+        cautions.append(
+            (
+                Strong("Singular fit "),
+                f"of the mixed model for {names}: it finds no variance between participants, so that it treats their"
+                " rows as if of different people.",
+            )
+        )
+    cautions += _of_design(material)
     undefined = sum(row["status"] != "ok" for row in material.rows("comparisons"))
     if undefined:
         cautions.append((f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",))

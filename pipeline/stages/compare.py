@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Iterable, Sequence
-from itertools import combinations
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,20 +10,16 @@ import pandas as pd
 from scipy import stats
 
 from pipeline import results, study_tables, tables
-from pipeline.errors import PipelineError, did_you_mean
+from pipeline.comparisons import compared, everything_asked
+from pipeline.design_check import findings
 from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
 from pipeline.stage import Outcome, Work
-from pipeline.statistics.anova import rm_anova
-from pipeline.statistics.multiplicity import adjusted
-from pipeline.statistics.paired import t_paired
-from pipeline.statistics.rank import friedman, wilcoxon
-from pipeline.statistics.result import FloatArray, Result
-from pipeline.study import Comparison, Study
+from pipeline.statistics.result import FloatArray
+from pipeline.study import Study
 from pipeline.wording import measure_order
 
 Row = dict[str, Any]
-PAIRWISE = ("t_paired", "wilcoxon")
 _SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones")
 
 
@@ -42,8 +35,12 @@ def run(work: Work) -> Outcome:
         "measures": measures,
         "descriptives": tables.frame("descriptives", descriptives(study, measures)),
     }
-    rows, left_out = comparisons(study, measures)
+    observations = tables.read("observations", measured)
+    rows, left_out = compared(study, measures, observations)
     found["comparisons"] = tables.frame("comparisons", rows)
+    asked = [one for entry in everything_asked(study, measures, observations) for one in entry]
+    checked = findings(study, asked, tables.read("orders", measured), found["trials"], work.sessions)
+    found["design_check"] = tables.frame("design_check", checked)
     left_out += _without_accuracy(work)
     found["exclusions"] = pd.concat(
         [
@@ -175,144 +172,3 @@ def shown_at_selection(study: Study, trials: pd.DataFrame) -> list[Row]:
         for estimator in dict.fromkeys(known["estimator"])
         if (condition, estimator) in found
     ]
-
-
-def comparisons(study: Study, measures: pd.DataFrame) -> tuple[list[Row], list[Row]]:
-    """Every row of `comparisons`, and the exclusions that came of incomplete participants."""
-    rows: list[Row] = []
-    left_out: list[Row] = []
-    for entry in study.comparisons:
-        family: list[list[Row]] = []
-        for measure in _matching(entry, sorted(set(measures["measure"]), key=measure_order)):
-            family.append(_compare(study, entry, measure, measures, left_out))
-        if entry.test in PAIRWISE and len(study.conditions) > 2:
-            for pairs in family:
-                _adjust(entry, pairs)
-        else:
-            _adjust(entry, [row for measured in family for row in measured])
-        rows += [row for measured in family for row in measured]
-    unique = {tuple(sorted(row.items())): row for row in left_out}
-    return rows, list(unique.values())
-
-
-def _matching(entry: Comparison, known: Sequence[str]) -> list[str]:
-    """The measures an entry names; `*` stands for scales, never for a total."""
-    if "*" in entry.measure:
-        pattern = ".*".join(re.escape(piece) for piece in entry.measure.split("*"))
-        found = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
-    else:
-        found = [name for name in known if name == entry.measure]
-    if not found:
-        raise PipelineError(
-            f'study.yaml: comparisons: there is no measure "{entry.measure}" in the'
-            f" data{did_you_mean(entry.measure, known)}"
-        )
-    return found
-
-
-def _compare(study: Study, entry: Comparison, measure: str, measures: pd.DataFrame, left_out: list[Row]) -> list[Row]:
-    if len(study.conditions) < 2:
-        raise PipelineError("study.yaml: comparisons: need two conditions or more, and conditions lists one")
-    if len(entry.within) > 1:
-        values, labels = _factorial(study, entry, measure, measures, left_out)
-        return [_row(entry, measure, result) for result in rm_anova(values, labels)]
-    wide = tables.participant_means(measures, measure, study.conditions)
-    complete = wide.dropna()
-    _list_incomplete(entry, measure, wide, left_out)
-    values = complete.to_numpy(np.float64)
-    if entry.test in PAIRWISE:
-        return [
-            _row(entry, measure, _pair(entry, values[:, i], values[:, j]), values[:, [i, j]], (first, second))
-            for (i, first), (j, second) in combinations(enumerate(study.conditions), 2)
-        ]
-    result = rm_anova(values, ["condition"])[0] if entry.test == "rm_anova" else friedman(values)
-    return [_row(entry, measure, result, values if values.shape[1] == 2 else None)]
-
-
-def _pair(entry: Comparison, first: FloatArray, second: FloatArray) -> Result:
-    return wilcoxon(first, second, zeros=entry.zeros) if entry.test == "wilcoxon" else t_paired(first, second)
-
-
-def _factorial(
-    study: Study, entry: Comparison, measure: str, measures: pd.DataFrame, left_out: list[Row]
-) -> tuple[FloatArray, list[str]]:
-    """Complete participants × levels of each factor, the factors in the order of `within`."""
-    rows = measures[measures["measure"] == measure].copy()
-    told = [json.loads(text) if isinstance(text, str) else {} for text in rows["factors"]]
-    for factor in entry.within:
-        if factor != "condition":
-            rows[factor] = [facts.get(factor) for facts in told]
-            if rows[factor].isna().any():
-                known = sorted({key for facts in told for key in facts} | {"condition"})
-                raise PipelineError(
-                    f'study.yaml: comparisons: "{measure}" has no factor "{factor}"{did_you_mean(factor, known)}'
-                )
-    levels = [
-        list(study.conditions) if factor == "condition" else list(dict.fromkeys(rows[factor]))
-        for factor in entry.within
-    ]
-    for factor, found in zip(entry.within, levels, strict=True):
-        if len(found) < 2:
-            raise PipelineError(f'study.yaml: comparisons: factor "{factor}" of "{measure}" has one level: {found[0]}')
-    wide = rows.pivot_table(index="participant", columns=list(entry.within), values="value", aggfunc="mean")
-    wide = wide.reindex(columns=pd.MultiIndex.from_product(levels, names=list(entry.within)))
-    _list_incomplete(entry, measure, wide, left_out)
-    complete = wide.dropna().to_numpy(np.float64)
-    return complete.reshape(len(complete), *(len(level) for level in levels)), list(entry.within)
-
-
-def _list_incomplete(entry: Comparison, measure: str, wide: pd.DataFrame, left_out: list[Row]) -> None:
-    """Who is left out of a comparison because a cell is missing (listwise)."""
-    for participant in wide.index[wide.isna().any(axis=1)]:
-        absent = [
-            column if isinstance(column, str) else " × ".join(column)
-            for column in wide.columns[wide.loc[participant].isna()]
-        ]
-        left_out.append(
-            {
-                "participant": participant,
-                "measure": measure,
-                "what": "left out of comparisons",
-                "reason": f"{entry.test}: no value in {', '.join(absent)}",
-            }
-        )
-
-
-def _row(
-    entry: Comparison,
-    measure: str,
-    result: Result,
-    values: FloatArray | None = None,
-    pair: tuple[str, str] | None = None,
-) -> Row:
-    """A result as a row; `values` of two conditions give the mean difference and the reduction."""
-    row: Row = {
-        "measure": measure,
-        "test": entry.test,
-        "effect": result.effect,
-        "contrast": None if pair is None else f"{pair[0]} - {pair[1]}",
-        "n": result.n,
-        "statistic_name": result.statistic_name,
-        "statistic": result.statistic,
-        "df1": result.df1,
-        "df2": result.df2,
-        "p": result.p,
-        "adjust": entry.adjust,
-        "method": result.method,
-        "effect_size_name": result.effect_size_name,
-        "effect_size": result.effect_size,
-        "ci_low": result.ci_low,
-        "ci_high": result.ci_high,
-        "status": result.status,
-        "details": json.dumps(result.details) if result.details else None,
-    }
-    if values is not None and len(values):
-        first, second = (float(mean) for mean in values.mean(axis=0))
-        row["mean_difference"] = first - second
-        row["reduction"] = 1 - second / first if first != 0 else None
-    return row
-
-
-def _adjust(entry: Comparison, rows: list[Row]) -> None:
-    for row, value in zip(rows, adjusted([row["p"] for row in rows], entry.adjust), strict=True):
-        row["p_adjusted"] = value

@@ -74,6 +74,9 @@ def run(work: Work) -> Outcome:
     reasons = [f"{row['stream']}: {row['note']}" for row in left_out]
     listed = [{**ids, "what": "samples left out", "reason": reason} for reason in reasons]
     tables.write("exclusions", tables.frame("exclusions", listed), work.out)
+    if "order" in log.facts:
+        order = {"session": session.id, "order": log.facts["order"]}
+        tables.write("session_orders", tables.frame("session_orders", [order]), work.out)
     in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 

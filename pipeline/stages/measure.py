@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import study_tables, tables
+from pipeline import orders, study_tables, tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.stage import Outcome, Work
 from pipeline.study import Exclusion, Study
@@ -24,8 +24,14 @@ def run(work: Work) -> Outcome:
     study = work.study
     exclusions: list[Row] = []
     trials = _trials(work)
+    tabled = _measures_table(work)
     values = pd.concat(
-        [_selection_values(study, trials), _completion_values(work, exclusions), *_tabled_values(work)]
+        [
+            _selection_values(study, trials),
+            _completion_values(work, exclusions),
+            *_rated_values(work),
+            *_tabled_values(work, tabled),
+        ]
     ).reset_index(drop=True)
     _check_sources(values)
     known = _known(work, values, trials)
@@ -37,14 +43,15 @@ def run(work: Work) -> Outcome:
         exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
     exclusions += _incomplete_trials(trials)
     values = _finite(values, exclusions)
-    cells = _cells(values)
-    measures = pd.concat([cells, _totals(cells)]).reset_index(drop=True)
-    for excluded in study.exclusions:
-        if excluded.session is None:
-            measures = measures[~_matches(excluded, measures)]
+    measures = _with_totals(study, _cells(values, CELL), CELL)
     exclusions += _gaps(work, measures)
+    run, sequences = _orders(work, tabled)
+    observed = [*CELL, "session", "period", "sequence"]
+    placed = orders.placed(values, run, sequences)
+    tables.write("observations", _with_totals(study, _cells(placed, observed), observed), work.out)
+    tables.write("orders", run, work.out)
     tables.write("trials", trials, work.out)
-    tables.write("measures", measures.sort_values(["measure", *CELL, "factors"], kind="stable"), work.out)
+    tables.write("measures", measures, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
 
@@ -84,18 +91,19 @@ def _trials(work: Work) -> pd.DataFrame:
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
-    """Rows of one measure: participant, condition, session, factors, measure, value, and where it stands."""
+    """Rows of one measure: participant, condition, session, factors, period, measure, value, and where it stands."""
     return pd.DataFrame(
         {
             "participant": rows["participant"],
             "condition": rows["condition"],
             "session": rows["session"],
             "factors": None,
+            "period": pd.NA,
             "measure": measure,
             "value": rows[column].astype("float64"),
             "source": source,
         }
-    ).astype({"factors": "object"})
+    ).astype({"factors": "object", "period": "Int64"})
 
 
 def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
@@ -138,24 +146,46 @@ def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
     return _values(found, "completion_time_s", "seconds", "the events")
 
 
-def _tabled_values(work: Work) -> Iterator[pd.DataFrame]:
-    """Ratings and further dependent variables from the study's tables."""
-    conditions = work.study.conditions
-    questionnaires, measures = _path(work, "questionnaires"), _path(work, "measures")
-    if questionnaires is not None:
-        ratings = study_tables.read_questionnaires(questionnaires, conditions)
+def _rated_values(work: Work) -> Iterator[pd.DataFrame]:
+    """Ratings from questionnaires."""
+    path = _path(work, "questionnaires")
+    if path is not None:
+        ratings = study_tables.read_questionnaires(path, work.study.conditions)
         ratings["session"] = ratings.get("session")
         names = ratings["questionnaire"] + "/" + ratings["scale"]
         yield _values(ratings, "", "rating", str(work.study.questionnaires)).assign(measure=names)
-    if measures is not None:
-        table, factors = study_tables.read_measures(measures, conditions)
-        rows = _values(table.assign(session=None), "", "value", str(work.study.measures)).assign(
-            measure=table["measure"]
-        )
-        if factors:
-            told = [{k: v for k, v in zip(factors, row, strict=True) if v} for row in table[factors].to_numpy()]
-            rows["factors"] = [json.dumps(facts) if facts else None for facts in told]
-        yield rows
+
+
+def _measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
+    """The table of measures and its further factors, if the study has one."""
+    path = _path(work, "measures")
+    return None if path is None else study_tables.read_measures(path, work.study.conditions)
+
+
+def _tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:
+    """Further dependent variables from the study's table of measures."""
+    if tabled is None:
+        return
+    table, factors = tabled
+    rows = _values(table.assign(session=None), "", "value", str(work.study.measures)).assign(measure=table["measure"])
+    if "period" in table:
+        rows["period"] = table["period"]
+    if factors:
+        told = [{k: v for k, v in zip(factors, row, strict=True) if v} for row in table[factors].to_numpy()]
+        rows["factors"] = [json.dumps(facts) if facts else None for facts in told]
+    yield rows
+
+
+def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """In which order people met the conditions, and the labels of their sequences."""
+    path = _path(work, "participants")
+    return orders.gathered(
+        work.study.conditions,
+        work.sessions,
+        tables.read("session_orders", work.entries["ingest"]),
+        None if tabled is None else tabled[0],
+        None if path is None else study_tables.read_participants(path),
+    )
 
 
 def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
@@ -244,27 +274,36 @@ def _finite(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
     return kept
 
 
-def _cells(values: pd.DataFrame) -> pd.DataFrame:
-    """A participant's mean in each condition and further factor: one row a cell and measure."""
-    keys = [*CELL, "factors", "measure"]
-    means: Any = values.groupby(keys, dropna=False, sort=False)["value"].mean().reset_index()
-    return pd.DataFrame(means)
+def _cells(values: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
+    """The mean of each cell and further factor, and of how many values: one row a cell and measure."""
+    found: Any = values.groupby([*cell, "factors", "measure"], dropna=False, sort=False)["value"]
+    return pd.DataFrame(found.agg(["mean", "size"]).reset_index()).rename(columns={"mean": "value", "size": "n"})
 
 
-def _totals(cells: pd.DataFrame) -> pd.DataFrame:
+def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
+    """Cells and the questionnaires' totals, less those that study.yaml excludes, in the order of the table."""
+    rows = pd.concat([cells, _totals(cells, cell)]).reset_index(drop=True)
+    for excluded in study.exclusions:
+        if excluded.session is None:
+            rows = rows[~_matches(excluded, rows)]
+    return rows.sort_values(["measure", *CELL, "factors"], kind="stable")
+
+
+def _totals(cells: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
     """`<questionnaire>/total`: a participant's sum over the scales; none where a scale is missing."""
     parts = [str(measure).partition("/") for measure in cells["measure"]]
     told = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
     ratings = told[told["scale"] != ""]
     rows = []
+    keys = [*cell, "factors"]
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
         scales = set(answered["scale"])
         if "total" in scales:
             continue
-        for (participant, condition, factors), cell in answered.groupby([*CELL, "factors"], dropna=False, sort=False):
-            if set(cell["scale"]) == scales:
-                rows.append((participant, condition, factors, f"{questionnaire}/total", cell["value"].sum()))
-    return pd.DataFrame(rows, columns=[*CELL, "factors", "measure", "value"])
+        for found, rated in answered.groupby(keys, dropna=False, sort=False):
+            if set(rated["scale"]) == scales:
+                rows.append((*found, f"{questionnaire}/total", rated["value"].sum(), rated["n"].min()))
+    return pd.DataFrame(rows, columns=[*keys, "measure", "value", "n"])
 
 
 def _check_sources(values: pd.DataFrame) -> None:

@@ -25,6 +25,7 @@ _FROM_COMPARE = (
     "quality",
     "exclusions",
     "printed",
+    "design_check",
 )
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
 

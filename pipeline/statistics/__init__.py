@@ -9,5 +9,20 @@ NO_ERROR = "undefined: all differences are equal, so there is no error to test a
 NO_VARIATION = "undefined: no value varies"
 NO_COMPLETE = "undefined: no participant is complete"
 ONE_COMPLETE = "undefined: only one participant is complete"
+CONFOUNDED = "undefined: nobody has values in two conditions, so the effect cannot be told from the participants"
+ALIASED = "undefined: the terms of the model cannot be told apart in these data"
+TOO_FEW_VALUES = "undefined: too few values for the terms of the model"
+ONE_ORDER = "undefined: everybody met the conditions in the same order"
 
-STATUSES = (OK, ALL_ZERO, NO_ERROR, NO_VARIATION, NO_COMPLETE, ONE_COMPLETE)
+STATUSES = (
+    OK,
+    ALL_ZERO,
+    NO_ERROR,
+    NO_VARIATION,
+    NO_COMPLETE,
+    ONE_COMPLETE,
+    CONFOUNDED,
+    ALIASED,
+    TOO_FEW_VALUES,
+    ONE_ORDER,
+)

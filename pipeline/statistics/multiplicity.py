@@ -25,7 +25,7 @@ def adjusted(p_values: Sequence[float | None], method: str) -> list[float | None
         changed[order] = np.minimum(1.0, np.maximum.accumulate((m - np.arange(m)) * p[order]))
     elif method == "benjamini_hochberg":
         changed = np.empty(m)
-        scaled = p[order] * m / np.arange(1, m + 1)
+        scaled = p[order] * (m / np.arange(1, m + 1))
         changed[order] = np.minimum(1.0, np.minimum.accumulate(scaled[::-1])[::-1])
     else:
         raise ValueError(f"no adjustment is called {method!r}")

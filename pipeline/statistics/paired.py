@@ -1,8 +1,8 @@
-"""The paired t test."""
+"""The paired t test, and what all tests of paired differences begin with."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -12,42 +12,52 @@ from pipeline.statistics.effect_size import cohen_dz, dz_interval, hedges_correc
 from pipeline.statistics.result import FloatArray, Result, negligible, rounded_differences, too_few
 
 
+@dataclass(frozen=True)
+class Differences:
+    """How many, their mean, its standard error, and the mean over their SD."""
+
+    n: int
+    mean: float
+    error: float
+    dz: float
+
+
+def differences_of(first: FloatArray, second: FloatArray) -> Differences | str:
+    """The differences first − second, or the status where they cannot be tested."""
+    n = len(first)
+    values = rounded_differences(first, second)
+    if status := too_few(n):
+        return status
+    if not np.any(values):
+        return ALL_ZERO
+    if negligible(float(np.sum((values - values.mean()) ** 2)), np.stack([first, second])):
+        return NO_ERROR
+    error = float(np.std(values, ddof=1)) / np.sqrt(n)
+    return Differences(n, float(np.mean(values)), error, cohen_dz(values))
+
+
 def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -> Result:
     """Student's t of the differences first − second, two-sided; effect size d_z with its noncentral-t interval."""
-    n = len(first)
-    blank = Result(effect, "t", "paired t test, two-sided", "Cohen's d_z", n)
-    both = np.stack([first, second])
-    differences = rounded_differences(first, second)
-    status = too_few(n)
-    if status is None and not np.any(differences):
-        status = ALL_ZERO
-    elif status is None and negligible(float(np.sum((differences - differences.mean()) ** 2)), both):
-        status = NO_ERROR
-    if status is not None:
-        return replace(blank, status=status)
-    sd = float(np.std(differences, ddof=1))
-    mean, error = float(np.mean(differences)), sd / np.sqrt(n)
-    statistic, margin = mean / error, float(stats.t.ppf(0.975, n - 1)) * error
-    dz = cohen_dz(differences)
-    low, high = dz_interval(dz, n)
-    correction = hedges_correction(n - 1)
+    blank = Result(effect, "t", "paired t test, two-sided", "Cohen's d_z", len(first))
+    found = differences_of(first, second)
+    if isinstance(found, str):
+        return replace(blank, status=found)
+    df = found.n - 1
+    statistic, margin = found.mean / found.error, float(stats.t.ppf(0.975, df)) * found.error
+    low, high = dz_interval(found.dz, found.n)
+    correction = hedges_correction(df)
     pooled = float(np.sqrt((np.var(first, ddof=1) + np.var(second, ddof=1)) / 2))
-    shapiro = stats.shapiro(differences) if n >= 3 else None
-    details = {
-        "hedges_gz": None if correction is None else correction * dz,
-        "d_av": mean / pooled if pooled > 0 else None,
-        "ci_difference": [mean - margin, mean + margin],
-        "shapiro_w": None if shapiro is None else float(shapiro.statistic),
-        "shapiro_p": None if shapiro is None else float(shapiro.pvalue),
-    }
-    p = float(2 * stats.t.sf(abs(statistic), n - 1))
     return replace(
         blank,
         statistic=float(statistic),
-        df2=float(n - 1),
-        p=p,
-        effect_size=dz,
+        df2=float(df),
+        p=float(2 * stats.t.sf(abs(statistic), df)),
+        effect_size=found.dz,
         ci_low=low,
         ci_high=high,
-        details=details,
+        details={
+            "hedges_gz": None if correction is None else correction * found.dz,
+            "d_av": found.mean / pooled if pooled > 0 else None,
+            "ci_difference": [found.mean - margin, found.mean + margin],
+        },
     )

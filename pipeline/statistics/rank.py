@@ -6,10 +6,22 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from scipy import stats
+from scipy import optimize, signal, special, stats
 
 from pipeline.statistics import ALL_ZERO
-from pipeline.statistics.result import FloatArray, Result, degenerate, rounded, rounded_differences, too_few
+from pipeline.statistics.result import (
+    FloatArray,
+    IntArray,
+    Result,
+    degenerate,
+    rounded,
+    rounded_differences,
+    too_few,
+)
+
+EXACT_UP_TO = 3000  # pairs: beyond, the Walsh averages alone would fill the memory
+_BLOCK = 256
+_SHARPEST = -50.0
 
 
 def wilcoxon(
@@ -18,14 +30,15 @@ def wilcoxon(
     effect: str = "condition",
     zeros: Literal["dropped", "pratt"] = "dropped",
 ) -> Result:
-    """Signed-rank test of first − second, two-sided and exact: the distribution of W₊ over all signs of the midranks.
+    """Signed-rank test of first − second, two-sided, by the exact distribution of W₊ over all signs of the midranks.
 
     Zeros are dropped (Wilcoxon) or ranked and then dropped (Pratt 1959). Effect size: matched-pairs rank-biserial
     correlation (Kerby 2014) with an interval by Fisher's z.
     """
     n = len(first)
     treatment = "zeros dropped" if zeros == "dropped" else "zeros by Pratt"
-    blank = Result(effect, "W+", f"exact, midranks, {treatment}", "matched-pairs rank-biserial", n)
+    how = "exact" if n <= EXACT_UP_TO else f"asymptotic (over {EXACT_UP_TO} pairs), tie-corrected"
+    blank = Result(effect, "W+", f"{how}, midranks, {treatment}", "matched-pairs rank-biserial", n)
     differences = rounded_differences(first, second)
     status = too_few(n) or (None if np.any(differences) else ALL_ZERO)
     if status is not None:
@@ -41,7 +54,7 @@ def wilcoxon(
     w_minus = float(ranks[differences[nonzero] < 0].sum())
     biserial = (w_plus - w_minus) / all_ranks
     low, high = _biserial_interval(biserial, n)
-    location, interval = hodges_lehmann(differences)
+    location, interval = hodges_lehmann(differences) if n <= EXACT_UP_TO else (None, None)
     details = {
         "w_plus": w_plus,
         "w_minus": w_minus,
@@ -62,23 +75,60 @@ def wilcoxon(
 
 
 def signed_rank_p(ranks: FloatArray, w_plus: float) -> float:
-    """Two-sided exact p: twice the smaller tail of W₊ when every rank takes its sign by a fair coin, at most 1."""
-    probability = _signed_rank_distribution(ranks)
-    at = round(2 * w_plus)
-    return float(min(1.0, 2 * min(probability[: at + 1].sum(), probability[at:].sum())))
+    """Two-sided p of W₊ when every rank takes its sign by a fair coin: twice the smaller tail, at most 1.
+
+    Exact up to `EXACT_UP_TO` ranks, beyond by the normal distribution with the ranks' own variance.
+    """
+    smaller = min(w_plus, float(ranks.sum()) - w_plus)
+    if len(ranks) > EXACT_UP_TO:
+        z = (smaller - ranks.sum() / 2) / np.sqrt(np.sum(ranks**2) / 4)
+        return float(min(1.0, 2 * special.ndtr(z)))
+    doubled = np.rint(2 * ranks).astype(np.int64)  # midranks are halves, so doubled ranks are whole
+    unit = int(np.gcd.reduce(doubled))
+    return float(min(1.0, 2 * _lower_tail(doubled // unit, round(2 * smaller) // unit)))
 
 
-def _signed_rank_distribution(ranks: FloatArray) -> FloatArray:
-    """Probability of each value of 2·W₊ (midranks are halves, so doubled ranks are whole), by convolution."""
-    doubled = np.rint(2 * ranks).astype(np.int64)
-    probability = np.zeros(int(doubled.sum()) + 1)
+def _lower_tail(weights: IntArray, at: int) -> float:
+    """P(W ≤ at) of a sum W of weights, each in or out by a fair coin.
+
+    Many weights are convolved by Fourier transforms, whose error is absolute. Coins tilted so that W is expected at
+    `at` (Esscher 1932) put the tail where the probabilities are large, and the tilt is taken out again.
+    """
+    tilt = 0.0 if len(weights) <= _BLOCK else _tilt(weights, at)
+    scale = float(np.sum(np.logaddexp(0, tilt * weights) - np.log(2)))
+    return float(np.sum(_distribution(weights, tilt)[: at + 1] * np.exp(scale - tilt * np.arange(at + 1))))
+
+
+def _tilt(weights: IntArray, at: int) -> float:
+    """The tilt under which W is expected at `at`, which is at most half the weights' sum."""
+
+    def beyond(tilt: float) -> float:
+        return float(np.sum(weights * special.expit(tilt * weights)) - at)
+
+    return _SHARPEST if beyond(_SHARPEST) >= 0 else float(optimize.brentq(beyond, _SHARPEST, 0.0, xtol=1e-15))
+
+
+def _distribution(weights: IntArray, tilt: float = 0.0) -> FloatArray:
+    """P(W = 0), P(W = 1), … where a weight w is in with probability 1 / (1 + e^(−tilt·w))."""
+    parts = [
+        _convolved(block, special.expit(tilt * block))
+        for block in np.split(weights, range(_BLOCK, len(weights), _BLOCK))
+    ]
+    while len(parts) > 1:
+        pairs = [signal.fftconvolve(one, two) for one, two in zip(parts[::2], parts[1::2], strict=False)]
+        parts = pairs + parts[2 * len(pairs) :]
+    return parts[0]
+
+
+def _convolved(weights: IntArray, chances: FloatArray) -> FloatArray:
+    """The same for few weights, one after the other: sums of positive terms, so that small figures are right too."""
+    probability = np.zeros(int(weights.sum()) + 1)
     probability[0], reached = 1.0, 0
-    for rank in doubled:
-        probability[rank : reached + rank + 1] = (
-            probability[rank : reached + rank + 1] + probability[: reached + 1]
-        ) / 2
-        probability[:rank] /= 2
-        reached += int(rank)
+    for weight, chance in zip(weights, chances, strict=True):
+        before = probability[: reached + 1].copy()
+        probability[: reached + 1] *= 1 - chance
+        probability[weight : reached + weight + 1] += chance * before
+        reached += int(weight)
     return probability
 
 
@@ -97,24 +147,26 @@ def hodges_lehmann(differences: FloatArray, level: float = 0.95) -> tuple[float,
     n = len(differences)
     row, column = np.triu_indices(n)
     walsh = np.sort((differences[row] + differences[column]) / 2)
-    cumulative = np.cumsum(_signed_rank_distribution(np.arange(1.0, n + 1))[::2])
+    cumulative = np.cumsum(_distribution(np.arange(1, n + 1)))
     outside = int(np.searchsorted(cumulative, (1 - level) / 2 * (1 + 1e-12), side="right"))
     interval = (float(walsh[outside - 1]), float(walsh[-outside])) if outside > 0 else None
     return float(np.median(walsh)), interval
 
 
 def friedman(values: FloatArray, effect: str = "condition") -> Result:
-    """Friedman's test of values (n, k) with ties corrected; effect size Kendall's W; Iman and Davenport's F beside."""
+    """Friedman's test of values (n, k) with ties corrected; Iman and Davenport's F beside.
+
+    Effect size: Kendall's W, with an interval by the jackknife over participants.
+    """
     n, k = values.shape
     blank = Result(effect, "chi2", "Friedman, chi-squared approximation, ties corrected", "Kendall's W", n, df1=k - 1)
     status = too_few(n) or degenerate(values)
     if status is not None:
         return replace(blank, status=status)
     ranks = np.apply_along_axis(stats.rankdata, 1, rounded(values))
-    spread = float(np.sum((ranks.sum(axis=0) - n * (k + 1) / 2) ** 2))
-    ties = float(np.sum(ranks**2)) - n * k * (k + 1) ** 2 / 4
-    statistic = (k - 1) * spread / ties
-    agreement = statistic / (n * (k - 1))
+    agreement = float(_agreement(n, ranks.sum(axis=0), np.sum(ranks**2)))
+    statistic = n * (k - 1) * agreement
+    low, high = _agreement_interval(ranks)
     left = n * (k - 1) - statistic
     f = (n - 1) * statistic / left if left > 1e-9 else None
     details = {
@@ -127,5 +179,38 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
         statistic=statistic,
         p=p,
         effect_size=agreement,
+        ci_low=low,
+        ci_high=high,
         details=details,
     )
+
+
+def _agreement(n: int, sums: FloatArray, squares: FloatArray) -> FloatArray:
+    """Kendall's W, corrected for ties, from the sums of n people's ranks (…, k) and of their squares (…)."""
+    k = sums.shape[-1]
+    expected = n * (k + 1) / 2
+    agreement: FloatArray = np.sum((sums - expected) ** 2, axis=-1) / (n * squares - k * expected**2)
+    return agreement
+
+
+def _agreement_interval(ranks: FloatArray, level: float = 0.95) -> tuple[float | None, float | None]:
+    """By the jackknife (Arvesen 1969) of Fisher's z of the mean rank correlation ρ, where W = (1 + (n − 1)ρ) / n.
+
+    None at perfect agreement, where z is infinite, and below three participants. In simulations of 6 to 24
+    participants and 3 or 4 conditions 90 to 98 % of intervals held W; fewer where W was above .8 of three conditions
+    (82 % at n = 12, 63 % at n = 6).
+    """
+    n, k = ranks.shape
+    varied = np.sum((ranks - (k + 1) / 2) ** 2, axis=1)
+    if n < 3 or np.any(varied.sum() - varied < 1e-9):
+        return None, None
+    sums, squares = ranks.sum(axis=0), np.sum(ranks**2, axis=1)
+    whole = (n * float(_agreement(n, sums, squares.sum())) - 1) / (n - 1)
+    if whole > 1 - 1e-12:
+        return None, None
+    without = ((n - 1) * _agreement(n - 1, sums - ranks, squares.sum() - squares) - 1) / (n - 2)
+    influence = n * whole - (n - 1) * without
+    margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * float(np.std(influence, ddof=1)) / np.sqrt(n)
+    bounds = np.tanh(np.arctanh(whole) + np.array([-1, 1]) * margin / (1 - whole**2))
+    low, high = np.clip((1 + (n - 1) * bounds) / n, 0.0, 1.0)
+    return float(low), float(high)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pipeline.statistics import ALL_ZERO, NO_COMPLETE, NO_VARIATION, OK, ONE_COMPLETE
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 _ROUND_OFF = 1e-12  # of the largest value: what arithmetic on decimal data leaves behind
 
@@ -32,6 +33,7 @@ class Result:
     effect_size: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None
+    contrast: str | None = None
     status: str = OK
     details: Mapping[str, Any] = field(default_factory=dict)
 

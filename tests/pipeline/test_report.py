@@ -24,8 +24,10 @@ from pipeline.document.model import (
     Strong,
     Table,
 )
+from pipeline.wording import TESTS
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.reference import study_of
 
 Folder = Callable[..., Path]
 
@@ -262,3 +264,62 @@ def test_names_in_any_script_are_drawn_and_set(folder: Folder, steadyhand: Stead
     assert ran.code == 0, ran.err
     assert "測定 🙂" in (steadyhand.out / "report.html").read_text(encoding="utf-8")
     assert "□□ □" in PdfReader(steadyhand.out / "report.pdf").pages[0].extract_text()
+
+
+def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) -> None:
+    """A sentence, a line of the table and the method of each, with the figures of results.json."""
+    tests = [
+        "test: rm_anova, adjust: holm",
+        "test: art_anova",
+        "test: friedman",
+        "test: mixed_model, fixed: [condition, period]",
+        "test: crossover",
+        "test: t_paired",
+        "test: wilcoxon",
+        "test: tost, bounds: [-30, 30]",
+        "test: bayes_t",
+    ]
+    study = study_of(folder, "crossover_2x2_n12", "main", ["kinect", "fusion"], tests)
+    assert steadyhand("report", study).code == 0
+    page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
+    text = " ".join("".join(checked(page).text).split())
+    for sentence in (
+        "M: F(1, 11) = 5.81, p = .0346, Holm-adjusted p = .0346, η²G = 0.10 [0.00, 0.29], n = 12, reduced by 13.3 %.",
+        "M: ART ANOVA: F(1, 11) = 5.77, p = .0351, η²p = 0.34 [0.00, 0.65], n = 12.",
+        "M: mixed model: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
+        "M: mixed model: period, t(10) = −4.01, p = .0025, estimate = −6.16 [−9.58, −2.73], n = 12.",
+        "M: crossover: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
+        "M: crossover: carry-over: KF − FK, t(10) = 0.27, p = .7892, estimate = 2.57 [−18.30, 23.44], n = 12.",
+        "the conditions are equivalent within the bounds at the 5 % level",
+        "the data are 2.20 times as likely under a difference as under none",
+        "Bayes factor (JZS, prior scale 0.707): kinect − fusion, BF₁₀ = 2.20",
+        "Design: 1 remark, on effect of the period; see the table.",
+        "mixed model: linear mixed model, random intercept, REML, Satterthwaite degrees of freedom",
+    ):
+        assert sentence in text, sentence
+    for row in steadyhand.results()["comparisons"]:
+        assert TESTS[row["test"]] in text
+        assert f"{abs(row['statistic']):.2f}" in text
+        assert row["method"] in text
+    for row in steadyhand.results()["design_check"]:
+        assert row["found"] in text
+
+
+def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Folder, steadyhand: Steadyhand) -> None:
+    rows = "".join(
+        f"P{person},{condition},m,{value}\n"
+        for person, values in enumerate(((1, 5, 9), (4, 9, 2), (8, 1, 6), (2, 7, 5)))
+        for condition, value in zip("abc", values, strict=True)
+    )
+    settings = (
+        "conditions: [a, b, c]\nmeasures: measures.csv\ncomparisons:\n  - {measure: m, test: rm_anova}\n"
+        "  - {measure: m, test: mixed_model, follow_up: bonferroni}\n"
+    )
+    study = folder(settings, **{"measures.csv": f"participant,condition,measure,value\n{rows}"})
+    assert steadyhand("report", study).code == 0
+    text = " ".join("".join(checked((steadyhand.out / "report.html").read_text(encoding="utf-8")).text).split())
+    assert "M: follow-up of the rm ANOVA, n = 4: a − b, t(3) = " in text
+    assert "; b − c, t(9) = " in text
+    assert "Bonferroni-adjusted p" in text
+    assert "Singular fit of the mixed model for M: it finds no variance between participants" in text
+    assert "singular fit: no variance between participants is found" in text

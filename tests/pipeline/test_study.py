@@ -165,3 +165,56 @@ def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhan
     ran = steadyhand("compare", folder(settings + line + "\n", **{"measures.csv": MEASURES}))
     assert ran.code == 2
     assert message in ran.err
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("test: tost", "tost needs bounds, in the unit of the measure, such as bounds: [-5, 5]"),
+        ("test: tost, bounds: [5, -5]", "bounds need the lower one first, found [5.0, -5.0]"),
+        ("test: t_paired, bounds: [-5, 5]", "t_paired does not take bounds; it is for tost"),
+        (
+            "test: friedman, within: [condition, task]",
+            "friedman does not take within; it is for rm_anova and art_anova",
+        ),
+        ("test: rm_anova, within: [task]", 'within of "m" needs "condition", and no name twice'),
+        (
+            "test: mixed_model, fixed: [condition, period, factor(period)]",
+            'fixed of "m" needs "condition", and no name',
+        ),
+        (
+            "test: mixed_model, fixed: [condition, 'condition:task']",
+            'fixed: "condition:task" needs "task" as a term too',
+        ),
+        (
+            "test: mixed_model, fixed: [condition, period, 'condition:period']",
+            'fixed: "condition:period" needs factor(period) in the place of period',
+        ),
+        ("test: bayes_t, prior_scale: 0", "prior_scale"),
+        ("test: mixed_model, fixed: [condition, task]", '"m" has no factor "task"'),
+        (
+            "test: mixed_model, fixed: [condition, period]",
+            "needs to know the period, and no data say it; give a column",
+        ),
+        ("test: crossover", 'crossover of "m" needs to know the period'),
+        (
+            "test: mixed_model, fixed: [condition, hand]",
+            '"hand" of "m" has one level in the rows of the model; take it',
+        ),
+        ("test: anova", "comparisons.0.test"),
+    ],
+)
+def test_a_comparison_that_cannot_be_is_named(folder: Folder, steadyhand: Steadyhand, entry: str, message: str) -> None:
+    settings = f"conditions: [a, b]\nmeasures: measures.csv\ncomparisons: [{{measure: m, {entry}}}]\n"
+    rows = "".join(f"P{person},{condition},m,{person},left\n" for person in (1, 2, 3) for condition in "ab")
+    table = f"participant,condition,measure,value,hand\n{rows}"
+    ran = steadyhand("compare", folder(settings, **{"measures.csv": table}))
+    assert ran.code == 2
+    assert message in ran.err
+
+
+def test_a_crossover_is_of_two_conditions(folder: Folder, steadyhand: Steadyhand) -> None:
+    settings = "conditions: [a, b, c]\nmeasures: measures.csv\ncomparisons: [{measure: m, test: crossover}]\n"
+    ran = steadyhand("compare", folder(settings, **{"measures.csv": "participant,condition,measure,value\nP1,a,m,1\n"}))
+    assert ran.code == 2
+    assert "crossover is for two conditions, and there are 3; mixed_model with fixed: [condition, period]" in ran.err

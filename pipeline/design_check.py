@@ -1,0 +1,235 @@
+"""Was the study run as a comparison within people needs it: who met what when, how often, and did the order matter?"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations, pairwise, permutations
+from typing import Any
+
+import pandas as pd
+
+from pipeline import model_rows, orders
+from pipeline.cells import Asked
+from pipeline.errors import PipelineError
+from pipeline.statistics import OK
+from pipeline.statistics.crossover import crossover
+from pipeline.statistics.mixed import mixed_model
+from pipeline.statistics.result import Result
+from pipeline.study import Comparison, Session, Study
+from pipeline.wording import counted, listing, p_phrase, statistic
+
+Row = dict[str, Any]
+Order = tuple[str, ...]
+_NAMED = 5
+
+
+def findings(
+    study: Study,
+    asked: Sequence[Asked],
+    told: pd.DataFrame,
+    trials: pd.DataFrame,
+    sessions: Iterable[Session],
+) -> list[Row]:
+    """The rows of `design_check` for what is asked; a remark says what is not as it should be.
+
+    `told` is the table `orders`.
+    """
+    if len(study.conditions) < 2 or not asked:
+        return []
+    one_each = list({one.measure: one for one in asked}.values())
+    people = sorted(set(asked[0].measures["participant"]))
+    known = _complete_orders(study.conditions, orders.run_orders(told))
+    rows = [*_known_orders(people, known), *_disagreements(told)]
+    if known:
+        rows += _balance(study.conditions, list(known.values()))
+        rows += [row for one in one_each for row in _order_effects(one)]
+    rows += [*_complete_people(study, one_each), *_trials(trials, one_each)]
+    return [*rows, *_sessions(asked[0].observations, sessions)]
+
+
+def _complete_orders(conditions: Sequence[str], run: pd.DataFrame) -> dict[str, Order]:
+    """The order of each participant of whom it is known for all conditions, each met once."""
+    found: dict[str, Order] = {}
+    once = run.drop_duplicates(["participant", "condition", "period"])
+    for participant, rows in once.groupby("participant", sort=True):
+        order = tuple(rows.sort_values("period")["condition"])
+        if rows["period"].is_unique and sorted(order) == sorted(conditions):
+            found[str(participant)] = order
+    return found
+
+
+def _known_orders(people: Sequence[str], known: Mapping[str, Order]) -> Iterator[Row]:
+    unknown = [person for person in people if person not in known]
+    row: Row = {"what": "order of the conditions", "expected": "known of everybody"}
+    if not known:
+        remark = "whether orders were balanced, and whether they mattered, cannot be checked"
+        yield {**row, "found": "not known", "remark": remark}
+        return
+    found = f"known of {len(people) - len(unknown)} of {counted(len(people), 'participant')}"
+    lacking = f"not known in full, each condition once: {_names(unknown)}" if unknown else None
+    yield {**row, "found": found, "remark": lacking}
+
+
+def _names(people: Sequence[str]) -> str:
+    return listing([*people[:_NAMED], f"{len(people) - _NAMED} more"] if len(people) > _NAMED else list(people))
+
+
+def _disagreements(told: pd.DataFrame) -> Iterator[Row]:
+    """Participants of whom two sources say two things."""
+    for first, second in combinations(orders.SOURCES, 2):
+        one, other = (orders.listed(told[told["source"] == source]) for source in (first, second))
+        differ = sorted(person for person in one if person in other and one[person] != other[person])
+        if differ:
+            yield {
+                "what": "order of the conditions",
+                "found": f"{first} and {second} differ for {_names(differ)}",
+                "expected": "one order",
+                "remark": f"{first} count",
+            }
+
+
+def _balance(conditions: Sequence[str], known: Sequence[Order]) -> Iterator[Row]:
+    """How often each condition stands in each period, and just before each other one."""
+    people, count = len(known), len(conditions)
+    low, over = divmod(people, count)
+    share = f"{low} or {low + 1}" if over else str(low)
+    for condition in conditions:
+        periods = Counter(order.index(condition) for order in known)
+        times = [periods[period] for period in range(count)]
+        yield {
+            "what": "times in each period",
+            "condition": condition,
+            "found": ", ".join(str(number) for number in times),
+            "expected": f"{share} in each",
+            "remark": None if _even(times, over) else "not balanced over the periods",
+        }
+    if count > 2:
+        follows = Counter(pair for order in known for pair in pairwise(order))
+        times = [follows[pair] for pair in permutations(conditions, 2)]
+        yield {
+            "what": "times each condition comes just before each other",
+            "found": _span(times),
+            "expected": share,
+            "remark": None if _even(times, over) else "not balanced for what came just before",
+        }
+
+
+def _even(times: Sequence[int], over: int) -> bool:
+    """As equal as can be, with so many people over a whole number of rounds?"""
+    return max(times) - min(times) <= (1 if over else 0)
+
+
+def _span(numbers: Iterable[int]) -> str:
+    """`3`, `2 to 4`."""
+    known = sorted(numbers)
+    return str(known[0]) if known[0] == known[-1] else f"{known[0]} to {known[-1]}"
+
+
+def _order_effects(asked: Asked) -> list[Row]:
+    """Whether a measure changes with the period, and with what came just before."""
+    tests: tuple[tuple[str, str, Callable[[Asked], Result]], ...] = (
+        ("effect of the period", "values change with the period", _period_test),
+        ("carry-over", "values change with what came just before", _carry_over_test),
+    )
+    rows: list[Row] = []
+    for what, remark, test in tests:
+        row: Row = {"what": what, "measure": asked.measure, "expected": "none"}
+        try:
+            rows.append({**row, **_tested(test(asked), remark, asked.study.alpha)})
+        except PipelineError:  # an error where a comparison asks for it; here the data just do not say enough
+            rows.append({**row, "found": "cannot be tested: too little is known of the order"})
+    return rows
+
+
+def _period_test(asked: Asked) -> Result:
+    if len(asked.study.conditions) == 2:
+        return _crossover(asked)[1]
+    return _omnibus(asked, ("condition", "factor(period)"), "period")
+
+
+def _carry_over_test(asked: Asked) -> Result:
+    if len(asked.study.conditions) == 2:
+        return _crossover(asked)[2]
+    return _omnibus(asked, ("condition", "factor(period)", model_rows.CARRY_OVER), model_rows.CARRY_OVER)
+
+
+def _crossover(asked: Asked) -> list[Result]:
+    """Treatment, period and carry-over."""
+    entry = Comparison(measure=asked.measure, test="crossover")
+    found = model_rows.of_crossover(replace(asked, entry=entry))
+    return crossover(found.values, found.first_came_first, found.conditions, found.sequences)
+
+
+def _omnibus(asked: Asked, fixed: tuple[str, ...], effect: str) -> Result:
+    entry = Comparison(measure=asked.measure, test="mixed_model", fixed=fixed)
+    found = model_rows.of_model(replace(asked, entry=entry))
+    results = mixed_model(found.values, found.participants, found.columns, found.terms)
+    return next(result for result in results if result.effect == effect)
+
+
+def _tested(result: Result, remark: str, alpha: float) -> Row:
+    if result.status != OK or result.p is None:
+        return {"found": result.status}
+    figures = {name: getattr(result, name) for name in ("statistic_name", "statistic", "df1", "df2", "p")}
+    found = f"{statistic(figures)}, {p_phrase(result.p)}"
+    return {**figures, "found": found, "remark": remark if result.p < alpha else None}
+
+
+def _complete_people(study: Study, asked: Sequence[Asked]) -> Iterator[Row]:
+    """Participants who lack a condition in a measure that is compared."""
+    what = "participants with every condition"
+    complete: set[int] = set()
+    for one in asked:
+        rows = one.measures[one.measures["measure"] == one.measure]
+        met = rows.groupby("participant")["condition"].nunique()
+        whole = int((met == len(study.conditions)).sum())
+        if whole == len(met):
+            complete.add(whole)
+            continue
+        remark = "the others are left out of tests within people, and are listed under exclusions"
+        yield {"what": what, "measure": one.measure, "found": str(whole), "expected": str(len(met)), "remark": remark}
+    if complete:
+        numbers = listing([str(number) for number in sorted(complete)])
+        yield {"what": what, "found": f"all, {numbers}", "expected": "all"}
+
+
+def _trials(trials: pd.DataFrame, asked: Sequence[Asked]) -> Iterator[Row]:
+    """How many trials there are in each cell: of the study's trials, or of measures that have several values a cell."""
+    recorded = trials[trials["estimator"] == "recorded"]
+    if len(recorded):
+        yield _per_cell("trials in each cell", None, recorded.groupby(["participant", "condition"]).size())
+        return
+    for one in asked:
+        rows = one.observations[one.observations["measure"] == one.measure]
+        if (rows["n"] > 1).any():
+            yield _per_cell("values in each cell", one.measure, rows.groupby(["participant", "condition"])["n"].sum())
+
+
+def _per_cell(what: str, measure: str | None, counts: pd.Series) -> Row:
+    uneven = "unequal; each participant's mean counts once, whatever its number of trials"
+    return {
+        "what": what,
+        "measure": measure,
+        "found": _span(counts),
+        "expected": "as many in each",
+        "remark": uneven if counts.nunique() > 1 else None,
+    }
+
+
+def _sessions(observations: pd.DataFrame, sessions: Iterable[Session]) -> Iterator[Row]:
+    """How many sessions there are in each cell, of those that have any."""
+    named = observations.dropna(subset="session")[["participant", "condition", "session"]]
+    every = {(session.participant, session.condition, session.id) for session in sessions}
+    every |= set(named.itertuples(index=False, name=None))
+    counts = Counter((participant, condition) for participant, condition, _ in every)
+    if not counts:
+        return
+    several = sorted(f"{participant} in {condition}" for (participant, condition), times in counts.items() if times > 1)
+    yield {
+        "what": "sessions in each cell",
+        "found": _span(counts.values()),
+        "expected": "1",
+        "remark": f"their values count together: {_names(several)}" if several else None,
+    }

@@ -1,0 +1,157 @@
+"""The rows that the mixed model and the crossover take: values with what was run when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline import cells
+from pipeline.cells import Asked
+from pipeline.errors import PipelineError
+from pipeline.statistics.mixed import Column, Covariate, Factor
+from pipeline.statistics.result import FloatArray
+
+Row = dict[str, Any]
+
+CARRY_OVER = "carry_over"
+_WHERE = (
+    'give a column "period" in the measures, a column "sequence" that lists the conditions in the participants table,'
+    ' or the fact "order" in the logs'
+)
+
+
+@dataclass(frozen=True)
+class ModelRows:
+    """Values (N,) of a mixed model, whose they are, its columns and terms, and who was left out."""
+
+    values: FloatArray
+    participants: list[str]
+    columns: dict[str, Column]
+    terms: list[str]
+    left_out: list[Row]
+
+
+def of_model(asked: Asked) -> ModelRows:
+    """A participant's mean in each combination of what `fixed` names, as far as there is one; not listwise.
+
+    `period` is a slope, `factor(period)` a factor; `carry_over` is the condition of the period before, so that the
+    first period, before which nothing came, does not count.
+    """
+    terms = list(asked.entry.terms)
+    names = list(dict.fromkeys(name for term in terms for name in term.split(":")))
+    told = ("condition", "period", "sequence", CARRY_OVER)
+    rows = cells.with_factors(asked, asked.observations, [name for name in names if name not in told])
+    left_out: list[Row] = []
+    for name in ("period", "sequence"):
+        if name in names or (name == "period" and CARRY_OVER in names):
+            rows, unknown = _known(asked, rows, name)
+            left_out += unknown
+    if CARRY_OVER in names:
+        rows, unknown = _with_carry_over(asked, rows)
+        left_out += unknown
+    means = _means(_means(rows, ["participant", *names, "factors"]), ["participant", *names])
+    columns = {name: _column(asked, name, means[name]) for name in names}
+    return ModelRows(means["value"].to_numpy(np.float64), list(means["participant"]), columns, terms, left_out)
+
+
+def _means(rows: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """One row a combination of keys: first of all values that there are, then of cells, each counting once."""
+    weighted = rows.assign(value=rows["value"] * rows["n"])
+    sums = weighted.groupby(list(dict.fromkeys(keys)), dropna=False, sort=True)[["value", "n"]].sum().reset_index()
+    return pd.DataFrame(sums.assign(value=sums["value"] / sums["n"], n=1))
+
+
+def _column(asked: Asked, name: str, values: pd.Series) -> Column:
+    """What a term's name stands for in each row; PipelineError for a factor that has one level."""
+    if name == "period" and asked.entry.period_is_slope:
+        return Covariate(values.to_numpy(np.float64))
+    levels = cells.levels_of(asked.study, "condition" if name == CARRY_OVER else name, values)
+    levels = [level for level in levels if level in set(values) or name == "condition"]
+    if len(levels) < 2:
+        raise PipelineError(
+            f'study.yaml: comparisons: "{name}" of "{asked.measure}" has one level in the rows of the model; take it'
+            " out of fixed"
+        )
+    codes = np.array([levels.index(value) for value in values], dtype=np.int64)
+    return Factor(tuple(str(level) for level in levels), codes)
+
+
+def _with_carry_over(asked: Asked, rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Row]]:
+    """Rows with the condition that their participant met in the period before, without first periods."""
+    met = asked.observations.dropna(subset="period")
+    before = {
+        (participant, int(period) + 1): condition
+        for participant, period, condition in zip(met["participant"], met["period"], met["condition"], strict=True)
+    }
+    at = [(who, int(period)) for who, period in zip(rows["participant"], rows["period"], strict=True)]
+    rows = rows.copy()
+    rows[CARRY_OVER] = [before.get(place) for place in at]
+    return _known(asked, rows[[period > 1 for _, period in at]], CARRY_OVER)
+
+
+def _known(asked: Asked, rows: pd.DataFrame, name: str) -> tuple[pd.DataFrame, list[Row]]:
+    """The rows that have a period or sequence, and the exclusions for those that have none."""
+    lacking = rows[rows[name].isna()]
+    if len(lacking) == len(rows):
+        raise PipelineError(
+            f'study.yaml: comparisons: {asked.entry.test} of "{asked.measure}" needs to know the'
+            f" {name.replace('_', '-')}, and no data say it; {_WHERE}"
+        )
+    unknown = [
+        cells.left_out(
+            asked, str(participant), f"no {name} is known for {', '.join(dict.fromkeys(found['condition']))}"
+        )
+        for participant, found in lacking.groupby("participant", sort=True)
+    ]
+    return rows.drop(index=lacking.index), unknown
+
+
+@dataclass(frozen=True)
+class CrossoverRows:
+    """Values (n, 2) of participants in two conditions, and who met the first one first."""
+
+    values: FloatArray
+    conditions: tuple[str, str]
+    first_came_first: list[bool]
+    sequences: tuple[str, str] | None
+    left_out: list[Row]
+
+
+def of_crossover(asked: Asked) -> CrossoverRows:
+    """Participants with a value and a period of their own in each of the two conditions."""
+    complete = cells.by_condition(asked)
+    rows = asked.observations[asked.observations["measure"] == asked.measure]
+    rows = rows[rows["participant"].isin(complete.participants)]
+    kept, left_out = _known(asked, rows, "period") if len(rows) else (rows, [])
+    first, second = asked.study.conditions
+    when: dict[str, dict[str, set[int]]] = {}
+    for who, condition, period in zip(kept["participant"], kept["condition"], kept["period"], strict=True):
+        when.setdefault(who, {}).setdefault(condition, set()).add(int(period))
+    keep: list[int] = []
+    early: list[bool] = []
+    for index, participant in enumerate(complete.participants):
+        periods = when.get(participant, {})
+        if len(periods) < 2:
+            continue  # listed among those whose period is not known
+        if len(periods[first]) == len(periods[second]) == 1 and periods[first] != periods[second]:
+            keep.append(index)
+            early.append(min(periods[first]) < min(periods[second]))
+        else:
+            left_out.append(cells.left_out(asked, participant, "the two conditions do not have a period each"))
+    people = [complete.participants[index] for index in keep]
+    labels = dict(zip(rows["participant"], rows["sequence"], strict=True))
+    sequences = _labels([labels.get(person) for person in people], early)
+    return CrossoverRows(complete.values[keep], (first, second), early, sequences, [*complete.left_out, *left_out])
+
+
+def _labels(labels: list[Any], early: list[bool]) -> tuple[str, str] | None:
+    """The study's own names of the two sequences, if it has one for each."""
+    of_early = {label for label, first in zip(labels, early, strict=True) if first}
+    of_late = {label for label, first in zip(labels, early, strict=True) if not first}
+    if len(of_early) != 1 or len(of_late) != 1 or of_early == of_late:
+        return None
+    (one,), (other,) = of_early, of_late
+    return None if pd.isna(one) or pd.isna(other) else (str(one), str(other))

@@ -1,0 +1,47 @@
+"""What to look at before a test of differences is believed: are they normal, and does any lie far out?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from pipeline.statistics.result import FloatArray, negligible, rounded_differences
+
+OUTLIER_RULE = "modified z beyond 3.5 (Iglewicz and Hoaglin 1993)"
+_FAR_OUT = 3.5
+_NORMAL_QUARTILE = 0.6745  # of the standard normal distribution: what turns a median deviation into an SD
+_SHAPIRO_UP_TO = 5000  # values, as far as Royston's approximation was made for
+
+
+def differences(first: FloatArray, second: FloatArray, participants: Sequence[str]) -> dict[str, Any]:
+    """Shapiro and Wilk's test of the differences first − second, and the participants whose difference lies far out.
+
+    `outliers` is None where more than half of the differences are equal: then no spread is left to judge by.
+    """
+    values = rounded_differences(first, second)
+    found = far_out(values)
+    outliers = None if found is None else [participants[index] for index in found]
+    return {**normality(values), "outliers": outliers, "outlier_rule": OUTLIER_RULE}
+
+
+def normality(values: FloatArray, prefix: str = "") -> dict[str, float | None]:
+    """Shapiro and Wilk's W and p by their names in details; None below three values, or where they do not vary."""
+    w = p = None
+    if 3 <= len(values) <= _SHAPIRO_UP_TO and not negligible(float(np.sum((values - values.mean()) ** 2)), values):
+        found = stats.shapiro(values)
+        w, p = float(found.statistic), float(found.pvalue)
+    return {f"{prefix}shapiro_w": w, f"{prefix}shapiro_p": p}
+
+
+def far_out(values: FloatArray) -> list[int] | None:
+    """Where |0.6745·(x − median) / MAD| is beyond 3.5 (Iglewicz and Hoaglin 1993); None where the MAD is zero."""
+    if not len(values):
+        return None
+    apart = values - np.median(values)
+    spread = float(np.median(np.abs(apart)))
+    if negligible(spread**2, values):
+        return None
+    return [int(index) for index in np.flatnonzero(np.abs(_NORMAL_QUARTILE * apart / spread) > _FAR_OUT)]

@@ -1,0 +1,44 @@
+"""Two one-sided tests of equivalence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from scipy import stats
+
+from pipeline.statistics.effect_size import dz_interval
+from pipeline.statistics.paired import differences_of
+from pipeline.statistics.result import FloatArray, Result
+
+
+def tost(first: FloatArray, second: FloatArray, bounds: tuple[float, float], effect: str = "condition") -> Result:
+    """Is the mean of first − second above the lower bound and below the upper one? (Schuirmann 1987)
+
+    The statistic is the t of the side with the larger p, which is the p of the whole; effect size d_z.
+    """
+    blank = Result(effect, "t", "two one-sided paired t tests (TOST)", "Cohen's d_z", len(first))
+    found = differences_of(first, second)
+    if isinstance(found, str):
+        return replace(blank, status=found)
+    df, mean, error = found.n - 1, found.mean, found.error
+    t_lower, t_upper = (mean - bounds[0]) / error, (mean - bounds[1]) / error
+    p_lower, p_upper = float(stats.t.sf(t_lower, df)), float(stats.t.cdf(t_upper, df))
+    low, high = dz_interval(found.dz, found.n)
+    margin = float(stats.t.ppf(0.95, df)) * error
+    return replace(
+        blank,
+        statistic=float(t_lower if p_lower >= p_upper else t_upper),
+        df2=float(df),
+        p=max(p_lower, p_upper),
+        effect_size=found.dz,
+        ci_low=low,
+        ci_high=high,
+        details={
+            "p_lower": p_lower,
+            "p_upper": p_upper,
+            "t_lower": float(t_lower),
+            "t_upper": float(t_upper),
+            "bounds": list(bounds),
+            "ci90_difference": [mean - margin, mean + margin],
+        },
+    )

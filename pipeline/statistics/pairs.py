@@ -1,0 +1,66 @@
+"""Which two things to compare: the pairs of conditions, and those that follow an analysis of variance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+
+from pipeline.statistics.result import FloatArray
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two values of each participant, first minus second being the contrast."""
+
+    effect: str
+    contrast: str
+    first: FloatArray
+    second: FloatArray
+
+    @property
+    def both(self) -> FloatArray:
+        """Participants × 2."""
+        return np.column_stack([self.first, self.second])
+
+
+def of_conditions(values: FloatArray, conditions: Sequence[str]) -> list[Pair]:
+    """Every two columns of values (n, k), in order."""
+    return [
+        Pair("condition", f"{conditions[i]} - {conditions[j]}", values[:, i], values[:, j])
+        for i, j in combinations(range(len(conditions)), 2)
+    ]
+
+
+def follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequence[Sequence[str]]) -> list[Pair]:
+    """What an analysis of variance of values (n, k₁, k₂, …) leaves open, effect by effect.
+
+    Of a factor of three levels or more every two of its means. Of an interaction its simple effects: every two
+    conditions (or levels of its first factor, where `condition` is not in it) at each level of the others; factors
+    outside the effect are averaged over.
+    """
+    sizes = range(1, len(factors) + 1)
+    effects = [effect for size in sizes for effect in combinations(range(len(factors)), size)]
+    return [pair for effect in effects for pair in _of_effect(values, factors, levels, effect)]
+
+
+def _of_effect(
+    values: FloatArray, factors: Sequence[str], levels: Sequence[Sequence[str]], effect: tuple[int, ...]
+) -> Iterator[Pair]:
+    if len(effect) == 1 and len(levels[effect[0]]) < 3:
+        return  # its F is the comparison
+    name = ":".join(factors[index] for index in effect)
+    compared = next((index for index in effect if factors[index] == "condition"), effect[0])
+    held = [index for index in effect if index != compared]
+    outside = tuple(index + 1 for index in range(len(factors)) if index not in effect)
+    means = np.moveaxis(values.mean(axis=outside, keepdims=True), compared + 1, 1)
+    rest = [index for index in range(len(factors)) if index != compared]
+    for at in product(*(range(len(levels[index])) for index in held)):
+        place = tuple(at[held.index(index)] if index in held else 0 for index in rest)
+        where = ", ".join(levels[index][level] for index, level in zip(held, at, strict=True))
+        columns = means[(slice(None), slice(None), *place)]
+        for i, j in combinations(range(len(levels[compared])), 2):
+            contrast = f"{levels[compared][i]} - {levels[compared][j]}" + (f" | {where}" if where else "")
+            yield Pair(name, contrast, columns[:, i], columns[:, j])
