@@ -44,14 +44,24 @@ def compare(studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFo
 @app.command()
 def check(
     studies: Studies,
-    accept: Annotated[bool, typer.Option("--accept", help="Take today's results as the expected ones.")] = False,
+    accept: Annotated[
+        bool,
+        typer.Option("--accept", help="Take today's results as the expected ones; a person reviews what it changes."),
+    ] = False,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the outcome as JUnit XML too, for a CI page.")
+    ] = None,
     jobs: Jobs = None,
     cache: CacheFolder = None,
 ) -> None:
-    """Recompute and compare with expected.json in the study folder; exit code 3 where a number moved."""
+    """Recompute and compare with expected.json in the study folder: a table of what moved, and by how much.
+
+    Exit codes: 0 nothing moved, 1 some session was set aside or read in part, 2 a study could not be checked,
+    3 numbers moved.
+    """
     from pipeline.commands import check as command
 
-    command.check(studies, accept, jobs, cache)
+    command.check(studies, accept, junit, jobs, cache)
 
 
 @app.command()
@@ -95,7 +105,7 @@ def main() -> None:
         sys.exit(130)
     except OSError as error:
         where = error.filename or "a file"
-        print(f"steadyhand: {where}: {error.strerror or error}; check --out and --cache", file=sys.stderr)  # noqa: T201
+        print(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache", file=sys.stderr)  # noqa: T201
         sys.exit(2)
     except Exception as error:
         if os.environ.get("STEADYHAND_TRACEBACK"):
