@@ -83,6 +83,29 @@ def inspect(
     command.inspect(files, as_json)
 
 
+@app.command()
+def plan(
+    *,
+    participants: Annotated[int, typer.Option("--participants", "-n", min=1, max=10_000, help="How many.")],
+    conditions: Annotated[
+        list[str] | None, typer.Argument(metavar="CONDITION...", help="The conditions, as study.yaml names them.")
+    ] = None,
+    study: Annotated[
+        Path | None, typer.Option(metavar="STUDY", help="Take the conditions of this study instead.")
+    ] = None,
+    prefix: Annotated[str, typer.Option(help="What the participants' ids begin with.")] = "P",
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Let chance decide who gets which sequence, within each square. Default: in turn."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table there. Default: print it.")] = None,
+) -> None:
+    """Give each participant an order of the conditions: a balanced Latin square, as a participants.csv."""
+    from pipeline.commands import plan as command
+
+    command.plan(conditions or [], study, participants, prefix=prefix, seed=seed, out=out)
+
+
 def main() -> None:
     """Run the command; an error the user can mend is a message, not a traceback."""
     # One thread a process: many small matrices, and processes for the rest. Set before NumPy is imported.
