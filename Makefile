@@ -6,7 +6,7 @@ STUDY ?= studies/feng2016
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check simulate test lint bench lock clean
+.PHONY: help report check simulate power plan test lint bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -22,6 +22,12 @@ check: .venv/installed ## do the bundled studies' statistics still come out the 
 
 simulate: .venv/installed ## write the logs of a simulated STUDY anew
 	@$(steadyhand) simulate "$(STUDY)" $(ARGS)
+
+power: .venv/installed ## how many participants? ARGS="--effect 0.5"
+	@$(steadyhand) power $(ARGS)
+
+plan: .venv/installed ## counterbalanced orders: ARGS="kinect fusion --participants 12"
+	@$(steadyhand) plan $(ARGS)
 
 test: lint ## lint, then every test
 	@$(python) -m pytest -n auto $(ARGS)

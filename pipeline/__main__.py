@@ -44,14 +44,24 @@ def compare(studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFo
 @app.command()
 def check(
     studies: Studies,
-    accept: Annotated[bool, typer.Option("--accept", help="Take today's results as the expected ones.")] = False,
+    accept: Annotated[
+        bool,
+        typer.Option("--accept", help="Take today's results as the expected ones; a person reviews what it changes."),
+    ] = False,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the outcome as JUnit XML too, for a CI page.")
+    ] = None,
     jobs: Jobs = None,
     cache: CacheFolder = None,
 ) -> None:
-    """Recompute and compare with expected.json in the study folder; exit code 3 where a number moved."""
+    """Recompute and compare with expected.json in the study folder: a table of what moved, and by how much.
+
+    Exit codes: 0 nothing moved, 1 some session was set aside or read in part, 2 a study could not be checked,
+    3 numbers moved.
+    """
     from pipeline.commands import check as command
 
-    command.check(studies, accept, jobs, cache)
+    command.check(studies, accept, junit, jobs, cache)
 
 
 @app.command()
@@ -86,6 +96,70 @@ def inspect(
     command.inspect(files, as_json)
 
 
+@app.command()
+def power(
+    *,
+    test: Annotated[str, typer.Option(help="t_paired, wilcoxon, or rm_anova.")] = "t_paired",
+    effect: Annotated[
+        float | None,
+        typer.Option(
+            help="The effect to be found. rm_anova: Cohen's f. t_paired, wilcoxon: d_z, the mean difference over the SD"
+            " of the differences; with --correlation instead d, the mean difference over the SD of a condition."
+        ),
+    ] = None,
+    difference: Annotated[
+        float | None,
+        typer.Option(help="Or the mean difference to be found, in the measure's unit; of rm_anova the largest."),
+    ] = None,
+    sd: Annotated[
+        float | None, typer.Option(help="With --difference: the SD of a condition, in the same unit.")
+    ] = None,
+    correlation: Annotated[
+        float | None,
+        typer.Option(help="Of a participant's values in two conditions; 0.5 is assumed where it is not given."),
+    ] = None,
+    conditions: Annotated[int, typer.Option(min=2, max=100, help="How many, for rm_anova.")] = 2,
+    target: Annotated[float, typer.Option("--power", help="The chance wanted that the effect is found.")] = 0.8,
+    alpha: Annotated[float, typer.Option(help="The level of significance, two-sided.")] = 0.05,
+    simulations: Annotated[
+        int, typer.Option(min=100, max=1_000_000, help="Studies to simulate for each number of participants.")
+    ] = 10_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulation.")] = 1,
+    most: Annotated[int, typer.Option("--max-n", min=2, max=3000, help="The most participants to look at.")] = 1000,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write power.svg, power.csv and power.json there.")
+    ] = None,
+) -> None:
+    """How many participants? For a stated effect, in closed form and by simulation: a table and a curve."""
+    from pipeline.commands import power as command
+
+    expected = command.Expected(test, effect, difference, sd, correlation, conditions, alpha)
+    command.power(expected, command.Search(target, simulations, seed, most), out)
+
+
+@app.command()
+def plan(
+    *,
+    participants: Annotated[int, typer.Option("--participants", "-n", min=1, max=10_000, help="How many.")],
+    conditions: Annotated[
+        list[str] | None, typer.Argument(metavar="CONDITION...", help="The conditions, as study.yaml names them.")
+    ] = None,
+    study: Annotated[
+        Path | None, typer.Option(metavar="STUDY", help="Take the conditions of this study instead.")
+    ] = None,
+    prefix: Annotated[str, typer.Option(help="What the participants' ids begin with.")] = "P",
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Let chance decide who gets which sequence, within each square. Default: in turn."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table there. Default: print it.")] = None,
+) -> None:
+    """Give each participant an order of the conditions: a balanced Latin square, as a participants.csv."""
+    from pipeline.commands import plan as command
+
+    command.plan(conditions or [], study, participants, prefix=prefix, seed=seed, out=out)
+
+
 def main() -> None:
     """Run the command; an error the user can mend is a message, not a traceback."""
     # One thread a process: many small matrices, and processes for the rest. Set before NumPy is imported.
@@ -108,7 +182,7 @@ def main() -> None:
         sys.exit(130)
     except OSError as error:
         where = error.filename or "a file"
-        print(f"steadyhand: {where}: {error.strerror or error}; check --out and --cache", file=sys.stderr)  # noqa: T201
+        print(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache", file=sys.stderr)  # noqa: T201
         sys.exit(2)
     except Exception as error:
         if os.environ.get("STEADYHAND_TRACEBACK"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from pipeline.runner import Progress
@@ -34,6 +34,20 @@ def say(text: str) -> None:
 def warn(text: str) -> None:
     """A line for the user beside the output."""
     print(_tame(text), file=sys.stderr, flush=True)  # noqa: T201
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> None:
+    """Rows in columns: the first `left` columns to the left, the others, numbers, to the right."""
+    from rich.cells import cell_len
+
+    lines = [[cell.replace("\n", " ") for cell in line] for line in (header, *rows)]
+    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        padded = []
+        for place, (cell, width) in enumerate(zip(line, widths, strict=True)):
+            room = " " * (width - cell_len(cell))
+            padded.append(cell + room if place < left else room + cell)
+        say(f"  {'  '.join(padded)}".rstrip())
 
 
 class PlainLines:

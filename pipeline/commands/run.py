@@ -52,10 +52,12 @@ def for_each(
     jobs: int | None,
     cache: Path | None,
     then: Callable[[Path, Result], int],
+    *,
+    failed: Callable[[Path, PipelineError], None] = lambda _folder, _error: None,
 ) -> int:
     """Bring each study up to date and do with it what `then` does; the highest of the exit codes.
 
-    A study that cannot be brought up to date is said, and does not stop the others.
+    A study with which either cannot be done is said, handed to `failed`, and does not stop the others.
     """
     code = 0
     with executor_of(jobs) as executor:
@@ -63,11 +65,11 @@ def for_each(
             try:
                 with console.progress() as progress:
                     result = bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
+                code = max(code, then(folder, result))
             except PipelineError as error:
                 console.warn(f"steadyhand: {error}")
+                failed(folder, error)
                 code = max(code, error.exit_code)
-            else:
-                code = max(code, then(folder, result))
     return code
 
 
@@ -113,14 +115,20 @@ def _run(
     sys.exit(for_each(studies, stages, jobs, cache, write))
 
 
+def what_befell(result: Result) -> Iterator[str]:
+    """A line a session that is not wholly in the results, and a file that is not used."""
+    for session, reason in result.set_aside:
+        yield f"{result.name}: session {session.id} set aside: {reason}"
+    for session, reason in result.in_part:
+        yield f"{result.name}: session {session.id} read in part: {reason}"
+    for name, reason in result.unused:
+        yield f"{result.name}: {name} not used: {reason}"
+
+
 def _show(result: Result) -> None:
     """What happened to the sessions, and the results in a few lines."""
-    for session, reason in result.set_aside:
-        console.warn(f"{result.name}: session {session.id} set aside: {reason}")
-    for session, reason in result.in_part:
-        console.warn(f"{result.name}: session {session.id} read in part: {reason}")
-    for name, reason in result.unused:
-        console.warn(f"{result.name}: {name} not used: {reason}")
+    for line in what_befell(result):
+        console.warn(line)
     for line in summary(results.read(result.entry("compare") / "results.json")):
         console.say(line)
 

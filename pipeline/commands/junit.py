@@ -1,0 +1,79 @@
+"""JUnit XML, as the pages of CI servers read it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from pipeline.errors import PipelineError
+from pipeline.typeface import STAND_IN
+
+_NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One thing that was looked at. `fault` is a headline and its details; `broken` says that it was no test at all."""
+
+    group: str
+    name: str
+    fault: tuple[str, str] | None = None
+    broken: bool = False
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What was looked at together, in how long, and what else there is to say."""
+
+    name: str
+    cases: Sequence[Case]
+    seconds: float = 0.0
+    remarks: str = ""
+
+
+def refuse_other(path: Path) -> None:
+    """Only a new file, or one that holds XML, is written over; asked before anything is computed."""
+    if path.is_dir() or (path.exists() and not path.read_bytes()[:100].lstrip().startswith(b"<?xml")):
+        raise PipelineError(f"--junit {path}: is there and is no JUnit file; name a new one, such as junit.xml")
+
+
+def write(path: Path, suites: Sequence[Suite]) -> None:
+    """The suites as one file."""
+    root = ElementTree.Element(
+        "testsuites", {"name": "steadyhand check", **_counts([c for s in suites for c in s.cases])}
+    )
+    for suite in suites:
+        element = ElementTree.SubElement(
+            root, "testsuite", {"name": _text(suite.name), **_counts(suite.cases), "time": f"{suite.seconds:.3f}"}
+        )
+        for case in suite.cases:
+            _add(element, case)
+        if suite.remarks:
+            ElementTree.SubElement(element, "system-out").text = _text(suite.remarks)
+    ElementTree.indent(root)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _add(suite: ElementTree.Element, case: Case) -> None:
+    element = ElementTree.SubElement(suite, "testcase", {"classname": _text(case.group), "name": _text(case.name)})
+    if case.fault is not None:
+        headline, details = map(_text, case.fault)
+        kind = "error" if case.broken else "failure"
+        ElementTree.SubElement(element, kind, {"message": headline, "type": kind}).text = details
+
+
+def _counts(cases: Sequence[Case]) -> dict[str, str]:
+    return {
+        "tests": str(len(cases)),
+        "failures": str(sum(case.fault is not None and not case.broken for case in cases)),
+        "errors": str(sum(case.fault is not None and case.broken for case in cases)),
+    }
+
+
+def _text(text: str) -> str:
+    """Without what XML 1.0 cannot hold at all; the rest is escaped when it is written."""
+    return _NOT_IN_XML.sub(STAND_IN, text)

@@ -1,0 +1,137 @@
+"""`power`: how many participants a stated effect takes, as a table, and as files with the curve."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from pipeline.commands import console, power_output
+from pipeline.commands.publish import refuse_study
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.statistics.power import TESTS, Design, closed_form, difference_of_dz, difference_of_f
+from pipeline.statistics.power_simulation import simulate
+from pipeline.statistics.sample_size import sample_size
+from pipeline.wording import number, share
+
+_ASSUMED_CORRELATION = 0.5
+_LARGEST_EFFECT = 100.0
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What the user says of the study, as on the command line."""
+
+    test: str
+    effect: float | None
+    difference: float | None
+    sd: float | None
+    correlation: float | None
+    conditions: int
+    alpha: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """The power wanted, how many studies to simulate from which seed, and the most participants to look at."""
+
+    power: float
+    simulations: int
+    seed: int
+    most: int
+
+
+def power(expected: Expected, search: Search, out: Path | None) -> None:
+    """Print the table and the answer; write the files into `out`."""
+    design = _design(expected)
+    _within("--power", search.power, design.alpha, 1)
+    if out is not None:
+        refuse_study(out)
+    found = sample_size(design, search.power, search.simulations, search.seed, search.most)
+    if found is None:
+        raise PipelineError(_not_enough(design, search))
+    for line in (power_output.heading(design, search.power), *_effect(expected, design)):
+        console.say(line)
+    console.table(*power_output.table(power_output.records(found)), left=0)
+    for line in power_output.answer(design, search.simulations, search.seed, found):
+        console.say(line)
+    if out is not None:
+        power_output.write(out, design, {**asdict(expected), **asdict(search)}, found)
+        console.say(f"Written: {', '.join(str(out / name) for name in power_output.FILES)}")
+
+
+def _design(expected: Expected) -> Design:
+    """The study the options describe; PipelineError for the one that cannot be."""
+    test, k = expected.test, expected.conditions
+    if test not in TESTS:
+        raise PipelineError(f'--test: "{test}" is not known{did_you_mean(test, TESTS)}')
+    if test != "rm_anova" and k != 2:
+        raise PipelineError(
+            f"--conditions {k}: {test} compares two conditions; take --test rm_anova, or plan for one pair"
+            f" (--conditions 2) with --alpha divided by the {k * (k - 1) // 2} pairs"
+        )
+    _within("--alpha", expected.alpha, 0, 1)
+    r = _ASSUMED_CORRELATION if expected.correlation is None else expected.correlation
+    _within("--correlation", r, -1 / (k - 1), 1)
+    return Design(test, _difference(expected, r), r, k, expected.alpha)
+
+
+def _difference(expected: Expected, correlation: float) -> float:
+    """The difference between two conditions, in SDs of a condition."""
+    if expected.effect is not None:
+        if expected.difference is not None or expected.sd is not None:
+            raise PipelineError("--effect and --difference with --sd say the same thing; give one of them")
+        size = _size("--effect", expected.effect)
+        if expected.test == "rm_anova":
+            return difference_of_f(size, expected.conditions)
+        return difference_of_dz(size, correlation) if expected.correlation is None else size
+    if expected.difference is None or expected.sd is None:
+        raise PipelineError(
+            "the effect to be found is missing; give --effect 0.5, or --difference and --sd in the measure's unit"
+        )
+    _within("--sd", expected.sd, 0, math.inf)
+    return _size("--difference over --sd", expected.difference / expected.sd)
+
+
+def _size(option: str, value: float) -> float:
+    """An effect's size without its sign, by which no power changes."""
+    if not 0 < abs(value) <= _LARGEST_EFFECT:
+        raise PipelineError(f"{option}: should be a size other than 0 and up to {_LARGEST_EFFECT:g}, found {value:g}")
+    return abs(value)
+
+
+def _within(option: str, value: float, low: float, high: float) -> None:
+    if not low < value < high:
+        raise PipelineError(f"{option}: should lie between {low:.3g} and {high:g}, found {value:g}")
+
+
+def _not_enough(design: Design, search: Search) -> str:
+    reached = closed_form(design, search.most)
+    if reached is None:
+        reached = simulate(design, search.most, search.simulations, search.seed).own.power
+    return (
+        f"power: {search.most} participants reach a power of {share(reached)}, not {search.power:g}; raise --max-n,"
+        " or plan for a larger effect or a less noisy measure"
+    )
+
+
+def _effect(expected: Expected, design: Design) -> list[str]:
+    """The effect as it was said, and what is computed from it."""
+    assumed = "" if expected.correlation is not None else " (assumed; --correlation states it)"
+    lines = []
+    if expected.difference is not None and expected.sd is not None:
+        lines.append(
+            f"A difference of {abs(expected.difference):g} at an SD of {expected.sd:g} within each condition:"
+            f" d = {number(design.difference)}"
+        )
+        if design.conditions > 2:
+            lines.append(
+                "  between the two conditions farthest apart, the others in the middle: the smallest f it can be"
+            )
+    elif design.test != "rm_anova" and expected.correlation is not None:
+        lines.append(f"d = {number(design.difference)}: the mean difference over the SD within a condition")
+    if design.test == "rm_anova" or lines:
+        lines.append(f"r = {share(design.correlation, 2)}: a participant's values in two conditions correlate{assumed}")
+    if design.test == "rm_anova":
+        return [*lines, f"f = {number(design.f)}: the SD of the conditions' means over the SD within a condition"]
+    return [*lines, f"d_z = {number(design.dz)}: the mean difference over the SD of the differences"]

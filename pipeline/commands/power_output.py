@@ -1,0 +1,157 @@
+"""What `power` prints and writes: the table, what each of its figures means, and the curve."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.counterbalancing import williams_design
+from pipeline.statistics.power import Design
+from pipeline.statistics.sample_size import Needed, SampleSize
+from pipeline.wording import number, share
+
+FILES = ("power.svg", "power.csv", "power.json")
+_NAMES = {
+    "t_paired": "Paired t test",
+    "wilcoxon": "Exact Wilcoxon signed-rank test",
+    "rm_anova": "Repeated-measures ANOVA",
+}
+_FORMULAS = {"t_paired": "noncentral t", "rm_anova": "noncentral F"}
+_SERIES = {"power_closed_form": "closed form", "power_simulated": "simulated", "power_corrected": "Greenhouse-Geisser"}
+_MEANING = {
+    "participants": "complete participants, without those who drop out",
+    "power_closed_form": "chance that p is below alpha if the effect is as stated; null where there is no formula",
+    "power_simulated": "the same, as a share of simulated studies; low and high: its Clopper-Pearson 95 % interval",
+    "power_corrected": "the same of p corrected for sphericity (Greenhouse-Geisser), by which a report judges more than"
+    " two conditions",
+}
+Record = dict[str, Any]
+
+
+def records(found: SampleSize) -> list[Record]:
+    """A row a number of participants; the columns are always the same, None where they do not apply."""
+    rows = []
+    for row in found.rows:
+        record: Record = {"participants": row.n, "power_closed_form": row.closed_form}
+        for column, each in (("power_simulated", row.simulated.own), ("power_corrected", row.simulated.corrected)):
+            low, high = (None, None) if each is None else each.interval()
+            record |= {column: each and each.power, f"{column}_low": low, f"{column}_high": high}
+        rows.append(record)
+    return rows
+
+
+def heading(design: Design, power: float) -> str:
+    """What is planned."""
+    return f"{_named(design)}, alpha = {design.alpha:g}, for a power of {power:g}"
+
+
+def _named(design: Design) -> str:
+    kind = f" of {design.conditions} conditions" if design.test == "rm_anova" else ", two-sided"
+    return f"{_NAMES[design.test]}{kind}"
+
+
+def table(rows: Sequence[Record]) -> tuple[list[str], list[list[str]]]:
+    """Header and cells for people, less the columns that do not apply."""
+    header, lines = ["participants"], [[str(row["participants"])] for row in rows]
+    for column in _present(rows):
+        header += [_SERIES[column], *(["95 % interval"] if f"{column}_low" in rows[0] else [])]
+        for line, row in zip(lines, rows, strict=True):
+            line.append(share(row[column]))
+            if f"{column}_low" in row:
+                line.append(f"[{share(row[f'{column}_low'])}, {share(row[f'{column}_high'])}]")
+    return header, lines
+
+
+def _present(rows: Sequence[Record]) -> list[str]:
+    return [column for column in _SERIES if rows[0][column] is not None]
+
+
+def answer(design: Design, studies: int, seed: int, found: SampleSize) -> list[str]:
+    """How many participants by each way of computing it, and what to know of them."""
+    lines = []
+    if found.closed_form is not None:
+        lines.append(f"Closed form ({_FORMULAS[design.test]}): {found.closed_form} participants.")
+    lines.append(f"Simulation ({studies} studies a row, seed {seed}): {_within_error(found.simulated)}.")
+    if found.corrected is not None:
+        lines.append(f"  corrected by Greenhouse-Geisser, as a report judges: {_within_error(found.corrected)}.")
+    lines.append(
+        f"Power is the chance that p < {design.alpha:g} if the effect is as stated. Add those you expect to drop out."
+    )
+    lines.append(f"Assumed: {_assumed(design)}.")
+    sequences, judged = len(williams_design(design.conditions)), found.judged_by
+    if judged is not None:
+        even = -(-judged // sequences) * sequences
+        lines.append(
+            f"Counterbalancing (steadyhand plan) takes {sequences} sequences, which {even} participants share evenly."
+        )
+    return lines
+
+
+def _within_error(needed: Needed) -> str:
+    if needed.n is None:
+        return "more participants than --max-n"
+    low = needed.low or needed.n
+    if low == needed.high:
+        return f"{needed.n} participants"
+    if needed.high is None:
+        return f"{needed.n} participants, at least {low}; more --simulations would bound it"
+    return f"{needed.n} participants, {low} to {needed.high} within the simulation's error"
+
+
+def _assumed(design: Design) -> str:
+    """What the simulated studies are like."""
+    if design.test == "rm_anova":
+        spherical = ", so that sphericity holds" if design.conditions > 2 else ""
+        return f"normal values, equally spread in every condition, equally correlated between any two{spherical}"
+    if design.test == "wilcoxon":
+        return "normal differences without ties; ratings on a coarse scale tie, and take more participants"
+    return "normal differences"
+
+
+def write(folder: Path, design: Design, settings: Mapping[str, Any], found: SampleSize) -> None:
+    """The table as CSV and JSON, and the curve as SVG."""
+    rows = records(found)
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "power.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    content = {
+        "settings": dict(settings),
+        "effect": {"d": design.difference, "d_z": design.dz, "f": design.f, "correlation": design.correlation},
+        "needed": {
+            "closed_form": found.closed_form,
+            "simulated": vars(found.simulated),
+            "corrected": found.corrected and vars(found.corrected),
+        },
+        "meaning": _MEANING,
+        "rows": rows,
+    }
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    (folder / "power.json").write_text(text, encoding="utf-8")
+    _draw(folder / "power.svg", design, rows, found, settings["power"])
+
+
+def _draw(path: Path, design: Design, rows: Sequence[Record], found: SampleSize, target: float) -> None:
+    import pandas as pd
+
+    from pipeline import figures
+
+    needed = {
+        "power_closed_form": found.closed_form,
+        "power_simulated": found.simulated.n,
+        "power_corrected": found.corrected and found.corrected.n,
+    }
+    names = {
+        "power_closed_form": f"closed form ({_FORMULAS.get(design.test)})",
+        "power_simulated": "simulated (95 % interval)",
+        "power_corrected": "simulated, Greenhouse-Geisser",
+    }
+    series = {column: f"{names[column]}, n = {needed[column] or '?'}" for column in _present(rows)}
+    effect = f"f = {number(design.f)}" if design.test == "rm_anova" else f"d_z = {number(design.dz)}"
+    labels = figures.Labels(f"{_named(design)}: {effect}", f"Power (chance that p < {design.alpha:g})")
+    shown = pd.DataFrame(rows).dropna(axis="columns", how="all")
+    figures.draw(figures.power, path, shown, series, target, found.judged_by, labels)

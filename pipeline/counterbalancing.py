@@ -1,0 +1,70 @@
+"""Orders of conditions that are balanced for position and for what came just before."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, permutations, product
+
+import numpy as np
+
+Order = tuple[int, ...]
+
+
+def williams_design(conditions: int) -> list[Order]:
+    """The sequences of a balanced Latin square, conditions counted from 0 (Williams 1949).
+
+    In an even number of conditions every one follows every other once in a single square of as many sequences. In an
+    odd number that takes two squares; the second is the first read backwards. ValueError for fewer than two.
+    """
+    if conditions < 2:
+        raise ValueError(f"an order needs two conditions or more, found {conditions}")
+    first = [(place + 1) // 2 if place % 2 else -(place // 2) for place in range(conditions)]
+    square = [tuple((at + shift) % conditions for at in first) for shift in range(conditions)]
+    return square if conditions % 2 == 0 else square + [order[::-1] for order in square]
+
+
+def assigned(conditions: int, participants: int, seed: int | None = None) -> list[Order]:
+    """An order a participant: whole squares one after the other, the last as far as it is needed.
+
+    With a seed, chance decides within each square who gets which sequence.
+    """
+    design = williams_design(conditions)
+    squares = [design[start : start + conditions] for start in range(0, len(design), conditions)]
+    random = None if seed is None else np.random.default_rng(seed)
+    orders: list[Order] = []
+    while len(orders) < participants:
+        square = squares[len(orders) // conditions % len(squares)]
+        places = range(conditions) if random is None else random.permutation(conditions)
+        orders += [square[place] for place in places]
+    return orders[:participants]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The fewest and the most times that a condition stands in a period, and that one follows another."""
+
+    period: tuple[int, int]
+    neighbours: tuple[int, int]
+
+    @property
+    def complete(self) -> bool:
+        """Every one equally often?"""
+        return len(set(self.period)) == len(set(self.neighbours)) == 1
+
+
+def balance(orders: Sequence[Order]) -> Balance:
+    """How evenly the orders, each of all the conditions, spread them."""
+    conditions = range(len(orders[0]))
+    periods = Counter((place, condition) for order in orders for place, condition in enumerate(order))
+    follows = Counter(pair for order in orders for pair in pairwise(order))
+    return Balance(
+        _range(periods[cell] for cell in product(conditions, conditions)),
+        _range(follows[pair] for pair in permutations(conditions, 2)),
+    )
+
+
+def _range(counts: Iterable[int]) -> tuple[int, int]:
+    known = list(counts)
+    return min(known), max(known)
