@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -55,8 +54,3 @@ class Statement:
 
     def _found(self, verdict: Verdict, follows: str, explanation: str) -> Finding:
         return Finding(self.check, self.what, self.printed, follows, verdict, explanation)
-
-
-def contradictions(findings: Iterable[Finding]) -> list[Finding]:
-    """Those that cannot be true."""
-    return [finding for finding in findings if finding.verdict == CONTRADICTION]
