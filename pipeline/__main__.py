@@ -160,6 +160,17 @@ def plan(
     command.plan(conditions or [], study, participants, prefix=prefix, seed=seed, out=out)
 
 
+@app.command()
+def audit(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A paper's printed figures; docs/audit.md says how.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+) -> None:
+    """Say which of a paper's printed figures agree with each other; exit code 3 where some cannot."""
+    from pipeline.commands import audit as command
+
+    command.audit(file, as_json)
+
+
 def main() -> None:
     """Run the command; an error the user can mend is a message, not a traceback."""
     # One thread a process: many small matrices, and processes for the rest. Set before NumPy is imported.

@@ -1,165 +1,155 @@
-"""A paper's printed figures beside the computed ones, and printed figures that cannot all be true."""
+"""A paper's printed figures beside the computed ones, and held against each other."""
 
 from __future__ import annotations
 
-from decimal import Decimal, InvalidOperation
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipeline import tables
-from pipeline.errors import PipelineError
-from pipeline.study import Frozen, parse, read_yaml
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.publication import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
+from pipeline.statistics.forensics.audit import audit
+from pipeline.statistics.forensics.phrases import label
+from pipeline.statistics.forensics.rounded import Rounded
 
 Row = dict[str, Any]
-_LARGEST_EXPONENT = 100
+_STATISTIC_NAMES = {"t": "t", "F": "F", "chi2": "chi2", "W": "W+"}
+_ROUND_OFF = Fraction(1, 10**6)  # of a unit in the last digit: what arithmetic leaves of a value halfway
 
 
-class Figure(Frozen):
-    """One printed figure and the row and column that should give it. `times` turns a mean into a total or a percent."""
+def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame) -> pd.DataFrame:
+    """The table `printed`: each figure with its computed value, then what the audit of the file finds.
 
-    what: str
-    printed: str
-    table: Literal["descriptives", "comparisons"]
-    measure: str
-    column: str
-    condition: str | None = None
-    test: str | None = None
-    times: float = 1.0
-
-
-class Total(Frozen):
-    """A printed total of n whole-number ratings over several scales, and the printed means of those scales."""
-
-    what: str
-    printed: str
-    n: int
-    means: tuple[str, ...]
-
-
-class Claim(Frozen):
-    """A printed p value and what the text says of it."""
-
-    what: str
-    p: str
-    significant: bool
-
-
-class Printed(Frozen):
-    """printed.yaml: what a publication prints of the study."""
-
-    source: str
-    figures: tuple[Figure, ...] = ()
-    totals: tuple[Total, ...] = ()
-    claims: tuple[Claim, ...] = ()
-
-
-def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame, alpha: float) -> pd.DataFrame:
-    """The table `printed`: each figure with its computed value, then each total and claim by itself.
-
-    Verdicts: agrees, differs, undefined; contradiction or consistent where printed figures are held against
-    each other.
+    Verdicts: agrees, differs, undefined for a figure beside its computed value (`check` is null); those of
+    `forensics.finding` where printed figures are held against each other.
     """
-    printed = parse(Printed, read_yaml(path), path)
-    found = {"descriptives": descriptives, "comparisons": comparisons}
-    rows = [_figure(path, figure, found[figure.table]) for figure in printed.figures]
-    rows += [_total(path, total) for total in printed.totals]
-    rows += [_claim(path, claim, alpha) for claim in printed.claims]
-    return tables.frame("printed", [{**row, "source": printed.source} for row in rows])
+    publication = load_publication(path)
+    computed = _Computed(path, descriptives, comparisons)
+    rows = [_row(*figure) for figure in _figures(publication, computed)]
+    for found in audit(publication):
+        rows.append(
+            {
+                "what": found.what,
+                "check": found.check,
+                "printed": found.printed,
+                "computed": found.follows,
+                "verdict": found.verdict,
+                "explanation": found.explanation,
+            }
+        )
+    return tables.frame("printed", [{**row, "source": publication.source} for row in rows])
 
 
-def _decimal(path: Path, text: str) -> Decimal:
-    try:
-        value = Decimal(text)
-        if value.is_finite() and abs(value.adjusted()) < _LARGEST_EXPONENT:
-            return value
-        raise InvalidOperation
-    except InvalidOperation:
-        raise PipelineError(f'{path}: "{text}" should be a number, in quotes and with the digits as printed') from None
+Figure = tuple[str, Rounded, float]
+"""What it is, as printed, and its computed value, NaN where that is not defined."""
 
 
-def _half_unit(value: Decimal) -> Decimal:
-    """Half a unit of the last printed digit: how far the unrounded figure may be from it."""
-    exponent = value.as_tuple().exponent
-    return Decimal((0, (5,), int(exponent) - 1))
+def _figures(publication: Publication, computed: _Computed) -> Iterator[Figure]:
+    """Every figure of a measure that the study has, with its value."""
+    for measure in publication.measures:
+        if measure.measure is None:
+            continue
+        for condition, cell in measure.cells.items():
+            yield from _of_cell(computed, measure, measure.measure, condition, cell)
+        for reduction in measure.reductions:
+            if reduction.of != "participants":
+                what = f"{measure.name}: reduction of the {reduction.of}, {reduction.before} to {reduction.to}, %"
+                yield what, reduction.percent, computed.reduction(measure.measure, reduction)
+        for test in measure.tests:
+            yield from _of_test(computed, measure, measure.measure, test)
+    for total in publication.totals:
+        names = [measure.measure for measure in publication.named(total.measures)]
+        if None not in names:
+            yield total.label, total.printed, computed.total([name for name in names if name], total)
 
 
-def as_printed(value: float, printed: Decimal) -> str:
-    """A computed value with as many digits as the printed one."""
-    exponent = int(printed.as_tuple().exponent)
-    if exponent <= 0:
-        return f"{value:.{-exponent}f}"
-    return f"{value:.{len(printed.as_tuple().digits) - 1}e}".replace("e+0", "e")
+def _of_cell(computed: _Computed, measure: Measure, name: str, condition: str, cell: Cell) -> Iterator[Figure]:
+    for column in ("mean", "sd", "median", "rmse"):
+        figure = getattr(cell, column)
+        if figure is not None:
+            yield f"{measure.name}, {condition}: {column}", figure, computed.described(name, condition, column)
 
 
-def _figure(path: Path, figure: Figure, table: pd.DataFrame) -> Row:
-    printed = _decimal(path, figure.printed)
-    value = _computed(path, figure, table) * figure.times
-    row: Row = {"what": figure.what, "printed": figure.printed}
+def _of_test(computed: _Computed, measure: Measure, name: str, test: PrintedTest) -> Iterator[Figure]:
+    for symbol, statistic in _STATISTIC_NAMES.items():
+        figure = getattr(test, symbol)
+        if figure is not None:
+            yield f"{label(measure, test)}, {symbol}", figure, computed.tested(name, test, "statistic", statistic)
+    for column in ("p", "p_adjusted"):
+        figure = getattr(test, column)
+        if figure is not None:
+            yield f"{label(measure, test)}, {column.replace('_', ' ')}", figure, computed.tested(name, test, column)
+
+
+def _row(what: str, printed: Rounded, value: float) -> Row:
+    row: Row = {"what": what, "printed": printed.text}
     if not np.isfinite(value):
         return row | {"computed": "undefined", "verdict": "undefined"}
-    agrees = abs(Decimal(value) - printed) <= _half_unit(printed) * Decimal("1.000001")
+    interval, room = printed.interval, printed.unit * _ROUND_OFF
+    agrees = interval.low - room <= Fraction(value) <= interval.high + room
     return row | {
-        "computed": as_printed(value, printed),
+        "computed": printed.like(value),
         "computed_value": value,
         "verdict": "agrees" if agrees else "differs",
     }
 
 
-def _computed(path: Path, figure: Figure, table: pd.DataFrame) -> float:
-    """The figure's value in the table; a reduction of a descriptive is that of its two conditions' means."""
-    rows = table[table["measure"] == figure.measure]
-    if figure.table == "descriptives" and figure.column == "reduction":
-        means = rows["mean"].to_numpy(np.float64)
-        if len(means) != 2:
-            raise PipelineError(f'{path}: "{figure.what}": a reduction needs two conditions, found {len(means)}')
-        return float(1 - means[1] / means[0]) if means[0] != 0 else np.nan
-    for column in ("condition", "test"):
-        wanted = getattr(figure, column)
-        if wanted is not None:
-            rows = rows[rows[column] == wanted]
-    if "contrast" in rows and rows["contrast"].isna().any():
-        rows = rows[rows["contrast"].isna()]  # without what follows them up
-    if len(rows) != 1 or figure.column not in rows or rows[figure.column].dtype.kind not in "fi":
-        raise PipelineError(
-            f'{path}: "{figure.what}" fits {len(rows)} rows of {figure.table} with a column "{figure.column}"; it must '
-            "fit one: check measure, condition, test and column"
-        )
-    value = rows.iloc[0][figure.column]
-    return np.nan if pd.isna(value) else float(value)
+class _Computed:
+    """The study's descriptives and comparisons, asked for the figures that a publication prints."""
 
+    def __init__(self, path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame) -> None:
+        self._path, self._descriptives, self._comparisons = path, descriptives, comparisons
 
-def _total(path: Path, total: Total) -> Row:
-    """Each scale's sum is a whole number that its printed mean allows; their total must be the printed one."""
-    low = high = 0
-    for text in total.means:
-        mean = _decimal(path, text)
-        half = _half_unit(mean)
-        low += int(np.ceil(float((mean - half) * total.n) - 1e-9))
-        high += int(np.floor(float((mean + half) * total.n) + 1e-9))
-    fits = low <= _decimal(path, total.printed) <= high
-    allowed = str(low) if low == high else f"{low} to {high}"
-    return {
-        "what": total.what,
-        "printed": total.printed,
-        "computed": allowed,
-        "computed_value": float(low) if low == high else None,
-        "verdict": "consistent" if fits else "contradiction",
-        "explanation": (
-            f"the printed means of {len(total.means)} scales add up to {allowed} over {total.n} participants"
-        ),
-    }
+    def described(self, measure: str, condition: str, column: str) -> float:
+        """A condition's mean, sd or median; as `rmse` the root of its mean."""
+        rows = self._rows(self._descriptives, "measure", measure)
+        value = self._rows(rows, "condition", condition).iloc[0]["mean" if column == "rmse" else column]
+        if pd.isna(value):
+            return np.nan
+        return float(np.sqrt(value)) if column == "rmse" else float(value)
 
+    def reduction(self, measure: str, reduction: Reduction) -> float:
+        """In percent of the first figure."""
+        before, after = (self.described(measure, name, reduction.of) for name in (reduction.before, reduction.to))
+        return 100 * (1 - after / before) if before != 0 else np.nan
 
-def _claim(path: Path, claim: Claim, alpha: float) -> Row:
-    below = _decimal(path, claim.p) < Decimal(str(alpha))
-    said = "significant" if claim.significant else "not significant"
-    return {
-        "what": claim.what,
-        "printed": f"p = {claim.p}, called {said}",
-        "computed": "significant" if below else "not significant",
-        "verdict": "consistent" if below == claim.significant else "contradiction",
-        "explanation": f"p = {claim.p} is {'below' if below else 'not below'} the level of {alpha:g}",
-    }
+    def total(self, measures: Sequence[str], total: Total) -> float:
+        """Over the measures, and over participants for a sum."""
+        means = [self.described(measure, total.condition, "mean") for measure in measures]
+        if total.sum is not None:
+            means = [
+                mean * self.described(measure, total.condition, "n")
+                for mean, measure in zip(means, measures, strict=True)
+            ]
+        return sum(means) / (len(means) if total.average is not None else 1)
+
+    def tested(self, measure: str, test: PrintedTest, column: str, statistic: str | None = None) -> float:
+        """A column of the one comparison that the printed test is."""
+        rows = self._rows(self._comparisons, "measure", measure)
+        for name, wanted in (("test", test.test), ("effect", test.effect), ("contrast", test.contrast)):
+            rows = rows if wanted is None else self._rows(rows, name, wanted)
+        if test.contrast is None and rows["contrast"].isna().any():
+            rows = rows[rows["contrast"].isna()]  # without what follows them up
+        if statistic is not None:
+            rows = self._rows(rows, "statistic_name", statistic)
+        if len(rows) != 1:
+            raise PipelineError(
+                f'{self._path}: a printed test of "{measure}" fits {len(rows)} of the study\'s comparisons; it must fit'
+                " one: give its test, effect or contrast"
+            )
+        value = rows.iloc[0][column]
+        return np.nan if pd.isna(value) else float(value)
+
+    def _rows(self, table: pd.DataFrame, column: str, wanted: str) -> pd.DataFrame:
+        rows = table[table[column] == wanted]
+        if rows.empty:
+            known = [str(value) for value in table[column].dropna().unique()]
+            raise PipelineError(
+                f'{self._path}: the study\'s results have no {column} "{wanted}"{did_you_mean(wanted, known)}'
+            )
+        return rows

@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
@@ -303,17 +303,17 @@ class Study(Frozen):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
-        _unique("conditions", self.conditions)
-        _unique("axes", self.axes)
+        unique("conditions", self.conditions)
+        unique("axes", self.axes)
         for condition, shown in self.shown.items():
-            _known("shown", condition, self.conditions)
-            _known(f"shown.{condition}", shown, self.estimators)
+            known("shown", condition, self.conditions)
+            known(f"shown.{condition}", shown, self.estimators)
         for excluded in self.exclusions:
             if excluded.condition is not None:
-                _known("exclusions: condition", excluded.condition, self.conditions)
+                known("exclusions: condition", excluded.condition, self.conditions)
         for name, estimator in self.estimators.items():
             for stream in estimator.use or ():
-                _known(f"estimators.{name}.use", stream, self.sensor_streams)
+                known(f"estimators.{name}.use", stream, self.sensor_streams)
         for comparison in self.comparisons:
             if comparison.test == "crossover" and len(self.conditions) != 2:
                 raise ValueError(
@@ -335,9 +335,9 @@ class Study(Frozen):
         for name, stream in self.sensor_streams.items():
             axes = None if isinstance(stream, AccelerationStream) else stream.axes
             if axes is not None:
-                _unique(f"streams.{name}.axes", axes)
+                unique(f"streams.{name}.axes", axes)
                 for axis in axes:
-                    _known(f"streams.{name}.axes", axis, self.axes)
+                    known(f"streams.{name}.axes", axis, self.axes)
             if isinstance(stream, AccelerationStream) and stream.calibrate_s and self.tracker is None:
                 raise ValueError(f"streams.{name}: calibrate_s needs a stream of kind position to learn from")
 
@@ -362,15 +362,17 @@ class Study(Frozen):
         return next((name for name, stream in self.streams.items() if stream.kind == kind), None)
 
 
-def _unique(field: str, values: tuple[str, ...]) -> None:
+def unique(field: str, values: tuple[str, ...]) -> None:
+    """ValueError where one of the values stands there twice."""
     for value in values:
         if values.count(value) > 1:
             raise ValueError(f'{field}: "{value}" stands there twice')
 
 
-def _known(field: str, value: str, known: Mapping[str, object] | tuple[str, ...]) -> None:
-    if value not in known:
-        raise ValueError(f'{field}: "{value}" is not known{did_you_mean(value, known)}')
+def known(field: str, value: str, names: Mapping[str, object] | tuple[str, ...]) -> None:
+    """ValueError where a value is none of the names, with the one that was meant."""
+    if value not in names:
+        raise ValueError(f'{field}: "{value}" is not known{did_you_mean(value, names)}')
 
 
 _PLACEHOLDER = re.compile(r"\{(\w+)\}")
@@ -382,7 +384,7 @@ def _check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
     for name in names:
         if name not in _PLACEHOLDERS:
             raise ValueError(f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, _PLACEHOLDERS)}')
-    _unique("sessions: placeholder", tuple(names))
+    unique("sessions: placeholder", tuple(names))
     if not names:
         raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
     for condition in conditions:
@@ -432,10 +434,21 @@ def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, o
 _UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
-    """A YAML file that holds a mapping; PipelineError that names the file and line where it does not."""
+class _TextLoader(_UniqueKeyLoader):
+    """Numbers stay text: 0.050 keeps its last digit."""
+
+
+_TextLoader.yaml_implicit_resolvers = {}
+
+
+def read_yaml(path: Path, as_text: bool = False) -> dict[str, Any]:
+    """A YAML file that holds a mapping; PipelineError that names the file and line where it does not.
+
+    `as_text` leaves every value as it is written, numbers too.
+    """
+    loader = _TextLoader if as_text else _UniqueKeyLoader
     try:
-        content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_UniqueKeyLoader)  # noqa: S506 - safe
+        content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=loader)  # noqa: S506 - safe
     except FileNotFoundError:
         raise PipelineError(f"{path}: there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -503,16 +516,29 @@ def _explained(fault: Any, model: type[BaseModel]) -> str:
 
 def _keys_at(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
     """The keys that are known where an unknown one stood."""
-    nested: dict[object, type[BaseModel]] = {
-        "events": Events,
-        "display": Display,
-        "comparisons": Comparison,
-        "exclusions": Exclusion,
-        "simulation": ReachSimulation,
-    }
-    if location and model is Study:
-        model = KINDS[location[-1]] if location[0] == "streams" else nested.get(location[0], model)
-    return list(model.model_fields)
+    models = [model]
+    for part in location:
+        inner = [kind for outer in models for kind in _models_of(outer, part)]
+        models = inner or [kind for kind in models if part in _kinds(kind)] or models
+    return [field.alias or name for name, field in models[0].model_fields.items()]
+
+
+def _models_of(model: type[BaseModel], key: object) -> list[type[BaseModel]]:
+    """The models that a key of a model holds, in a list or a mapping or by itself."""
+    field = next((field for name, field in model.model_fields.items() if key in (name, field.alias)), None)
+    pending, found = [] if field is None else [field.annotation], []
+    while pending:
+        annotation: Any = pending.pop()
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            found.append(annotation)
+        pending += get_args(annotation)
+    return found
+
+
+def _kinds(model: type[BaseModel]) -> tuple[object, ...]:
+    """The kinds by which a union of models tells this one."""
+    field = model.model_fields.get("kind")
+    return get_args(field.annotation) if field else ()
 
 
 def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path:

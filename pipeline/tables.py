@@ -209,6 +209,7 @@ TABLES: Mapping[str, pa.Schema] = {
     ),
     "printed": _schema(
         ("what", _TEXT),
+        ("check", _TEXT),
         ("source", _TEXT),
         ("printed", _TEXT),
         ("computed", _TEXT),

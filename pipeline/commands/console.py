@@ -21,19 +21,19 @@ _LABELS = {
 }
 
 
-def _tame(text: str) -> str:
+def tame(text: str) -> str:
     """Without control characters: a name from a log must not steer the terminal."""
     return "".join("□" if unicodedata.category(c) == "Cc" and c != "\n" else c for c in text)
 
 
 def say(text: str) -> None:
     """A line of output."""
-    print(_tame(text), flush=True)  # noqa: T201
+    print(tame(text), flush=True)  # noqa: T201
 
 
 def warn(text: str) -> None:
     """A line for the user beside the output."""
-    print(_tame(text), file=sys.stderr, flush=True)  # noqa: T201
+    print(tame(text), file=sys.stderr, flush=True)  # noqa: T201
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from pipeline.statistics.forensics.finding import CONTRADICTION
 from pipeline.wording import comparison_sentence, counted, measure_label, number
 
 Row = Mapping[str, Any]
@@ -23,9 +24,15 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
         yield f"  {len(results['comparisons']) - len(rows)} pairwise comparisons: see the report"
     for row in results["accuracy_means"]:
         yield f"  {row['estimator']}: RMSE {number(row['rmse_mm'])} mm (mean of {counted(row['n'], 'session')})"
-    differing = [row for row in results["printed"] if row["verdict"] in ("differs", "contradiction")]
-    agreeing = sum(row["verdict"] == "agrees" for row in results["printed"])
-    if results["printed"]:
-        yield f"  printed figures reproduced to the digit: {agreeing}; not, or in contradiction: {len(differing)}"
-    for row in differing:
-        yield f"    {row['what']}: printed {row['printed']}, computed {row['computed']} ({row['verdict']})"
+    figures = [row for row in results["printed"] if row["check"] is None]
+    if figures:
+        agreeing = sum(row["verdict"] == "agrees" for row in figures)
+        yield f"  printed figures reproduced to the digit: {agreeing}; not: {len(figures) - agreeing}"
+    for row in figures:
+        if row["verdict"] == "differs":
+            yield f"    {row['what']}: printed {row['printed']}, computed {row['computed']}"
+    contradictions = [row for row in results["printed"] if row["verdict"] == CONTRADICTION]
+    if contradictions:
+        yield f"  printed figures that contradict others of the publication: {len(contradictions)}"
+    for row in contradictions:
+        yield f"    {row['what']}: {row['printed']}; {row['explanation']}"

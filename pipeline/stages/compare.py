@@ -56,9 +56,8 @@ def run(work: Work) -> Outcome:
     found["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(found["accuracy"]))
     found["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, found["trials"]))
     if study.printed is not None:
-        found["printed"] = compare_printed(
-            work.folder / study.printed, found["descriptives"], found["comparisons"], study.alpha
-        )
+        path = work.folder / study.printed
+        found["printed"] = compare_printed(path, found["descriptives"], found["comparisons"])
     for name, table in found.items():
         tables.write(name, table, work.out)
     results.write(work.out / "results.json", work.study_name, study, found, _people(work, measures))

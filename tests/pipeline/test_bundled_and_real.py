@@ -42,6 +42,8 @@ def test_feng2016_reproduces_what_the_paper_prints(steadyhand: Steadyhand) -> No
     for printed in (".0071", ".0052", ".0137", ".0898", ".0508", ".0249", ".1611", ".0195"):
         assert f">{printed}<" in page or f"p = {printed}" in page
     assert "Reconstructed data" in page
+    for title in ("Contradictions within the publication", "What a reader of it should know"):
+        assert title in page
 
 
 def test_reach_shows_what_the_first_experiment_shows(steadyhand: Steadyhand) -> None:

@@ -1,0 +1,61 @@
+"""`audit`: do a publication's printed figures agree with each other?"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from pipeline.commands import console
+from pipeline.publication import load_publication
+from pipeline.statistics.forensics.audit import audit as findings_of
+from pipeline.statistics.forensics.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
+from pipeline.wording import counted, listing
+
+CONTRADICTED = 3  # the exit code, as of numbers that moved
+_WIDTH_OF_A_FILE = 140
+_COLOURS = {CONTRADICTION: "bold red", REMARK: "yellow", AGREEMENT: "green"}
+
+
+def audit(path: Path, as_json: bool) -> None:
+    """Print every check of the file, the gravest first; exit with 3 where figures contradict each other."""
+    publication = load_publication(path)
+    findings = findings_of(publication)
+    counts = Counter(finding.verdict for finding in findings)
+    if as_json:
+        content = {
+            "source": publication.source,
+            "counts": {verdict: counts[verdict] for verdict in VERDICTS},
+            "findings": [asdict(finding) for finding in findings],
+        }
+        console.say(json.dumps(content, indent=1, ensure_ascii=False))
+    else:
+        _print(sorted(findings, key=lambda finding: VERDICTS.index(finding.verdict)))
+        told = [counted(counts[verdict], verdict) for verdict in (CONTRADICTION, REMARK, AGREEMENT)]
+        told.append(f"{counts[UNCHECKED]} that cannot be checked")
+        console.say(f"{publication.source}: {listing(told)}")
+    sys.exit(CONTRADICTED if counts[CONTRADICTION] else 0)
+
+
+def _print(findings: Sequence[Finding]) -> None:
+    """A table, as wide as the terminal. Text from the file is data: no markup, no control characters."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    out = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE, highlight=False)
+    table = Table("Verdict", "Check", "Printed", "Follows from the rest", box=SIMPLE, pad_edge=False)
+    for column in table.columns:
+        column.overflow = "fold"
+    for before, finding in zip([None, *findings], findings, strict=False):
+        if before is not None and before.verdict != finding.verdict:
+            table.add_section()
+        because = "" if finding.verdict == AGREEMENT else f"\n{finding.explanation}"
+        words = (f"{finding.check}: {finding.what}", finding.printed, f"{finding.follows}{because}".strip())
+        style = _COLOURS.get(finding.verdict, "")
+        table.add_row(Text(finding.verdict, style=style), *(Text(console.tame(word)) for word in words))
+    out.print(table)

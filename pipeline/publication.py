@@ -1,0 +1,288 @@
+"""printed.yaml as frozen models: what a publication prints, digit for digit. docs/audit.md is the reference."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationInfo,
+    model_validator,
+)
+
+from pipeline.errors import did_you_mean
+from pipeline.statistics.forensics.p_values import DEGREES_OF_FREEDOM, Symbol
+from pipeline.statistics.forensics.rounded import Rounded, Rounding
+from pipeline.study import Frozen, Id, known, parse, read_yaml, unique
+
+BETWEEN = ("t_independent", "welch", "anova")
+"""Tests of groups: each has participants of its own."""
+
+
+def _listed(value: object) -> object:
+    """One thing as a list of it."""
+    return (value,) if isinstance(value, str) else value
+
+
+def _read(value: object, info: ValidationInfo) -> Rounded:
+    """A figure; `rounding` of the validation's context says how to take it."""
+    if isinstance(value, Rounded):
+        return value
+    if not isinstance(value, str):
+        raise ValueError("should be a number with its digits as printed")
+    return Rounded.read(value, (info.context or {}).get("rounding", "nearest"))
+
+
+def _no_relation(value: Rounded) -> Rounded:
+    if value.relation != "=":
+        raise ValueError("should be a number; only p may have < or >")
+    return value
+
+
+_Text = PlainSerializer(lambda value: value.text, return_type=str)
+PValue = Annotated[Rounded, PlainValidator(_read), _Text]
+Number = Annotated[Rounded, PlainValidator(lambda value, info: _no_relation(_read(value, info))), _Text]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Names = Annotated[tuple[Id, ...], BeforeValidator(_listed), Field(min_length=1)]
+
+
+class Scale(Frozen):
+    """What a participant's score can be: from `min` to `max` in steps; a mean of `items` such ratings."""
+
+    step: Number | None = None
+    items: Count = 1
+    min: Number | None = None
+    max: Number | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Scale:
+        if self.step is not None and self.step.value <= 0:
+            raise ValueError("scale: step should be more than 0")
+        if self.min is not None and self.max is not None:
+            if self.min.value >= self.max.value:
+                raise ValueError("scale: min should be less than max")
+            if self.step is not None and ((self.max.value - self.min.value) / self.step.value).denominator != 1:
+                raise ValueError("scale: from min to max should be a whole number of steps")
+        return self
+
+
+class Cell(Frozen):
+    """One condition's printed figures; `rmse` is the root of `mean`, a mean of squares."""
+
+    n: Count | None = None
+    mean: Number | None = None
+    sd: Number | None = None
+    median: Number | None = None
+    rmse: Number | None = None
+
+
+class Reduction(Frozen):
+    """A printed percentage by which `to` is less than `from`; negative for an increase."""
+
+    model_config = ConfigDict(populate_by_name=False)
+
+    before: Id = Field(alias="from")
+    to: Id
+    percent: Number
+    of: Literal["mean", "median", "sd", "rmse", "participants"] = "mean"
+
+
+class PrintedTest(Frozen):
+    """A printed test: its statistic, degrees of freedom, p, and what the text says of it."""
+
+    test: (
+        Literal[
+            "rm_anova",
+            "t_paired",
+            "wilcoxon",
+            "friedman",
+            "art_anova",
+            "mixed_model",
+            "t_independent",
+            "welch",
+            "anova",
+            "correlation",
+        ]
+        | None
+    ) = None
+    conditions: Names | None = None
+    effect: str | None = None
+    contrast: str | None = None
+    n: Count | None = None
+    t: Number | None = None
+    F: Number | None = None
+    chi2: Number | None = None
+    z: Number | None = None
+    r: Number | None = None
+    W: Number | None = None
+    df: Annotated[tuple[Number, ...], BeforeValidator(_listed)] = ()
+    epsilon: Number | None = None
+    p: PValue | None = None
+    p_adjusted: PValue | None = None
+    sides: Literal["1", "2"] | None = None
+    method: Literal["exact", "normal"] | None = None
+    significant: bool | None = None
+    alpha: Number | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> PrintedTest:
+        printed = [symbol for symbol in DEGREES_OF_FREEDOM if getattr(self, symbol) is not None]
+        if len(printed) > 1:
+            raise ValueError(f"has {' and '.join(printed)}; give each statistic a test of its own")
+        for symbol in printed:
+            needed = DEGREES_OF_FREEDOM[symbol]
+            if len(self.df) not in (0, needed):
+                raise ValueError(f"the statistic {symbol} has {needed} degrees of freedom, and df lists {len(self.df)}")
+        if self.W is not None and self.test != "wilcoxon":
+            raise ValueError("only test: wilcoxon has a W")
+        return self
+
+    @property
+    def statistic(self) -> tuple[Symbol, Rounded] | None:
+        """The printed statistic that p follows from, if there is one."""
+        symbols: tuple[Symbol, ...] = ("t", "F", "chi2", "z", "r")
+        return next(((symbol, getattr(self, symbol)) for symbol in symbols if getattr(self, symbol) is not None), None)
+
+
+class Measure(Frozen):
+    """What is printed of one dependent variable. `measure` is the study's own name for it, where there is a study."""
+
+    name: Id
+    measure: Id | None = None
+    n: Count | None = None
+    scale: Scale | None = None
+    cells: Mapping[Id, Cell] = {}
+    reductions: tuple[Reduction, ...] = ()
+    tests: tuple[PrintedTest, ...] = ()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Measure:
+        for reduction in self.reductions:
+            known("from", reduction.before, self.cells)
+            known("to", reduction.to, self.cells)
+        for test in self.tests:
+            for condition in test.conditions or ():
+                known("conditions", condition, self.cells)
+        return self
+
+    @property
+    def between(self) -> bool:
+        """Are its conditions groups of different participants?"""
+        return any(test.test in BETWEEN for test in self.tests)
+
+
+class Total(Frozen):
+    """A printed figure over several measures in one condition: `sum` over participants too, `mean` of the participants'
+    sums, or `average` of the measures' means.
+    """
+
+    label: str
+    measures: Names
+    condition: Id
+    sum: Number | None = None
+    mean: Number | None = None
+    average: Number | None = None
+
+    @model_validator(mode="after")
+    def _one_of(self) -> Total:
+        if sum(figure is not None for figure in (self.sum, self.mean, self.average)) != 1:
+            raise ValueError("needs one of sum, mean and average")
+        return self
+
+    @property
+    def printed(self) -> Rounded:
+        """The one of the three that is there."""
+        (figure,) = (figure for figure in (self.sum, self.mean, self.average) if figure is not None)
+        return figure
+
+
+class Share(Frozen):
+    """A printed percentage of a number of things; `count` is how many of them, where that is printed too."""
+
+    label: str
+    of: Count
+    percent: Number
+    count: Annotated[int, Field(ge=0)] | None = None
+
+
+class Parts(Frozen):
+    """Counts that make a printed total."""
+
+    label: str
+    parts: tuple[Annotated[int, Field(ge=0)], ...]
+    total: Annotated[int, Field(ge=0)]
+
+
+class Family(Frozen):
+    """Tests that belong together; `adjust` is how the publication judged them, from p values printed unadjusted."""
+
+    label: str
+    measures: Names
+    adjust: Literal["none", "holm", "bonferroni", "benjamini_hochberg"] = "none"
+
+
+class Publication(Frozen):
+    """printed.yaml. `n` participants stand behind every mean and test unless it says otherwise."""
+
+    source: str
+    n: Count | None = None
+    alpha: Number = Rounded.read("0.05")
+    rounding: Literal["nearest", "cut_off"] = "nearest"
+    sd: Literal["sample", "population"] = "sample"
+    measures: tuple[Measure, ...]
+    totals: tuple[Total, ...] = ()
+    shares: tuple[Share, ...] = ()
+    counts: tuple[Parts, ...] = ()
+    families: tuple[Family, ...] = ()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Publication:
+        if not self.measures:
+            raise ValueError("measures: needs one or more")
+        names = tuple(measure.name for measure in self.measures)
+        unique("measures: name", names)
+        for field, entries in (("totals", self.totals), ("families", self.families)):
+            for entry in entries:
+                for pattern in entry.measures:
+                    if not any(matches(pattern, name) for name in names):
+                        raise ValueError(f'{field}: there is no measure "{pattern}"{did_you_mean(pattern, names)}')
+        for total in self.totals:
+            for measure in self.named(total.measures):
+                known(f'totals: condition of "{measure.name}"', total.condition, measure.cells)
+        return self
+
+    def named(self, patterns: tuple[str, ...]) -> list[Measure]:
+        """The measures whose names fit, in the file's order."""
+        return [measure for measure in self.measures if any(matches(pattern, measure.name) for pattern in patterns)]
+
+    def n_of(self, measure: Measure, test: PrintedTest) -> int | None:
+        """How many participants a test took, as far as the file says."""
+        return test.n or measure.n or self.n
+
+    def tests(self) -> Iterator[tuple[Measure, PrintedTest]]:
+        """Every test with its measure."""
+        return ((measure, test) for measure in self.measures for test in measure.tests)
+
+    def as_read(self, rounding: Rounding) -> Publication:
+        """The same figures, taken to be rounded in another way."""
+        content = self.model_dump(by_alias=True, exclude_defaults=True)
+        return Publication.model_validate(content, context={"rounding": rounding})
+
+
+def matches(pattern: str, name: str) -> bool:
+    """Does a name fit a pattern, in which * stands for any text?"""
+    return re.fullmatch(".*".join(re.escape(piece) for piece in pattern.split("*")), name) is not None
+
+
+def load_publication(path: Path) -> Publication:
+    """A file of printed figures; PipelineError that names the file, the field, the fault and the remedy."""
+    content: dict[str, Any] = read_yaml(path, as_text=True)
+    publication = parse(Publication, content, path)
+    return publication.as_read("cut_off") if publication.rounding == "cut_off" else publication

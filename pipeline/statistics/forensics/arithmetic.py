@@ -1,0 +1,117 @@
+"""Printed reductions, totals, percentages and counts against the figures they are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import reduce
+from math import ceil, floor
+from operator import add
+
+from pipeline.publication import Measure, Parts, Publication, Reduction, Share, Total
+from pipeline.statistics.forensics.cells import described
+from pipeline.statistics.forensics.finding import Finding, Statement
+from pipeline.statistics.forensics.rounded import Interval, Rounded
+
+_FIGURES = {"mean": "mean", "median": "median", "sd": "SD", "rmse": "RMSE", "participants": "mean"}
+_ONE = Interval(Fraction(1), Fraction(1))
+
+
+def reduction_findings(measure: Measure) -> Iterator[Finding]:
+    """Each printed reduction against the two figures it compares."""
+    return (_reduction(measure, reduction) for reduction in measure.reductions)
+
+
+def _reduction(measure: Measure, reduction: Reduction) -> Finding:
+    figure = _FIGURES[reduction.of]
+    what = f"{measure.name}, {reduction.before} to {reduction.to}"
+    statement = Statement("reduction", what, f"{figure} reduced by {_percent(reduction.percent)}")
+    if reduction.of == "participants":
+        return statement.unchecked("a mean of the participants' own reductions does not follow from means")
+    before, after = (getattr(measure.cells[name], reduction.of) for name in (reduction.before, reduction.to))
+    if before is None or after is None:
+        return statement.unchecked(f"the {figure} of both conditions is needed")
+    if before.interval.low <= 0 <= before.interval.high:
+        return statement.unchecked(f"the first {figure}, {before.text}, may be zero")
+    possible = _reduced(before, after)
+    fits = possible.meets(reduction.percent.interval)
+    explanation = f"1 − {after.text}/{before.text}"
+    if not fits and not after.interval.low <= 0 <= after.interval.high:
+        other = (before.interval / after.interval - _ONE) * 100
+        explanation += f"; relative to the second, {reduction.percent.span(other.low, other.high)} %"
+    return statement.held(fits, f"{reduction.percent.span(possible.low, possible.high)} %", explanation)
+
+
+def _reduced(before: Rounded, after: Rounded) -> Interval:
+    """The reduction in percent of the first figure."""
+    return (_ONE - after.interval / before.interval) * 100
+
+
+def _percent(figure: Rounded) -> str:
+    return f"{figure.text.rstrip(' %')} %"
+
+
+def total_finding(publication: Publication, total: Total) -> Finding:
+    """A total against the means it is made of, each of them as far as the scale's steps allow it."""
+    statement = Statement("total", total.label, total.printed.text)
+    measures = publication.named(total.measures)
+    cells = [described(publication, measure, total.condition) for measure in measures]
+    parts: list[Interval] = []
+    grains: set[Fraction | None] = set()
+    for cell in cells:
+        if cell.cell.mean is None:
+            return statement.unchecked(f"{cell.what} has no mean")
+        if cell.n is None and total.sum is not None:
+            return statement.unchecked(f"{cell.what} has no n")
+        times = cell.n if cell.n is not None and total.sum is not None else 1
+        possible, grain = cell.cell.mean.interval, None
+        if cell.steps is not None and cell.n is not None:
+            totals = cell.steps.totals(possible, cell.n)
+            if not totals:
+                return statement.unchecked(f"{cell.what} has a mean that is not possible")
+            possible = Interval(cell.steps.mean(totals[0], cell.n), cell.steps.mean(totals[-1], cell.n))
+            grain = cell.steps.grain * Fraction(times, cell.n)
+        parts.append(possible * times)
+        grains.add(grain)
+    grain = grains.pop() if len(grains) == 1 else None
+    factor = Fraction(1, len(parts)) if total.average is not None else Fraction(1)
+    made = reduce(add, parts) * factor
+    fits = _meets(made, None if grain is None else grain * factor, total.printed.interval)
+    follows = total.printed.span(made.low, made.high)
+    does = "average" if total.average is not None else "add up to"
+    over = f" over {cells[0].n} participants" if total.sum is not None and len({cell.n for cell in cells}) == 1 else ""
+    return statement.held(fits, follows, f"the printed means of {len(parts)} measures {does} {follows}{over}")
+
+
+def _meets(possible: Interval, grain: Fraction | None, printed: Interval) -> bool:
+    """Does the printed total stand for a possible one? Where all scales have one step, these lie `grain` apart."""
+    if grain is None or not possible.meets(printed):
+        return possible.meets(printed)
+    low, high = max(possible.low, printed.low), min(possible.high, printed.high)
+    return ceil((low - possible.low) / grain) <= floor((high - possible.low) / grain)
+
+
+def share_finding(share: Share) -> Finding:
+    """A percentage of a number of things: of the printed count, or of any."""
+    percent = share.percent.interval
+    if share.count is not None:
+        statement = Statement("percentage", share.label, f"{share.count} of {share.of}, {_percent(share.percent)}")
+        exact = Fraction(100 * share.count, share.of)
+        fits = share.count <= share.of and percent.low <= exact <= percent.high
+        return statement.held(fits, f"{share.percent.like(exact)} %", f"{share.count} of {share.of}")
+    statement = Statement("percentage", share.label, f"{_percent(share.percent)} of {share.of}")
+    counts = range(max(0, ceil(percent.low * share.of / 100)), min(share.of, floor(percent.high * share.of / 100)) + 1)
+    if counts and percent.high - percent.low >= Fraction(100, share.of):
+        return statement.unchecked(f"of {share.of} every percentage with these digits is possible")
+    if counts:
+        return statement.held(True, f"{counts[0]} of {share.of}", "a whole number of them")
+    below = min(max(floor(share.percent.value * share.of / 100), 0), share.of - 1)
+    near = [share.percent.like(Fraction(100 * count, share.of)) for count in (below, below + 1)]
+    return statement.held(False, f"{near[0]} or {near[1]} %", f"{below} or {below + 1} of {share.of}")
+
+
+def count_finding(parts: Parts) -> Finding:
+    """Counts are exact."""
+    printed = f"{' + '.join(map(str, parts.parts))} = {parts.total}"
+    made = sum(parts.parts)
+    return Statement("count", parts.label, printed).held(made == parts.total, str(made), "the sum of the parts")

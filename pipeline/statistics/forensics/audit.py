@@ -1,0 +1,97 @@
+"""Every check that a file of printed figures allows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from pipeline.publication import Measure, PrintedTest, Publication
+from pipeline.statistics.forensics.arithmetic import count_finding, reduction_findings, share_finding, total_finding
+from pipeline.statistics.forensics.cells import cell_findings
+from pipeline.statistics.forensics.claims import claim_findings, family_findings
+from pipeline.statistics.forensics.finding import CONTRADICTION, Finding, Statement
+from pipeline.statistics.forensics.freedom import freedom_findings
+from pipeline.statistics.forensics.from_means import statistic_findings
+from pipeline.statistics.forensics.phrases import label, written_p
+from pipeline.statistics.forensics.recomputed import p_finding
+from pipeline.statistics.forensics.wilcoxon import wilcoxon_finding
+
+
+def audit(publication: Publication) -> list[Finding]:
+    """Findings in the file's order: measures, then totals, percentages, counts, claims and families.
+
+    A contradiction that would be none if figures were cut off instead of rounded says so.
+    """
+    found = list(_findings(publication))
+    if publication.rounding == "cut_off" or not any(finding.verdict == CONTRADICTION for finding in found):
+        return found
+    either = _findings(publication.as_read("either"))
+    still = {(f.check, f.what, f.printed) for f in either if f.verdict == CONTRADICTION}
+    return [
+        replace(f, explanation=f"{f.explanation}; no contradiction if figures are cut off, not rounded")
+        if f.verdict == CONTRADICTION and (f.check, f.what, f.printed) not in still
+        else f
+        for f in found
+    ]
+
+
+def _findings(publication: Publication) -> Iterator[Finding]:
+    for measure in publication.measures:
+        found = [*_of_measure(publication, measure)]
+        claimed = any(test.significant is not None for test in measure.tests)
+        yield from found
+        if not found and not claimed and not _is_in_a_total(publication, measure):
+            yield Statement("any", measure.name, "").unchecked("no two of its figures depend on each other")
+    yield from (total_finding(publication, total) for total in publication.totals)
+    yield from map(share_finding, publication.shares)
+    yield from map(count_finding, publication.counts)
+    yield from claim_findings(publication)
+    for family in publication.families:
+        yield from family_findings(publication, family)
+
+
+def _of_measure(publication: Publication, measure: Measure) -> Iterator[Finding]:
+    yield from cell_findings(publication, measure)
+    yield from reduction_findings(measure)
+    for test in measure.tests:
+        yield from _of_test(publication, measure, test)
+
+
+def _is_in_a_total(publication: Publication, measure: Measure) -> bool:
+    return any(measure in publication.named(total.measures) for total in publication.totals)
+
+
+def _of_test(publication: Publication, measure: Measure, test: PrintedTest) -> Iterator[Finding]:
+    yield from _out_of_range(measure, test)
+    checked = p_finding(publication, measure, test)
+    if checked is not None:
+        yield checked
+    yield from freedom_findings(publication, measure, test)
+    yield from statistic_findings(publication, measure, test)
+    if test.test == "wilcoxon":
+        ranked = wilcoxon_finding(publication, measure, test)
+        if ranked is not None:
+            yield ranked
+    if test.p is not None and test.p_adjusted is not None:
+        statement = Statement(
+            "adjusted p", label(measure, test), f"{written_p(test.p)}, adjusted {test.p_adjusted.text}"
+        )
+        fits = test.p_adjusted.interval.high >= test.p.interval.low
+        yield statement.held(fits, f"{test.p.text} or more", "adjusting makes no p smaller")
+
+
+def _out_of_range(measure: Measure, test: PrintedTest) -> Iterator[Finding]:
+    """Figures that no data can give, whatever the others are."""
+    bounded = [("p", test.p, 0, 1), ("adjusted p", test.p_adjusted, 0, 1), ("r", test.r, -1, 1)]
+    unbounded = [("F", test.F), ("χ²", test.chi2), ("W", test.W)]
+    for name, figure, low, high in [*bounded, *((name, figure, 0, None) for name, figure in unbounded)]:
+        if figure is None:
+            continue
+        statement = Statement("range", label(measure, test), f"{name} = {figure.text}")
+        if figure.interval.high < low:
+            yield statement.held(False, f"{low} or more", f"no {name} is less")
+        elif high is not None and figure.relation == "=" and figure.interval.low > high:
+            yield statement.held(False, f"{high} or less", f"no {name} is more")
+    for part in test.df:
+        if part.value <= 0:
+            yield Statement("range", label(measure, test), f"df = {part.text}").held(False, "more than 0", "they count")

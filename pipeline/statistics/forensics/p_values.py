@@ -1,0 +1,76 @@
+"""The p value that a printed statistic and its degrees of freedom leave open (statcheck: Nuijten et al. 2016)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.statistics.forensics.rounded import Interval
+
+Symbol = Literal["t", "F", "chi2", "z", "r"]
+Bounds = tuple[float, float]
+FloatArray = npt.NDArray[np.float64]
+
+DEGREES_OF_FREEDOM = {"t": 1, "F": 2, "chi2": 1, "z": 0, "r": 1}
+
+_PATH = 33  # points between the bounds of a degree of freedom that is itself rounded
+_SMALLEST_DF = 1e-3
+_ROUND_OFF = 1e-9  # relative: of the distributions' own arithmetic
+
+
+def p_two_sided(symbol: Symbol, statistic: float, df: Sequence[float | FloatArray]) -> FloatArray:
+    """p of both tails for t, z and Pearson's r (df = n − 2), of the upper tail for F and χ²; one for each df."""
+    from scipy import stats
+
+    if symbol == "F":
+        p = stats.f.sf(statistic, *df)
+    elif symbol == "chi2":
+        p = stats.chi2.sf(statistic, *df)
+    elif symbol == "z":
+        p = 2 * stats.norm.sf(abs(statistic))
+    elif symbol == "r":
+        with np.errstate(divide="ignore"):
+            size = np.divide(min(abs(statistic), 1.0), np.sqrt(1 - min(abs(statistic), 1.0) ** 2))
+        p = 2 * stats.t.sf(size * np.sqrt(df[0]), df[0])
+    else:
+        p = 2 * stats.t.sf(abs(statistic), df[0])
+    return np.asarray(p, dtype=np.float64)
+
+
+def p_bounds(symbol: Symbol, statistic: Interval, df: Sequence[Interval]) -> Bounds:
+    """The smallest and the largest p for a statistic and degrees of freedom within intervals."""
+    grid = np.meshgrid(*(_points(part) for part in df), indexing="ij")
+    return _bounds(symbol, statistic, grid)
+
+
+def p_bounds_corrected(statistic: Interval, df: Sequence[Interval], epsilon: Interval) -> Bounds:
+    """The same for F with both degrees of freedom times one ε, as corrections for sphericity have it."""
+    first, second, factor = np.meshgrid(*(_points(part) for part in (*df, epsilon)), indexing="ij")
+    return _bounds("F", statistic, [first * factor, second * factor])
+
+
+def _points(interval: Interval) -> FloatArray:
+    low, high = max(float(interval.low), _SMALLEST_DF), max(float(interval.high), _SMALLEST_DF)
+    return np.array([low]) if low == high else np.linspace(low, high, _PATH)
+
+
+def _bounds(symbol: Symbol, statistic: Interval, df: Sequence[FloatArray]) -> Bounds:
+    """p falls with the statistic's size, but need not be monotonic in the degrees of freedom of F.
+
+    So these are walked through, and the bounds widened by the walk's largest step: what lies between two points is
+    no further off than that.
+    """
+    size = statistic.at_least(0) if symbol in ("F", "chi2") else statistic.size()
+    smallest, largest = (p_two_sided(symbol, float(end), df) for end in (size.high, size.low))
+    steps = [np.abs(np.diff(p, axis=axis)) for p in (smallest, largest) for axis in range(p.ndim)]
+    room = max((float(step.max()) for step in steps if step.size), default=0.0)
+    low, high = float(smallest.min()) - room, float(largest.max()) + room
+    return max(0.0, low * (1 - _ROUND_OFF)), min(1.0, high * (1 + _ROUND_OFF))
+
+
+def meets(bounds: Bounds, printed: Interval) -> bool:
+    """Does a printed p lie in what was recomputed?"""
+    return bounds[0] <= float(printed.high) and float(printed.low) <= bounds[1]

@@ -1,0 +1,26 @@
+"""Printed tests as they are written."""
+
+from __future__ import annotations
+
+from pipeline.publication import Measure, PrintedTest
+from pipeline.statistics.forensics.p_values import Symbol
+from pipeline.statistics.forensics.rounded import Rounded
+from pipeline.wording import TESTS
+
+
+def label(measure: Measure, test: PrintedTest) -> str:
+    """A test by its measure, and what tells it from the measure's others."""
+    name = TESTS.get(test.test or "", (test.test or "").replace("_", " "))
+    named = ", ".join(part for part in (test.contrast, test.effect, name) if part)
+    return f"{measure.name}: {named}" if named else measure.name
+
+
+def written_p(p: Rounded) -> str:
+    """`p = 0.0508`, `p < .001`."""
+    return f"p = {p.text}" if p.relation == "=" else f"p {p.text}"
+
+
+def written(symbol: Symbol, statistic: Rounded, test: PrintedTest) -> str:
+    """`F(1, 11) = 10.86`."""
+    df = f"({', '.join(part.text for part in test.df)})" if test.df else ""
+    return f"{'χ²' if symbol == 'chi2' else symbol}{df} = {statistic.text}"
