@@ -173,21 +173,28 @@ def _move_wiener(
 
 
 @njit(cache=True)
+def whole_step(motion: Motion, dimension: int, size: int, dt: float, density: float) -> tuple[FloatArray, FloatArray]:
+    """Transition and process noise of all states of all axes over `dt` seconds, (size, size); constants stay."""
+    states = len(motion.stationary)
+    one, noise = np.empty((states, states)), np.empty((states, states))
+    step(motion, dt, density, one, noise)
+    transition, added = np.eye(size), np.zeros((size, size))
+    for axis in range(dimension):
+        for state in range(states):
+            for other in range(states):
+                transition[state * dimension + axis, other * dimension + axis] = one[state, other]
+                added[state * dimension + axis, other * dimension + axis] = noise[state, other]
+    return transition, added
+
+
+@njit(cache=True)
 def _move_anchored(
     motion: Motion, dimension: int, mean: FloatArray, covariance: FloatArray, row: int, dt: float, density: float
 ) -> None:
     """The same for a process that returns to a constant, by whole matrices."""
-    states, size = len(motion.stationary), mean.shape[1]
-    transition, noise = np.empty((states, states)), np.empty((states, states))
-    step(motion, dt, density, transition, noise)
-    whole, added = np.eye(size), np.zeros((size, size))
-    for axis in range(dimension):
-        for state in range(states):
-            for other in range(states):
-                whole[state * dimension + axis, other * dimension + axis] = transition[state, other]
-                added[state * dimension + axis, other * dimension + axis] = noise[state, other]
-    mean[row] = whole @ mean[row - 1]
-    covariance[row] = whole @ covariance[row - 1] @ whole.T + added
+    transition, noise = whole_step(motion, dimension, mean.shape[1], dt, density)
+    mean[row] = transition @ mean[row - 1]
+    covariance[row] = transition @ covariance[row - 1] @ transition.T + noise
 
 
 @njit(cache=True)

@@ -5,27 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fusion_core.event_steps import JERK_PSD, History, Model
-from fusion_core.motion import step
+from fusion_core.event_steps import JERK_PSD, History, Model, whole_step
 from fusion_core.samples import FloatArray
 
 
 @njit(cache=True)
-def whole_step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatArray]:
-    """Transition and process noise over `dt` seconds of all states of all axes, (size, size) each."""
-    states, dimension = len(model.states), len(model.axes)
-    size = states * dimension + len(model.constants)
-    one, noise = np.empty((states, states)), np.empty((states, states))
-    step(model.motion, dt, jerk_psd, one, noise)
-    transition, added = np.eye(size), np.zeros((size, size))
-    for axis in range(dimension):
-        for state in range(states):
-            for other in range(states):
-                transition[state * dimension + axis, other * dimension + axis] = one[state, other]
-                added[state * dimension + axis, other * dimension + axis] = noise[state, other]
+def _step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatArray]:
+    """Transition and process noise over `dt` seconds, (size, size); constants are slow random walks."""
+    dimension, moving = len(model.axes), len(model.states) * len(model.axes)
+    transition, noise = whole_step(model.motion, dimension, moving + len(model.constants), dt, jerk_psd)
     for constant in range(len(model.constants)):
-        added[states * dimension + constant, states * dimension + constant] = model.constant_psd[constant] * dt
-    return transition, added
+        noise[moving + constant, moving + constant] = model.constant_psd[constant] * dt
+    return transition, noise
 
 
 @njit(cache=True)
@@ -39,7 +30,7 @@ def step_back(
     later_covariance: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Filtered moments in view of smoothed moments `dt` seconds later."""
-    transition, noise = whole_step(model, dt, jerk_psd)
+    transition, noise = _step(model, dt, jerk_psd)
     expected = transition @ covariance @ transition.T + noise
     for state in range(len(mean)):
         expected[state, state] += 1e-12 * (1.0 + expected[state, state])  # a step of no length has no noise
@@ -55,7 +46,7 @@ def _at(
 ) -> tuple[FloatArray, FloatArray]:
     """Mean and SD of the position at `time`, between a row and the next, whose smoothed moments are given."""
     jerk_psd = history.adapted[row, JERK_PSD]
-    transition, noise = whole_step(model, time - history.time[row], jerk_psd)
+    transition, noise = _step(model, time - history.time[row], jerk_psd)
     mean = transition @ history.mean[row]
     covariance = transition @ history.covariance[row] @ transition.T + noise
     rest = history.time[row + 1] - time
