@@ -77,18 +77,20 @@ def _parents(module: str) -> list[str]:
     return [".".join(parts[:size]) for size in range(1, len(parts))]
 
 
-def _imports(path: Path) -> Iterator[str]:
+@cache
+def _imports(path: Path) -> tuple[str, ...]:
     """The modules a source imports, wherever it does, and those it names as text to import when needed."""
+    found: list[str] = []
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            found += (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            found = _MODULE_TEXT.match(node.value)
-            if found:
-                yield found.group()
+            named = _MODULE_TEXT.match(node.value)
+            if named:
+                found.append(named.group())
+    return tuple(found)
 
 
 def versions(libraries: Iterable[str]) -> dict[str, str]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fusion_core.samples import Samples
+if TYPE_CHECKING:
+    from fusion_core.samples import Samples
 
 _TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
 _POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
@@ -319,6 +320,8 @@ def samples(
     order = np.lexsort((time_ns, arrival_ns))
     time_ns, arrival_ns, value = time_ns[order], arrival_ns[order], value[order]
     kept = np.flatnonzero(~pd.DataFrame(value).assign(stamp=time_ns).duplicated())
+    from fusion_core.samples import Samples  # and with it the compiler, which most commands never need
+
     return Samples(
         (time_ns[kept] - origin_ns) * NANOSECONDS,
         (arrival_ns[kept] - origin_ns) * NANOSECONDS,

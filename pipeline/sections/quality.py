@@ -108,7 +108,7 @@ def _mounting_table(material: Material) -> Table:
 
     def three(row: Row, key: str, unit: str, digits: int) -> str:
         pairs = ((row[f"{key}_{a}_{unit}"], row[f"{key}_sd_{a}_{unit}"]) for a in "xyz")
-        return ", ".join(f"{number(value, digits)} ± {number(1.96 * sd, digits)}" for value, sd in pairs)
+        return ", ".join(f"{value:.{digits}f} ± {1.96 * sd:.{digits}f}" for value, sd in pairs).replace("-", "−")
 
     cells = tuple(
         (
