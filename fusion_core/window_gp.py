@@ -191,19 +191,37 @@ class WindowGP:
         mean, sd = np.empty(self._dimension), np.empty(self._dimension)
         origin = state.positions[-1].value if self.mean != "zero" else np.zeros(self._dimension)
         for axes in self._alike:
-            chosen = [(name, sample) for name, sample in readings if axes[0] in self._sees[name]]
+            chosen = readings
+            if self._partial:
+                chosen = [(name, sample) for name, sample in readings if axes[0] in self._sees[name]]
             names = tuple(name for name, _ in chosen)
             weights, variance = self._weights(names, np.array([sample.time for _, sample in chosen]), time)
             constant = np.array([self._constant[name] for name in names])
-            for axis in axes:
-                values = np.array([sample.value[self._sees[name].index(axis)] for name, sample in chosen])
-                mean[axis] = origin[axis] + weights @ (values - constant * origin[axis])
-                sd[axis] = np.sqrt(variance)
+            if len(axes) == self._dimension and not self._partial:
+                values = np.array([sample.value for _, sample in chosen])
+            else:
+                values = np.array([sample.value[self._place[name][axes]] for name, sample in chosen])
+            mean[axes] = origin[axes] + weights @ (values - constant[:, None] * origin[axes])
+            sd[axes] = np.sqrt(variance)
         return mean, sd
 
     @cached_property
     def _sees(self) -> dict[str, tuple[int, ...]]:
         return {name: sensor.sees(self._dimension) for name, sensor in self.sensors.items()}
+
+    @cached_property
+    def _partial(self) -> bool:
+        """Does a sensor name the axes it sees?"""
+        return any(sensor.axes is not None for sensor in self.sensors.values())
+
+    @cached_property
+    def _place(self) -> dict[str, IntArray]:
+        """Where each axis of the position stands among a sensor's own."""
+        found = {}
+        for name, axes in self._sees.items():
+            found[name] = np.zeros(self._dimension, np.int64)
+            found[name][list(axes)] = np.arange(len(axes))
+        return found
 
     @cached_property
     def _constant(self) -> dict[str, float]:

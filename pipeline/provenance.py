@@ -12,5 +12,6 @@ LIBRARIES = (
     "matplotlib",
     "jinja2",
     "typst",
+    "vqf",
 )
 """The libraries whose versions a report names, by import name."""
