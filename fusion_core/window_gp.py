@@ -309,7 +309,7 @@ class WindowGP:
         mean = np.full((len(times), self._dimension), np.nan)
         sd = np.full((len(times), self._dimension), np.nan)
         left = np.flatnonzero(spans[1] > 0)
-        if self._regular_names is not None and len(self._regular_names) == len(used):
+        if self._regular_names is not None:
             left = self._regular_windows(frames, others, times, spans, mean, sd)
         for rows, weights, variance, values, constant in self._windows(frames, others, names, times, spans, left):
             newest = frames.value[spans[1, rows] - 1]

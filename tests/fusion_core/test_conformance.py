@@ -67,6 +67,19 @@ def test_replay_is_one_update_a_sample_and_one_predict_a_time(name: str, kind: s
 
 
 @estimators
+@pytest.mark.parametrize("there", [(), ("tracker",), ("imu",), ("tracker", "imu")])
+@pytest.mark.parametrize("empty", [(), ("tracker",), ("imu",)])
+def test_streams_that_are_missing_or_empty_are_no_fault(
+    name: str, there: tuple[str, ...], empty: tuple[str, ...]
+) -> None:
+    nothing = Samples(np.empty(0), np.empty(0), np.empty((0, 3)))
+    samples = {sensor: recording(1)[sensor] for sensor in there} | dict.fromkeys(empty, nothing)
+    estimator = build(name)
+    for times in (TIMES, TIMES[::-1], np.empty(0)):
+        same(estimator.replay(samples, times), replay_loop(estimator, samples, times), 1e-8)
+
+
+@estimators
 @settings(deadline=None, max_examples=15)
 @given(cut=st.floats(0.1, 1.9), seed=st.integers(0, 5))
 def test_no_estimator_sees_the_future(name: str, cut: float, seed: int) -> None:
