@@ -8,7 +8,7 @@ import io
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -22,13 +22,13 @@ from pipeline.errors import SessionError
 from pipeline.formats.log import Content, IntArray
 from pipeline.formats.mcap.inflate import CHUNK_LIMIT, DAMAGED, check_stated_size, inflate
 from pipeline.formats.mcap.messages import Messages, joined, messages_at, record_starts
-from pipeline.formats.mcap.resume import Place, next_place
+from pipeline.formats.mcap.resume import next_place
 
 _Record = TypeVar("_Record", bound=McapRecord)
 
 MAGIC = b"\x89MCAP0\r\n"
 
-BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError)
+BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError, OverflowError)
 """What reading a damaged record raises."""
 
 _INFLATED_LIMIT = 64 * 2**20  # bytes a log may always inflate to; beyond it, so many times its own size
@@ -37,6 +37,8 @@ _RECORD_HEAD = struct.Struct("<BQ")
 _MESSAGES_LIMIT = 500_000  # a log may always hold; beyond it, one for so many bytes of its size
 _BYTES_PER_MESSAGE = 16
 _BLOCK = 2**20
+_FAULTS_LIMIT = 20
+_DEFINITION_LIMIT = 2**20  # bytes of a schema or channel
 
 
 @dataclass
@@ -68,11 +70,19 @@ class Walk:
     facts: dict[str, str] = field(default_factory=dict)
     stated: dict[int, int] | None = None
     faults: list[str] = field(default_factory=list)
+    noted: int = 0
     inflated: int = 0
     chunks: int = 0
     last_chunk_damaged: bool = False
     unknown_loss: bool = False
+    in_summary: bool = False
     complete: bool = False
+
+    def note(self, fault: str) -> None:
+        """Something is wrong with the file. Beyond so many faults they are only counted."""
+        self.noted += 1
+        if self.noted <= _FAULTS_LIMIT:
+            self.faults.append(fault)
 
 
 def walk_log(path: Path, wanted: Mapping[str, Content]) -> Walk:
@@ -87,6 +97,8 @@ def walk_log(path: Path, wanted: Mapping[str, Content]) -> Walk:
     with path.open("rb") as file:
         _walk_file(state, file, size)
     _adopt_orphans(state)
+    if state.noted > _FAULTS_LIMIT:
+        state.faults.append(f"and {state.noted - _FAULTS_LIMIT} further faults")
     if not any(topic.read for topic in state.topics.values()):
         raise SessionError("; ".join(["it holds no message that can be read", *state.faults]))
     return state
@@ -99,17 +111,19 @@ def _walk_file(walk: Walk, file: BinaryIO, size: int) -> None:
     if start != MAGIC:
         raise SessionError("not an MCAP file: it does not begin with the MCAP mark")
     checksum = zlib.crc32(start)
+    position = file.tell()
     while not walk.complete:
-        before = checksum
+        before, previous, position = checksum, position, file.tell()
         head = file.read(_RECORD_HEAD.size)
         if len(head) < _RECORD_HEAD.size:
             _take_loose(walk)
-            walk.faults.append("the log ends without its summary: it was cut off, or its recorder was stopped")
+            walk.note("the log ends without its summary: it was cut off, or its recorder was stopped")
             walk.unknown_loss = True
             return
         opcode, length = _RECORD_HEAD.unpack(head)
-        if opcode == 0 or length > size - file.tell():
-            if not _resumed(walk, file, opcode):
+        left = size - file.tell() - length
+        if opcode == 0 or left < 0 or (opcode == Opcode.FOOTER and left > len(MAGIC)):
+            if not _resumed(walk, file, opcode, previous):
                 return
             continue
         checksum = zlib.crc32(head, checksum)
@@ -124,20 +138,23 @@ def _walk_file(walk: Walk, file: BinaryIO, size: int) -> None:
         checksum = zlib.crc32(body, checksum)
         _take_record(walk, opcode, head, body)
     if file.read(len(MAGIC)) != MAGIC:
-        walk.faults.append("the log's last bytes are missing")
+        walk.note("the log's last bytes are missing")
 
 
-def _resumed(walk: Walk, file: BinaryIO, opcode: int) -> bool:
-    """Go on behind damage, where a chunk or the summary can be told from its bytes; False where there is none."""
+def _resumed(walk: Walk, file: BinaryIO, opcode: int, previous: int) -> bool:
+    """Go on behind damage, where a chunk or the summary can be told from its bytes; False where there is none.
+
+    The record before, at `previous`, may have led astray by a wrong length, so it is looked into.
+    """
     at = file.tell()
     _take_loose(walk)
     walk.unknown_loss = True
-    place: Place | None = next_place(file, at - _RECORD_HEAD.size + 1)
-    what = "a chunk of messages" if opcode == Opcode.CHUNK else "a record"
+    place = next_place(file, previous + 1)
     if place is None:
-        walk.faults.append(f"the log is cut off, or damaged, {at} bytes in: {what} is not all there")
+        what = "a chunk of messages" if opcode == Opcode.CHUNK else "a record"
+        walk.note(f"the log is cut off, or damaged, {at} bytes in: {what} is not all there")
         return False
-    walk.faults.append(f"the log is damaged {at} bytes in: reading goes on {place.position} bytes in, at {place.what}")
+    walk.note(f"the log is damaged about {at} bytes in: reading goes on {place.position} bytes in, at {place.what}")
     file.seek(place.position)
     return True
 
@@ -175,7 +192,7 @@ def _adopt_orphans(walk: Walk) -> None:
     _share_out(walk, orphans)
     nameless = sum(map(len, walk.orphans))
     if nameless:
-        walk.faults.append(f"{nameless} messages are left out: the log does not say what topic they belong to")
+        walk.note(f"{nameless} messages are left out: the log does not say what topic they belong to")
         walk.unknown_loss = True
 
 
@@ -187,7 +204,7 @@ def _parsed(kind: type[_Record], body: bytes) -> _Record:
 def _check_data_end(walk: Walk, body: bytes, checksum: int) -> None:
     stated = struct.unpack("<I", body[:4])[0] if len(body) >= 4 else 0
     if stated not in (0, checksum) and not walk.faults:
-        walk.faults.append("the log's checksum does not fit its bytes: something in it is damaged")
+        walk.note("the log's checksum does not fit its bytes: something in it is damaged")
 
 
 _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
@@ -201,6 +218,7 @@ def _take_record(walk: Walk, opcode: int, head: bytes, body: bytes) -> None:
             _take_loose(walk)
         return
     _take_loose(walk)
+    walk.in_summary = walk.in_summary or opcode == Opcode.DATA_END
     try:
         if opcode == Opcode.FOOTER:
             walk.complete = True
@@ -224,7 +242,7 @@ def _take_record(walk: Walk, opcode: int, head: bytes, body: bytes) -> None:
 
 def _note_broken(walk: Walk, opcode: int, error: BaseException) -> None:
     name = Opcode(opcode).name.lower().replace("_", " ")
-    walk.faults.append(f"a record ({name}) cannot be read: {str(error) or type(error).__name__}")
+    walk.note(f"a record ({name}) cannot be read: {str(error) or type(error).__name__}")
     walk.unknown_loss = True
 
 
@@ -252,7 +270,7 @@ def _take_records(walk: Walk, data: bytes) -> bool:
             _note_broken(walk, opcode, error)
     messages, too_short = messages_at(data, starts[kinds == int(Opcode.MESSAGE)])
     if too_short:
-        walk.faults.append(f"{too_short} messages are left out: they are too short to be any")
+        walk.note(f"{too_short} messages are left out: they are too short to be any")
         walk.unknown_loss = True
     _share_out(walk, messages)
     return whole
@@ -265,7 +283,8 @@ def _share_out(walk: Walk, messages: Messages) -> None:
         channel = walk.channels.get(channel_id)
         ids.setdefault(None if channel is None else channel.topic, []).append(channel_id)
     for topic, channels in ids.items():
-        which: IntArray = np.flatnonzero(np.isin(messages.channel, channels))
+        own = messages.channel == channels[0] if len(channels) == 1 else np.isin(messages.channel, channels)
+        which: IntArray = np.flatnonzero(own)
         if topic is None:
             walk.orphans.append(messages.chosen(which))
         else:
@@ -274,24 +293,27 @@ def _share_out(walk: Walk, messages: Messages) -> None:
 
 def _take_definition(walk: Walk, opcode: int, body: bytes) -> None:
     """A schema or a channel. The same may be said again; another of the same number may not."""
+    if len(body) > _DEFINITION_LIMIT:
+        raise ValueError(f"it is {len(body) // 1024} KiB long")
     if opcode == Opcode.CHANNEL:
-        named = _parsed(Channel, body)
+        named = replace(_parsed(Channel, body), metadata={})
         known = walk.channels.setdefault(named.id, named)
-        if (known.topic, known.schema_id, known.message_encoding) != (
-            named.topic,
-            named.schema_id,
-            named.message_encoding,
-        ):
-            raise SessionError(
-                f'channel {named.id} is defined twice, as "{known.topic}" and as "{named.topic}": which '
-                "messages belong to which cannot be told"
-            )
+        if known != named:
+            raise _contradiction(walk, "channel", named.id, known.topic, named.topic)
         walk.topics.setdefault(named.topic, Topic())
     else:
         schema = _parsed(Schema, body)
         before = walk.schemas.setdefault(schema.id, schema)
-        if (before.name, before.encoding, before.data) != (schema.name, schema.encoding, schema.data):
-            raise SessionError(f'schema {schema.id} is defined twice, as "{before.name}" and as "{schema.name}"')
+        if before != schema:
+            raise _contradiction(walk, "schema", schema.id, before.name, schema.name)
+
+
+def _contradiction(walk: Walk, what: str, number: int, first: str, second: str) -> Exception:
+    """Among the messages it ends the reading; in the summary, which only repeats, it is a damaged record."""
+    text = f'{what} {number} is defined twice, as "{first}" and as "{second}"'
+    if walk.in_summary:
+        return ValueError(text)
+    return SessionError(f"{text}: which messages belong to which cannot be told")
 
 
 def _take_chunk(walk: Walk, body: bytes) -> None:
@@ -305,7 +327,7 @@ def _take_chunk(walk: Walk, body: bytes) -> None:
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             raise ValueError("its checksum does not fit its bytes")
     except DAMAGED as error:
-        walk.faults.append(f"chunk {walk.chunks} is damaged and left out: {error}")
+        walk.note(f"chunk {walk.chunks} is damaged and left out: {error}")
         return
     walk.last_chunk_damaged = False
     if not _take_records(walk, data):

@@ -87,13 +87,15 @@ def record_starts(data: bytes, limit: int) -> tuple[list[int], bool]:
     """Where the records in `data` begin, at most `limit` + 1 of them, and whether the last ends where the data do."""
     starts: list[int] = []
     at, end = 0, len(data)
+    last = end - RECORD_HEAD_BYTES
     length_at = _LENGTH.unpack_from
-    while at + RECORD_HEAD_BYTES <= end and len(starts) <= limit:
-        begin = at
+    for _ in range(limit + 1):
+        if at > last:
+            break
+        starts.append(at)
         at += RECORD_HEAD_BYTES + length_at(data, at + 1)[0]
-        if at > end:
-            return starts, False
-        starts.append(begin)
+    if at > end:
+        starts.pop()
     return starts, at == end
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
+from pipeline.errors import SessionError
 from pipeline.formats.log import Content, FloatArray, IntArray, Readings
 from pipeline.formats.mcap import cdr
 from pipeline.formats.mcap.container import BROKEN, Walk
@@ -31,6 +32,8 @@ _UNFIT = "the bytes do not fit the schema"
 _TIME_LIMIT_NS = 2**62
 _NUMBER_LIMIT = 2**53
 _PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond it the bytes are something else
+_EVENT_LIMIT = 64 * 1024  # bytes of one event
+_EVENTS_LIMIT = 100_000
 _NOTES = 3  # reasons told apart; the rest are counted together
 
 Failures = dict[int, str]
@@ -194,6 +197,8 @@ def _kept(message: object, content: str) -> list[float]:
 
 
 def _events(walk: Walk, messages: Messages, failures: Failures) -> dict[int, Mapping[str, object]]:
+    if len(messages) > _EVENTS_LIMIT:
+        raise SessionError(f"refused: it holds {len(messages)} events, which no session does")
     events = {}
     for index in range(len(messages)):
         try:
@@ -204,17 +209,21 @@ def _events(walk: Walk, messages: Messages, failures: Failures) -> dict[int, Map
 
 
 def _event(channel: Channel, payload: bytes) -> Mapping[str, object]:
+    """What is used of an event: type, trial, and the target and selected position in metres."""
     if channel.message_encoding != "json":
         raise ValueError(f'its encoding is "{channel.message_encoding}", not json')
+    if len(payload) > _EVENT_LIMIT:
+        raise ValueError(f"it is longer than {_EVENT_LIMIT // 1024} KiB, which no event is")
     event = json.loads(payload)
     if not isinstance(event, dict) or event.get("type") not in EVENT_TYPES:
         raise ValueError(f"it is no event: `type` must be one of {', '.join(EVENT_TYPES)}")
     trial = event.get("trial")
     if trial is not None and not (isinstance(trial, int) and abs(trial) < _NUMBER_LIMIT):
         raise ValueError("its trial is not a whole number")
+    found = {"type": event["type"], "trial": trial}
     for key in ("target_x", "target_y", "target_z", "x", "y", "z"):
         if event.get(key) is not None:
-            event[key] = float(event[key])
-            if np.isfinite(event[key]) and abs(event[key]) > _PLAUSIBLE["position"]:
+            found[key] = float(event[key])
+            if np.isfinite(found[key]) and abs(found[key]) > _PLAUSIBLE["position"]:
                 raise ValueError(f"{_UNFIT}: a figure is out of all range")
-    return event
+    return found

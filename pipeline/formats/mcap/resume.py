@@ -14,6 +14,7 @@ _LENGTH = struct.Struct("<Q")
 _RECORD_HEAD_BYTES = 9
 _FOOTER = struct.Struct("<BQQQI")
 _MAGIC_BYTES = 8
+_FIRST_BLOCK = 2**12
 _BLOCK = 2**20
 
 
@@ -44,15 +45,17 @@ def next_place(file: BinaryIO, begin: int) -> Place | None:
 def _next_chunk(file: BinaryIO, begin: int, end: int) -> int | None:
     """A chunk states its length twice, around the name of its compression: where both agree, it is one."""
     longest = _CHUNK.size + max(map(len, _COMPRESSIONS)) + _LENGTH.size
+    size = _FIRST_BLOCK
     while begin < end:
         file.seek(begin)
-        block = file.read(_BLOCK + longest)
-        at = block.find(Opcode.CHUNK, 0, _BLOCK)
+        block = file.read(size + longest)
+        at = block.find(Opcode.CHUNK, 0, size)
         while at >= 0:
             if _is_chunk(block[at : at + longest], end - begin - at):
                 return begin + at
-            at = block.find(Opcode.CHUNK, at + 1, _BLOCK)
-        begin += _BLOCK
+            at = block.find(Opcode.CHUNK, at + 1, size)
+        begin += size
+        size = min(2 * size, _BLOCK)
     return None
 
 
