@@ -8,43 +8,50 @@ import io
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-import lz4.frame
-import zstandard
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, MessageIndex, Metadata, Schema, Statistics
 
 from pipeline.errors import SessionError
-from pipeline.formats.log import Content
+from pipeline.formats.log import Content, IntArray
+from pipeline.formats.mcap.inflate import CHUNK_LIMIT, DAMAGED, check_stated_size, inflate
+from pipeline.formats.mcap.messages import Messages, joined, messages_at, record_starts
+from pipeline.formats.mcap.resume import next_place
 
 _Record = TypeVar("_Record", bound=McapRecord)
 
 MAGIC = b"\x89MCAP0\r\n"
 
-BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError)
+BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError, OverflowError)
 """What reading a damaged record raises."""
 
 _INFLATED_LIMIT = 64 * 2**20  # bytes a log may always inflate to; beyond it, so many times its own size
 _INFLATION_LIMIT = 64
-_CHUNK_LIMIT = 128 * 2**20
 _RECORD_HEAD = struct.Struct("<BQ")
-_MESSAGE_HEAD = struct.Struct("<HIQQ")
 _MESSAGES_LIMIT = 500_000  # a log may always hold; beyond it, one for so many bytes of its size
 _BYTES_PER_MESSAGE = 16
 _BLOCK = 2**20
+_FAULTS_LIMIT = 20
+_DEFINITION_LIMIT = 2**20  # bytes of a schema or channel
 
 
 @dataclass
 class Topic:
     """What is gathered of one topic while the file is walked."""
 
-    messages: list[tuple[int, int, int, bytes]] = field(default_factory=list)  # log, publish time, channel, payload
+    parts: list[Messages] = field(default_factory=list)
     in_damaged_chunks: int = 0
+
+    @property
+    def read(self) -> int:
+        """How many of its messages are there."""
+        return sum(map(len, self.parts))
 
 
 @dataclass
@@ -58,15 +65,24 @@ class Walk:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     topics: dict[str, Topic] = field(default_factory=dict)
-    orphans: list[tuple[int, int, int, bytes]] = field(default_factory=list)  # their channel is named later, or never
+    orphans: list[Messages] = field(default_factory=list)  # their channel is named later, or never
+    loose: bytearray = field(default_factory=bytearray)  # records outside of any chunk, not looked at yet
     facts: dict[str, str] = field(default_factory=dict)
     stated: dict[int, int] | None = None
     faults: list[str] = field(default_factory=list)
+    noted: int = 0
     inflated: int = 0
     chunks: int = 0
     last_chunk_damaged: bool = False
     unknown_loss: bool = False
+    in_summary: bool = False
     complete: bool = False
+
+    def note(self, fault: str) -> None:
+        """Something is wrong with the file. Beyond so many faults they are only counted."""
+        self.noted += 1
+        if self.noted <= _FAULTS_LIMIT:
+            self.faults.append(fault)
 
 
 def walk_log(path: Path, wanted: Mapping[str, Content]) -> Walk:
@@ -81,7 +97,9 @@ def walk_log(path: Path, wanted: Mapping[str, Content]) -> Walk:
     with path.open("rb") as file:
         _walk_file(state, file, size)
     _adopt_orphans(state)
-    if not any(topic.messages for topic in state.topics.values()):
+    if state.noted > _FAULTS_LIMIT:
+        state.faults.append(f"and {state.noted - _FAULTS_LIMIT} further faults")
+    if not any(topic.read for topic in state.topics.values()):
         raise SessionError("; ".join(["it holds no message that can be read", *state.faults]))
     return state
 
@@ -93,19 +111,21 @@ def _walk_file(walk: Walk, file: BinaryIO, size: int) -> None:
     if start != MAGIC:
         raise SessionError("not an MCAP file: it does not begin with the MCAP mark")
     checksum = zlib.crc32(start)
+    position = file.tell()
     while not walk.complete:
-        before = checksum
+        before, previous, position = checksum, position, file.tell()
         head = file.read(_RECORD_HEAD.size)
         if len(head) < _RECORD_HEAD.size:
-            walk.faults.append("the log ends without its summary: it was cut off, or its recorder was stopped")
+            _take_loose(walk)
+            walk.note("the log ends without its summary: it was cut off, or its recorder was stopped")
             walk.unknown_loss = True
             return
         opcode, length = _RECORD_HEAD.unpack(head)
-        if length > size - file.tell():
-            what = "a chunk of messages" if opcode == Opcode.CHUNK else "a record"
-            walk.faults.append(f"the log is cut off, or damaged, {file.tell()} bytes in: {what} is not all there")
-            walk.unknown_loss = True
-            return
+        left = size - file.tell() - length
+        if opcode == 0 or left < 0 or (opcode == Opcode.FOOTER and left > len(MAGIC)):
+            if not _resumed(walk, file, opcode, previous):
+                return
+            continue
         checksum = zlib.crc32(head, checksum)
         if opcode not in _USED:
             checksum = _passed_over(file, length, checksum)
@@ -116,9 +136,27 @@ def _walk_file(walk: Walk, file: BinaryIO, size: int) -> None:
         if opcode == Opcode.DATA_END:
             _check_data_end(walk, body, before)
         checksum = zlib.crc32(body, checksum)
-        _take_record(walk, opcode, body)
+        _take_record(walk, opcode, head, body)
     if file.read(len(MAGIC)) != MAGIC:
-        walk.faults.append("the log's last bytes are missing")
+        walk.note("the log's last bytes are missing")
+
+
+def _resumed(walk: Walk, file: BinaryIO, opcode: int, previous: int) -> bool:
+    """Go on behind damage, where a chunk or the summary can be told from its bytes; False where there is none.
+
+    The record before, at `previous`, may have led astray by a wrong length, so it is looked into.
+    """
+    at = file.tell()
+    _take_loose(walk)
+    walk.unknown_loss = True
+    place = next_place(file, previous + 1)
+    if place is None:
+        what = "a chunk of messages" if opcode == Opcode.CHUNK else "a record"
+        walk.note(f"the log is cut off, or damaged, {at} bytes in: {what} is not all there")
+        return False
+    walk.note(f"the log is damaged about {at} bytes in: reading goes on {place.position} bytes in, at {place.what}")
+    file.seek(place.position)
+    return True
 
 
 _USED = frozenset(
@@ -149,13 +187,12 @@ def _passed_over(file: BinaryIO, length: int, checksum: int) -> int:
 
 def _adopt_orphans(walk: Walk) -> None:
     """A damaged chunk may have held a channel's name; the log's summary names it again."""
-    for message in walk.orphans:
-        channel = walk.channels.get(message[2])
-        if channel is not None:
-            walk.topics[channel.topic].messages.append(message)
-    nameless = sum(message[2] not in walk.channels for message in walk.orphans)
+    orphans = joined(walk.orphans)
+    walk.orphans.clear()
+    _share_out(walk, orphans)
+    nameless = sum(map(len, walk.orphans))
     if nameless:
-        walk.faults.append(f"{nameless} messages are left out: the log does not say what topic they belong to")
+        walk.note(f"{nameless} messages are left out: the log does not say what topic they belong to")
         walk.unknown_loss = True
 
 
@@ -167,11 +204,21 @@ def _parsed(kind: type[_Record], body: bytes) -> _Record:
 def _check_data_end(walk: Walk, body: bytes, checksum: int) -> None:
     stated = struct.unpack("<I", body[:4])[0] if len(body) >= 4 else 0
     if stated not in (0, checksum) and not walk.faults:
-        walk.faults.append("the log's checksum does not fit its bytes: something in it is damaged")
+        walk.note("the log's checksum does not fit its bytes: something in it is damaged")
 
 
-def _take_record(walk: Walk, opcode: int, body: bytes) -> None:
-    """One record of the file itself; anything unknown or of no use here is passed over."""
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+
+
+def _take_record(walk: Walk, opcode: int, head: bytes, body: bytes) -> None:
+    """One record of the file itself. Those that might be in a chunk are gathered, and taken as one."""
+    if opcode in _IN_CHUNKS:
+        walk.loose += head + body
+        if len(walk.loose) > _BLOCK:
+            _take_loose(walk)
+        return
+    _take_loose(walk)
+    walk.in_summary = walk.in_summary or opcode == Opcode.DATA_END
     try:
         if opcode == Opcode.FOOTER:
             walk.complete = True
@@ -189,93 +236,110 @@ def _take_record(walk: Walk, opcode: int, body: bytes) -> None:
         elif opcode == Opcode.STATISTICS:
             statistics = _parsed(Statistics, body)
             walk.stated = dict(statistics.channel_message_counts)
-        else:
-            _take_message_record(walk, opcode, body)
     except BROKEN as error:
-        name = Opcode(opcode).name.lower().replace("_", " ") if opcode in set(Opcode) else f"kind {opcode}"
-        walk.faults.append(f"a record ({name}) cannot be read: {str(error) or type(error).__name__}")
+        _note_broken(walk, opcode, error)
+
+
+def _note_broken(walk: Walk, opcode: int, error: BaseException) -> None:
+    name = Opcode(opcode).name.lower().replace("_", " ")
+    walk.note(f"a record ({name}) cannot be read: {str(error) or type(error).__name__}")
+    walk.unknown_loss = True
+
+
+def _take_loose(walk: Walk) -> None:
+    if walk.loose:
+        data = bytes(walk.loose)
+        walk.loose.clear()
+        _take_records(walk, data)
+
+
+def _take_records(walk: Walk, data: bytes) -> bool:
+    """The schemas, channels and messages of a chunk, or outside of any; False where they end in mid-record."""
+    found, whole = record_starts(data, walk.messages_limit - walk.messages)
+    walk.messages += len(found)
+    if walk.messages > walk.messages_limit:
+        raise SessionError(f"refused: it holds more than {walk.messages_limit} messages, too many for its size")
+    starts = np.array(found, dtype=np.int64)
+    kinds = np.frombuffer(data, np.uint8)[starts]
+    for start in starts[(kinds == int(Opcode.SCHEMA)) | (kinds == int(Opcode.CHANNEL))].tolist():
+        opcode, length = _RECORD_HEAD.unpack_from(data, start)
+        begin = start + _RECORD_HEAD.size
+        try:
+            _take_definition(walk, opcode, data[begin : begin + length])
+        except BROKEN as error:
+            _note_broken(walk, opcode, error)
+    messages, too_short = messages_at(data, starts[kinds == int(Opcode.MESSAGE)])
+    if too_short:
+        walk.note(f"{too_short} messages are left out: they are too short to be any")
         walk.unknown_loss = True
+    _share_out(walk, messages)
+    return whole
 
 
-def _take_message_record(walk: Walk, opcode: int, body: bytes) -> None:
-    """A schema, channel or message, inside a chunk or outside."""
-    if opcode == Opcode.MESSAGE:
-        channel_id, _, log_time, publish_time = _MESSAGE_HEAD.unpack_from(body)
+def _share_out(walk: Walk, messages: Messages) -> None:
+    """Each message to its topic, in the order of the file; the bytes of the wanted topics only are kept."""
+    ids: dict[str | None, list[int]] = {}
+    for channel_id in np.unique(messages.channel).tolist():
         channel = walk.channels.get(channel_id)
-        walk.messages += 1
-        if walk.messages > walk.messages_limit:
-            raise SessionError(f"refused: it holds more than {walk.messages_limit} messages, too many for its size")
-        payload = body[_MESSAGE_HEAD.size :]
-        if channel is None:
-            walk.orphans.append((log_time, publish_time, channel_id, payload))
+        ids.setdefault(None if channel is None else channel.topic, []).append(channel_id)
+    for topic, channels in ids.items():
+        own = messages.channel == channels[0] if len(channels) == 1 else np.isin(messages.channel, channels)
+        which: IntArray = np.flatnonzero(own)
+        if topic is None:
+            walk.orphans.append(messages.chosen(which))
         else:
-            kept = payload if channel.topic in walk.wanted else b""
-            walk.topics[channel.topic].messages.append((log_time, publish_time, channel_id, kept))
-    elif opcode == Opcode.CHANNEL:
-        named = _parsed(Channel, body)
+            walk.topics[topic].parts.append(messages.chosen(which, topic in walk.wanted))
+
+
+def _take_definition(walk: Walk, opcode: int, body: bytes) -> None:
+    """A schema or a channel. The same may be said again; another of the same number may not."""
+    if len(body) > _DEFINITION_LIMIT:
+        raise ValueError(f"it is {len(body) // 1024} KiB long")
+    if opcode == Opcode.CHANNEL:
+        named = replace(_parsed(Channel, body), metadata={})
         known = walk.channels.setdefault(named.id, named)
-        if (known.topic, known.schema_id, known.message_encoding) != (
-            named.topic,
-            named.schema_id,
-            named.message_encoding,
-        ):
-            raise SessionError(
-                f'channel {named.id} is defined twice, as "{known.topic}" and as "{named.topic}": which '
-                "messages belong to which cannot be told"
-            )
+        if known != named:
+            raise _contradiction(walk, "channel", named.id, known.topic, named.topic)
         walk.topics.setdefault(named.topic, Topic())
-    elif opcode == Opcode.SCHEMA:
+    else:
         schema = _parsed(Schema, body)
         before = walk.schemas.setdefault(schema.id, schema)
-        if (before.name, before.encoding, before.data) != (schema.name, schema.encoding, schema.data):
-            raise SessionError(f'schema {schema.id} is defined twice, as "{before.name}" and as "{schema.name}"')
+        if before != schema:
+            raise _contradiction(walk, "schema", schema.id, before.name, schema.name)
+
+
+def _contradiction(walk: Walk, what: str, number: int, first: str, second: str) -> Exception:
+    """Among the messages it ends the reading; in the summary, which only repeats, it is a damaged record."""
+    text = f'{what} {number} is defined twice, as "{first}" and as "{second}"'
+    if walk.in_summary:
+        return ValueError(text)
+    return SessionError(f"{text}: which messages belong to which cannot be told")
 
 
 def _take_chunk(walk: Walk, body: bytes) -> None:
     walk.chunks += 1
-    walk.last_chunk_damaged = False
+    walk.last_chunk_damaged = True
     chunk = _parsed(Chunk, body)
     try:
-        data = _inflate(walk, chunk)
+        check_stated_size(chunk)
+        _allow(walk, chunk.uncompressed_size)
+        data = inflate(chunk)
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             raise ValueError("its checksum does not fit its bytes")
-    except (ValueError, zstandard.ZstdError, RuntimeError, EOFError) as error:
-        walk.last_chunk_damaged = True
-        walk.faults.append(f"chunk {walk.chunks} is damaged and left out: {error}")
+    except DAMAGED as error:
+        walk.note(f"chunk {walk.chunks} is damaged and left out: {error}")
         return
-    position = 0
-    while position < len(data):
-        if position + _RECORD_HEAD.size > len(data):
-            raise ValueError(f"chunk {walk.chunks} ends in mid-record")
-        opcode, length = _RECORD_HEAD.unpack_from(data, position)
-        position += _RECORD_HEAD.size
-        if position + length > len(data):
-            raise ValueError(f"chunk {walk.chunks} ends in mid-record")
-        _take_message_record(walk, opcode, data[position : position + length])
-        position += length
+    walk.last_chunk_damaged = False
+    if not _take_records(walk, data):
+        raise ValueError(f"chunk {walk.chunks} ends in mid-record")
 
 
-def _inflate(walk: Walk, chunk: Chunk) -> bytes:
-    """The chunk's bytes, never more than it states nor more than a log may hold."""
-    stated = chunk.uncompressed_size
+def _allow(walk: Walk, stated: int) -> None:
+    """SessionError if so many bytes more would be a bomb."""
     walk.inflated += stated
     if walk.inflated > walk.inflated_limit:
         raise SessionError(
             f"refused: it would inflate to more than {walk.inflated_limit // 2**20} MiB, which no session's log does"
         )
-    if stated > _CHUNK_LIMIT:
+    if stated > CHUNK_LIMIT:
         raise SessionError(f"refused: a chunk that inflates to {stated // 2**20} MiB, which no recorder writes")
-    if chunk.compression == "":
-        data = bytes(chunk.data)
-    elif chunk.compression == "zstd":
-        reader = zstandard.ZstdDecompressor().stream_reader(chunk.data)
-        data = reader.read(stated + 1)
-    elif chunk.compression == "lz4":
-        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=stated + 1)
-    else:
-        raise ValueError(f'its compression "{chunk.compression}" is not one of zstd, lz4')
-    if len(data) > stated:
-        raise SessionError(f"refused: a chunk that states {stated} bytes inflates to more")
-    if len(data) < stated:
-        raise ValueError(f"it states {stated} bytes and holds {len(data)}")
-    return data

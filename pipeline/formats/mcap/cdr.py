@@ -1,0 +1,111 @@
+"""Positions and accelerations in CDR, many messages at once.
+
+A message is an encapsulation header (4 bytes), a stamp (int32 s, uint32 ns), the frame's name with its length, padding
+to 8 bytes, and float64 to the end. So messages that are equally long have every field at the same place, whatever
+their frame is called. (OMG DDS-XTypes 1.3, 7.4: plain CDR; alignment counts from behind the header.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.formats.log import FloatArray, IntArray
+
+Bytes = npt.NDArray[np.uint8]
+
+NUMBERS: Mapping[str, int] = {"position": 3, "acceleration": 37}
+"""How many float64 a message holds."""
+
+COLUMNS: Mapping[str, tuple[int, ...]] = {
+    "position": (0, 1, 2),
+    "acceleration": (25, 26, 27, 13, 14, 15, 0, 1, 2, 3, 4),
+}
+"""Which of them are kept: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""
+
+_HEADER = 4
+_NAME = 16  # where the frame's name begins, its length before it
+_EMPTY_NAME_BYTES = 20
+
+
+@dataclass(frozen=True)
+class Fields:
+    """What n messages hold: stamps (n,), the kept float64 (n, w), and which of the messages fit the layout (n,)."""
+
+    seconds: IntArray
+    nanoseconds: IntArray
+    values: FloatArray
+    fits: npt.NDArray[np.bool_]
+
+
+def fields(rows: Bytes, content: str) -> Fields:
+    """The fields of equally long messages, shape (n, length); of those that do not fit nothing is to be believed."""
+    count, length = rows.shape
+    body = length - (length - _HEADER) % 8 - 8 * NUMBERS[content]
+    result = Fields(
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros((count, len(COLUMNS[content]))),
+        np.zeros(count, bool),
+    )
+    if body < _EMPTY_NAME_BYTES:
+        return result
+    for flag, order in ((0, ">"), (1, "<")):
+        which = np.flatnonzero((rows[:, 0] == 0) & (rows[:, 1] == flag))
+        if not len(which):
+            continue
+        part = rows if len(which) == count else rows[which]
+        view = part.view(_layout(order, length, body, content))[:, 0]
+        result.seconds[which] = view["seconds"]
+        result.nanoseconds[which] = view["nanoseconds"]
+        result.values[which] = view["numbers"][:, COLUMNS[content]]
+        name_bytes = view["name_bytes"].astype(np.int64)
+        padded = _HEADER + -(-(_NAME - _HEADER + name_bytes) // 8) * 8
+        result.fits[which] = (padded == body) & _are_text(part[:, _NAME:body], name_bytes)
+    return result
+
+
+def _layout(order: str, length: int, body: int, content: str) -> np.dtype[np.void]:
+    return np.dtype(
+        {
+            "names": ["seconds", "nanoseconds", "name_bytes", "numbers"],
+            "formats": [f"{order}i4", f"{order}u4", f"{order}u4", (f"{order}f8", (NUMBERS[content],))],
+            "offsets": [4, 8, 12, body],
+            "itemsize": length,
+        }
+    )
+
+
+def _are_text(names: Bytes, name_bytes: IntArray) -> npt.NDArray[np.bool_]:
+    """Which names are UTF-8, by trying each different one; they are mostly all the same."""
+    if (names == names[0]).all() and (name_bytes == name_bytes[0]).all():
+        return np.full(len(names), _is_text(names[0].tobytes(), int(name_bytes[0])))
+    each = [(name.tobytes(), int(size)) for name, size in zip(names, name_bytes, strict=True)]
+    text = {key: _is_text(*key) for key in set(each)}
+    return np.array([text[key] for key in each])
+
+
+def _is_text(name: bytes, size: int) -> bool:
+    try:
+        name[: max(size - 1, 0)].decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def laid_out_alike(row: Bytes, content: str, stock: Callable[[bytes], tuple[int, int, list[float]]]) -> bool:
+    """Whether the stock decoder finds the fields of such a message where they are looked for here.
+
+    It follows the log's own schema. It is given the message with other figures in it, each different and the stamp
+    before 1970, so that none can be taken for another.
+    """
+    probe = row.copy()[np.newaxis]
+    body = len(row) - (len(row) - _HEADER) % 8 - 8 * NUMBERS[content]
+    view = probe.view(_layout("<" if row[1] else ">", len(row), body, content))[0]
+    view["seconds"], view["nanoseconds"], view["numbers"] = -2, 3, 0.5 + np.arange(NUMBERS[content])
+    ours = fields(probe, content)
+    expected = (int(ours.seconds[0]), int(ours.nanoseconds[0]), ours.values[0].tolist())
+    return bool(ours.fits[0]) and stock(probe.tobytes()) == expected
