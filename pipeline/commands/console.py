@@ -17,6 +17,7 @@ _LABELS = {
     "measure": "measuring",
     "compare": "comparing",
     "report": "writing the report",
+    "replay": "replaying",
     "simulate": "simulating",
 }
 

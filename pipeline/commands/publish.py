@@ -24,7 +24,7 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     files.pop("entry.json")
     files["results.json"] = result.entry("compare") / "results.json"
-    _refuse_inputs(result, folder, files)
+    refuse_inputs(result, folder, files)
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
     for name, source in files.items():
@@ -48,7 +48,7 @@ def refuse_study(folder: Path) -> None:
         raise PipelineError(f"--out {folder}: is a study, and its files are not changed; name a folder for the report")
 
 
-def _refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
+def refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
     """Nor over the files it was made from."""
     inputs = {(result.folder / name).resolve() for name in result.inputs}
     for name in files:
@@ -58,7 +58,7 @@ def _refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
 
 def publish_results(result: Result, folder: Path) -> None:
     """results.json alone."""
-    _refuse_inputs(result, folder, ["results.json"])
+    refuse_inputs(result, folder, ["results.json"])
     _copy(result.entry("compare") / "results.json", folder / "results.json")
 
 
