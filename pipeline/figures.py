@@ -395,14 +395,25 @@ def trade_off(means: pd.DataFrame) -> Figure:
             own = rows["variant"].isna().to_numpy(bool)
             ring: dict[str, Any] = {"s": 110, "facecolors": "none", "edgecolors": COLOURS[6], "linewidths": 0.9}
             panel.scatter(errors_mm[0][own], values[0][own], **ring)
-            for x, y, rank in zip(errors_mm[0], values[0], rows["rank"], strict=True):
-                panel.annotate(str(rank), (x, y), (6, 5), textcoords="offset points", fontsize=8)
         panel.axhline(0, color=_GREY, linewidth=0.8)
         panel.set_ylabel(label)
         _along_rmse(panel, means["rmse_mm"])
+        _ranks(panel, means, scale * means[f"{stem}{unit}"])
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=4)
     return figure
+
+
+def _ranks(axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
+    """Each mark's rank beside it; marks that lie on one another share a label."""
+    known = means[values.notna()].assign(value=values)
+    at: dict[tuple[int, int], list[Any]] = {}
+    for row in known.itertuples():
+        x, y = axes.transData.transform((row.rmse_mm, row.value))
+        at.setdefault((round(x / 8), round(y / 8)), []).append(row)
+    for rows in at.values():
+        label = ", ".join(str(row.rank) for row in rows)
+        axes.annotate(label, (rows[0].rmse_mm, rows[0].value), (6, 5), textcoords="offset points", fontsize=8)
 
 
 def _arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

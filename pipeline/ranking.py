@@ -10,7 +10,13 @@ import pandas as pd
 from pipeline.statistics.descriptive import described
 
 Row = dict[str, Any]
-_FIGURES = ("rmse_mm", "sd_mm", "coverage_95", "lag_s", "jitter_mm")
+_POSSIBLE = {
+    "rmse_mm": (0.0, np.inf),
+    "sd_mm": (0.0, np.inf),
+    "coverage_95": (0.0, 1.0),
+    "lag_s": (-np.inf, np.inf),
+    "jitter_mm": (0.0, np.inf),
+}
 
 
 def ranked(accuracy: pd.DataFrame, trials: pd.DataFrame) -> list[Row]:
@@ -49,15 +55,17 @@ def _ranked(study: str | None, accuracy: pd.DataFrame, trials: pd.DataFrame) -> 
 
 
 def _means(rows: pd.DataFrame) -> Row:
-    """Each figure's mean over the sessions that have it, with its t interval."""
+    """Each figure's mean over the sessions that have it, with its t interval, cut off at what values are possible."""
     found: Row = {"n": len(rows)}
-    for name in _FIGURES:
+    for name, possible in _POSSIBLE.items():
         values = rows[name].dropna().to_numpy(np.float64)
         if len(values):
             stem, _, unit = name.rpartition("_")
             summary = described(values)
             found[name] = summary["mean"]
-            found |= {f"{stem}_{end}_{unit}": summary.get(f"ci_{end}") for end in ("low", "high")}
+            if "ci_low" in summary:
+                found[f"{stem}_low_{unit}"] = max(summary["ci_low"], possible[0])
+                found[f"{stem}_high_{unit}"] = min(summary["ci_high"], possible[1])
     return found
 
 

@@ -30,22 +30,19 @@ from pipeline.wording import NOTHING, counted, interval, number, percent, second
 Row = Mapping[str, Any]
 _ROWS_MAX = 120
 _TITLES = (
-    "Rank",
     "Estimator",
+    "Rank",
     "Sessions",
     "RMSE (mm)",
-    "95 % interval",
-    "In 95 % interval",
     "Lag (ms)",
-    "95 % interval",
     "Jitter (mm)",
-    "95 % interval",
+    "In 95 % interval",
 )
-_AT_SELECTION = ("At the selections, RMSE (mm)", "95 % interval")
+_AT_SELECTION = ("At the selections, RMSE (mm)",)
 _NOTE = (
-    "Means over sessions, with 95 % t intervals over sessions. RMSE: root mean square distance to the reference. In"
-    " 95 % interval: share of instants and axes where the reference is within 1.96 stated SDs. Lag: positive = late."
-    " Jitter: SD while the hand is slower than 20 mm/s."
+    "Means over sessions; in brackets 95 % t intervals over sessions, cut off where values end. RMSE: root mean square"
+    " distance to the reference. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In 95 %"
+    " interval: share of instants and axes where the reference is within 1.96 stated SDs."
 )
 _NOTE_SELECTION = (
     " At the selections: root of the mean over sessions of the mean squared distance to the target that the estimator"
@@ -66,7 +63,7 @@ def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: P
 
 
 def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Iterator[Block]:
-    means = found["replay_means"]
+    every = tables.records("replay_means", found["replay_means"])
     yield Paragraph(
         (
             "Every variant was run over the same raw streams and asked, at the arrival of each acceleration, where the"
@@ -77,8 +74,7 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
     if (found["accuracy"]["reference"] == SMOOTHED).any():
         yield Paragraph((Strong("No reference was recorded in some study."), SMOOTHED_REMARK))
     for index, study in enumerate([None, *(study["name"] for study in studies)]):
-        of_study = means["study"].isna() if study is None else means["study"] == study
-        rows = tables.records("replay_means", means[of_study.to_numpy(bool)])
+        rows = [row for row in every if row["study"] == study]
         if rows:
             yield from _one(rows, "all studies together" if study is None else f"study “{study}”", index, drawn)
     yield Notice(
@@ -96,8 +92,7 @@ def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[B
     """One study's table and figure, or those of all together."""
     best = rows[0]
     if best["rank"] is not None:
-        bounds = interval(best["rmse_low_mm"], best["rmse_high_mm"])
-        evidence = f"RMSE {number(best['rmse_mm'])} mm, {bounds}, over {counted(best['n'], 'session')}."
+        evidence = f"RMSE {_with_interval(best, 'rmse')} mm over {counted(best['n'], 'session')}."
         yield Paragraph((Strong(f"Least error, {where}: {_called(best)}. "), evidence))
     selections = any(row["selection_n"] for row in rows)
     titles = _TITLES + (_AT_SELECTION if selections else ())
@@ -128,23 +123,25 @@ def _called(row: Row) -> str:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    lag = NOTHING
+    lag = seconds(row["lag_s"])
     if row["lag_low_s"] is not None:
-        lag = f"[{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]"
+        lag += f" [{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]"
     return (
-        NOTHING if row["rank"] is None else str(row["rank"]),
         _called(row),
+        NOTHING if row["rank"] is None else str(row["rank"]),
         str(row["n"]),
-        number(row["rmse_mm"]),
-        interval(row["rmse_low_mm"], row["rmse_high_mm"]),
-        percent(row["coverage_95"], 0),
-        seconds(row["lag_s"]),
+        _with_interval(row, "rmse"),
         lag,
-        number(row["jitter_mm"]),
-        interval(row["jitter_low_mm"], row["jitter_high_mm"]),
-        number(row["selection_rmse_mm"]),
-        interval(row["selection_rmse_low_mm"], row["selection_rmse_high_mm"]),
+        _with_interval(row, "jitter"),
+        percent(row["coverage_95"], 0),
+        _with_interval(row, "selection_rmse"),
     )
+
+
+def _with_interval(row: Row, figure: str) -> str:
+    """A figure in mm and, where there is one, its interval."""
+    low, high = row[f"{figure}_low_mm"], row[f"{figure}_high_mm"]
+    return number(row[f"{figure}_mm"]) + ("" if low is None else f" {interval(low, high)}")
 
 
 def _left_out(excluded: pd.DataFrame) -> Table | None:
