@@ -406,14 +406,15 @@ def trade_off(means: pd.DataFrame) -> Figure:
 
 def _ranks(axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
     """Each mark's rank beside it; marks that lie on one another share a label."""
-    known = means[values.notna()].assign(value=values)
-    at: dict[tuple[int, int], list[Any]] = {}
-    for row in known.itertuples():
-        x, y = axes.transData.transform((row.rmse_mm, row.value))
-        at.setdefault((round(x / 8), round(y / 8)), []).append(row)
-    for rows in at.values():
-        label = ", ".join(str(row.rank) for row in rows)
-        axes.annotate(label, (rows[0].rmse_mm, rows[0].value), (6, 5), textcoords="offset points", fontsize=8)
+    known = values.notna().to_numpy(bool)
+    points = np.column_stack([means["rmse_mm"], values])[known]
+    at: dict[tuple[int, ...], list[int]] = {}
+    for index, pixel in enumerate(axes.transData.transform(points)):
+        at.setdefault(tuple(np.rint(pixel / 8).astype(int)), []).append(index)
+    ranks = means["rank"].to_numpy()[known]
+    for together in at.values():
+        label = ", ".join(str(ranks[index]) for index in together)
+        axes.annotate(label, tuple(points[together[0]]), (6, 5), textcoords="offset points", fontsize=8)
 
 
 def _arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

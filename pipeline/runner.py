@@ -154,8 +154,7 @@ def _settings(study: Study, stage: Stage) -> Any:
     # Order matters in mappings too: it is the order in which streams and estimators are shown.
     return (
         json.loads(study.model_dump_json(include=set(stage.settings))),
-        list(study.streams),
-        list(study.estimators),
+        [list(getattr(study, name)) for name in ("streams", "estimators") if name in stage.settings],
     )
 
 

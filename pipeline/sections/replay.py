@@ -105,7 +105,9 @@ def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[B
         _NOTE + (_NOTE_SELECTION if selections else ""),
     )
     ranked = [row for row in rows if row["rank"] is not None and (row["lag_s"], row["jitter_mm"]) != (None, None)]
-    if ranked:
+    if not ranked:
+        yield Paragraph(("Neither lag nor jitter could be measured, so what less error costs cannot be drawn.",))
+    else:
         name = f"trade-off-{index}.svg"
         figures.draw(figures.trade_off, drawn / name, tables.frame("replay_means", ranked))
         yield Figure(
