@@ -31,13 +31,35 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
         _copy(source, folder / name)
     provenance: dict[str, Any] = {
         "study": result.name,
+        **_program(command),
+        **_read(result),
+        "files": sorted(files),
+    }
+    _write_provenance(provenance, folder)
+
+
+def publish_provenance(results: Iterable[Result], folder: Path, command: Sequence[str]) -> None:
+    """provenance.json of something made from several studies."""
+    studies = {result.name: _read(result) for result in results}
+    _write_provenance({**_program(command), "studies": studies}, folder)
+
+
+def _program(command: Sequence[str]) -> dict[str, Any]:
+    """What ran."""
+    return {
         "command": [Path(command[0]).name, *command[1:]],
         "python": platform.python_version(),
         "versions": versions(["steadyhand", *LIBRARIES]),
-        "settings": json.loads(result.study.model_dump_json(exclude_defaults=True)),
-        "inputs_sha256": result.inputs,
-        "files": sorted(files),
     }
+
+
+def _read(result: Result) -> dict[str, Any]:
+    """What it read."""
+    settings = json.loads(result.study.model_dump_json(exclude_defaults=True))
+    return {"settings": settings, "inputs_sha256": result.inputs}
+
+
+def _write_provenance(provenance: dict[str, Any], folder: Path) -> None:
     text = json.dumps(provenance, indent=1, ensure_ascii=False) + "\n"
     (folder / _PROVENANCE).write_text(text, encoding="utf-8")
 

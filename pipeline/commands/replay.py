@@ -14,7 +14,7 @@ import pandas as pd
 from pipeline import results, tables
 from pipeline.cache import Entry
 from pipeline.commands import console
-from pipeline.commands.publish import refuse_inputs, refuse_study
+from pipeline.commands.publish import publish_provenance, refuse_inputs, refuse_study
 from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
 from pipeline.document import html
 from pipeline.errors import PipelineError
@@ -133,8 +133,21 @@ def _gather(
             gathered.trials.append(tables.as_table("replay_trials", trials))
     gathered.results.append(result)
     gathered.exclusions += [{"study": result.name, **row} for row in rows]
-    facts = {"title": result.study.title, "data_origin": result.study.data_origin, "sessions": sessions}
-    gathered.studies.append({"name": result.name, **facts})
+    gathered.studies.append(
+        {
+            "name": result.name,
+            "title": result.study.title,
+            "data_origin": result.study.data_origin,
+            "sessions": sessions,
+            "variants": [_settings(variant) for variant in listed],
+        }
+    )
+
+
+def _settings(variant: Variant) -> Row:
+    """A variant with all that was set for it."""
+    settings = variant.study.estimators[variant.estimator].model_dump(mode="json", exclude_unset=True)
+    return {"estimator": variant.estimator, "variant": variant.label, "settings": settings}
 
 
 def _write(gathered: _Gathered, folder: Path) -> None:
@@ -154,6 +167,7 @@ def _write(gathered: _Gathered, folder: Path) -> None:
         tables.write(name, found[name], folder)
     with tempfile.TemporaryDirectory() as drawn:
         html.render(document(gathered.studies, found, Path(drawn)), Path(drawn), folder / _PAGE)
+    publish_provenance(gathered.results, folder, sys.argv)
     _say(tables.records("replay_means", found["replay_means"]))
     console.say(f"Report: {short(folder / _PAGE)}")
 

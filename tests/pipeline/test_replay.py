@@ -122,9 +122,16 @@ def test_the_report_ranks_and_says_everything(study: Path, steadyhand: Steadyhan
     ran = steadyhand("replay", study, "--set", "fusion.window=3")
     found = steadyhand.results()
     assert found["schema_version"] == 1
-    assert found["studies"] == [
-        {"name": "study", "title": "Tried <again> & again", "data_origin": "recorded", "sessions": 2}
+    (facts,) = found["studies"]
+    assert (facts["name"], facts["title"], facts["sessions"]) == ("study", "Tried <again> & again", 2)
+    assert facts["variants"] == [
+        {"estimator": "raw", "variant": None, "settings": {"type": "raw"}},
+        {"estimator": "fusion", "variant": None, "settings": {"type": "window_gp", "window": 5}},
+        {"estimator": "fusion", "variant": "fusion[window=3]", "settings": {"type": "window_gp", "window": 3}},
     ]
+    made = json.loads((steadyhand.out / "provenance.json").read_text())
+    assert made["command"][:2] == ["steadyhand", "replay"]
+    assert "data/P1_a.mcap" in made["studies"]["study"]["inputs_sha256"]
     means = found["replay_means"]
     assert [row["rank"] for row in means] == [1, 2, 3]
     assert [row["rmse_mm"] for row in means] == sorted(row["rmse_mm"] for row in means)
