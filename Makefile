@@ -6,7 +6,7 @@ STUDY ?= studies/feng2016
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check simulate power plan test lint bench lock clean
+.PHONY: help report check replay simulate power plan test lint bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -19,6 +19,9 @@ report: .venv/installed ## write the report of STUDY (default: the bundled study
 
 check: .venv/installed ## do the bundled studies' statistics still come out the same?
 	@$(steadyhand) check studies/feng2016 studies/reach $(ARGS)
+
+replay: .venv/installed ## variants of the estimators, ranked: STUDY=… ARGS="--set fusion.window=3,5,10"
+	@$(steadyhand) replay "$(STUDY)" $(ARGS)
 
 simulate: .venv/installed ## write the logs of a simulated STUDY anew
 	@$(steadyhand) simulate "$(STUDY)" $(ARGS)

@@ -78,6 +78,31 @@ def fit(
 
 
 @app.command()
+def replay(
+    studies: Studies,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="ESTIMATOR.KEY=VALUE,…",
+            help="Values to try for a parameter of an estimator; may be given often, and those of one estimator"
+            " multiply out.",
+        ),
+    ] = None,
+    estimators: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A YAML file with further estimators, as in study.yaml.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; one report for all studies.")] = None,
+    jobs: Jobs = None,
+    cache: CacheFolder = None,
+) -> None:
+    """Run variants of the estimators over studies and rank them: replay.html, results.json and Parquet."""
+    from pipeline.commands import replay as command
+
+    command.replay(studies, changes or [], estimators, out, jobs, cache)
+
+
+@app.command()
 def simulate(studies: Studies) -> None:
     """Write the logs of a study's `simulation:` block into the study folder."""
     from pipeline.commands import simulate as command

@@ -36,10 +36,13 @@ def sensors(study: Study) -> dict[str, Sensor]:
     return {name: sensor(study, stream) for name, stream in study.sensor_streams.items()}
 
 
-def build_estimator(study: Study, name: str) -> Estimator:
-    """The study's estimator of that name; PipelineError that says which key or value is wrong."""
+def build_estimator(study: Study, name: str, where: str | None = None) -> Estimator:
+    """The study's estimator of that name; PipelineError that says which key or value is wrong.
+
+    `where` is where its settings stand, if not in study.yaml.
+    """
     settings = study.estimators[name]
-    where = f"study.yaml: estimators.{name}"
+    where = where or f"study.yaml: estimators.{name}"
     if settings.type not in ESTIMATORS:
         raise PipelineError(f'{where}: type "{settings.type}" is not known{did_you_mean(settings.type, ESTIMATORS)}')
     kind = ESTIMATORS[settings.type]

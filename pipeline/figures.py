@@ -346,20 +346,80 @@ def errors(accuracy: pd.DataFrame) -> Figure:
                 panel.plot([known.mean()], [index], marker, color=colour, markersize=9, markeredgecolor="white")
     axes[0].set_yticks(range(len(names)), [_name(name) for name in names])
     axes[0].invert_yaxis()
-    if accuracy["rmse_mm"].max() > 15 * accuracy["rmse_mm"].min():
-        axes[0].set_xscale("log")
-        axes[0].xaxis.set_major_locator(mpl.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes[0].xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-        axes[0].xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
-    else:
-        axes[0].set_xlim(left=0)
-    axes[0].set_xlabel("RMSE against the reference (mm)")
+    _along_rmse(axes[0], accuracy["rmse_mm"])
     axes[1].axvline(0, color=_GREY, linewidth=0.8)
     axes[1].set_xlabel("Lag behind the reference (ms)")
     for panel in axes:
         panel.grid(axis="y", color="#e3e7ea", linewidth=0.8)
         panel.set_axisbelow(True)
     return figure
+
+
+def _along_rmse(axes: Axes, rmse_mm: pd.Series) -> None:
+    """RMSE along x; by its logarithm where the largest is many times the least."""
+    if rmse_mm.max() > 15 * rmse_mm.min():
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(mpl.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
+    else:
+        axes.set_xlim(left=0)
+    axes.set_xlabel("RMSE against the reference (mm)")
+
+
+def trade_off(means: pd.DataFrame) -> Figure:
+    """Lag and jitter against RMSE, a mark a variant with its rank beside it; an estimator's own settings are ringed.
+
+    `means` has the columns of `replay_means`; a panel without values is left out.
+    """
+    quantities = [("lag", "_s", 1000, "Lag behind the reference (ms)"), ("jitter", "_mm", 1, "Jitter at rest (mm)")]
+    known = [one for one in quantities if means[f"{one[0]}{one[1]}"].notna().any()]
+    figure, axes = _axes(1, max(len(known), 1), 3.6)
+    for panel, (stem, unit, scale, label) in zip(axes, known, strict=False):
+        for index, name in enumerate(sorted(set(means["estimator"]))):
+            rows = means[(means["estimator"] == name) & means[f"{stem}{unit}"].notna()]
+            values = [scale * rows[f"{stem}{end}{unit}"].to_numpy(np.float64) for end in ("", "_low", "_high")]
+            errors_mm = [rows[f"rmse{end}_mm"].to_numpy(np.float64) for end in ("", "_low", "_high")]
+            panel.errorbar(
+                errors_mm[0],
+                values[0],
+                xerr=_arms(*errors_mm),
+                yerr=_arms(*values),
+                fmt=MARKERS[index % 7],
+                color=COLOURS[index % 7],
+                elinewidth=0.7,
+                markersize=6,
+                alpha=0.85,
+                label=_name(name),
+            )
+            own = rows["variant"].isna().to_numpy(bool)
+            ring: dict[str, Any] = {"s": 110, "facecolors": "none", "edgecolors": COLOURS[6], "linewidths": 0.9}
+            panel.scatter(errors_mm[0][own], values[0][own], **ring)
+        panel.axhline(0, color=_GREY, linewidth=0.8)
+        panel.set_ylabel(label)
+        _along_rmse(panel, means["rmse_mm"])
+        _ranks(panel, means, scale * means[f"{stem}{unit}"])
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    return figure
+
+
+def _ranks(axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
+    """Each mark's rank beside it; marks that lie on one another share a label."""
+    known = values.notna().to_numpy(bool)
+    points = np.column_stack([means["rmse_mm"], values])[known]
+    at: dict[tuple[int, ...], list[int]] = {}
+    for index, pixel in enumerate(axes.transData.transform(points)):
+        at.setdefault(tuple(np.rint(pixel / 8).astype(int)), []).append(index)
+    ranks = means["rank"].to_numpy()[known]
+    for together in at.values():
+        label = ", ".join(str(ranks[index]) for index in together)
+        axes.annotate(label, tuple(points[together[0]]), (6, 5), textcoords="offset points", fontsize=8)
+
+
+def _arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """An interval as matplotlib takes it: how far to each side, nothing where there is none."""
+    return np.nan_to_num(np.maximum(0, np.stack([middle - low, high - middle])))
 
 
 def noise(residuals: Sequence[FloatArray], units: Sequence[str], names: Sequence[str]) -> Figure:

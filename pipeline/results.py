@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,16 @@ def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame]
         content[table] = tables.records(table, found[table]) if table in found else []
     for row in content["comparisons"]:
         row["details"] = None if row["details"] is None else json.loads(row["details"])
+    _dump(content, path)
+
+
+def write_replay(path: Path, studies: Sequence[Mapping[str, Any]], found: Mapping[str, pd.DataFrame]) -> None:
+    """The file of a replay: what is known of its studies, and its tables."""
+    content: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "studies": [dict(study) for study in studies]}
+    _dump(content | {name: tables.records(name, table) for name, table in found.items()}, path)
+
+
+def _dump(content: Mapping[str, Any], path: Path) -> None:
     path.write_text(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
 
 

@@ -47,11 +47,13 @@ class InThisProcess(Executor):
 class Result:
     """A study brought up to date: what each stage gave, by session, and what happened to the sessions.
 
-    The entry of a stage of scope "study" stands under an empty name.
+    `sessions` are those that went through every stage. The entry of a stage of scope "study" stands under an empty
+    name.
     """
 
     folder: Path
     study: Study
+    sessions: list[Session] = field(default_factory=list)
     entries: dict[str, dict[str, Entry]] = field(default_factory=dict)
     computed: dict[str, int] = field(default_factory=dict)
     set_aside: list[tuple[Session, str]] = field(default_factory=list)
@@ -105,8 +107,21 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
                 result.entries[stage.name] = {"": _run_study(stage, result, sessions, means)}
         except PipelineError as error:
             raise PipelineError(_with_context(folder, result, str(error))) from None
+    result.sessions = sessions
     result.seconds = time.monotonic() - began
     return result
+
+
+def over_settings(
+    result: Result, stage: Stage, settings: Sequence[Study], sessions: Sequence[Session], means: Means
+) -> list[list[Entry]]:
+    """A stage's entry for each of several settings of a study, by session: a list a session, in the settings' order."""
+    began = time.monotonic()
+    of_settings = [replace(result, study=study) for study in settings]
+    works = [_work(stage, one, [session]) for session in sessions for one in of_settings]
+    entries = _entries(stage, result, works, means)
+    result.seconds += time.monotonic() - began
+    return [entries[at : at + len(settings)] for at in range(0, len(entries), len(settings))]
 
 
 def _with_context(folder: Path, result: Result, message: str) -> str:
@@ -139,8 +154,7 @@ def _settings(study: Study, stage: Stage) -> Any:
     # Order matters in mappings too: it is the order in which streams and estimators are shown.
     return (
         json.loads(study.model_dump_json(include=set(stage.settings))),
-        list(study.streams),
-        list(study.estimators),
+        [list(getattr(study, name)) for name in ("streams", "estimators") if name in stage.settings],
     )
 
 
@@ -189,31 +203,37 @@ def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[E
 
 def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> dict[str, Entry]:
     """The stage's entry for each session, computed where the cache has none."""
+    found = _entries(stage, result, [_work(stage, result, [session]) for session in sessions], means)
+    return {session.id: entry for session, entry in zip(sessions, found, strict=True)}
+
+
+def _entries(stage: Stage, result: Result, works: Sequence[tuple[Work, str]], means: Means) -> list[Entry]:
+    """The entry of each piece of work with its key, each key computed once, where the cache has none."""
     found: dict[str, Entry] = {}
-    missing: list[tuple[Session, Work, str]] = []
-    for session in sessions:
-        work, key = _work(stage, result, [session])
+    missing: dict[str, Work] = {}
+    for work, key in works:
+        if key in found or key in missing:
+            continue
         entry = means.cache.get(stage.name, key)
         if entry is None:
-            missing.append((session, work, key))
+            missing[key] = work
         else:
-            found[session.id] = entry
+            found[key] = entry
     result.computed[stage.name] = len(missing)
     if missing:
         means.progress.begin(stage.name, len(missing))
         waiting = {
-            means.executor.submit(compute, stage, work, key, means.cache.root): session
-            for session, work, key in missing
+            means.executor.submit(compute, stage, work, key, means.cache.root): key for key, work in missing.items()
         }
         try:
             for future in as_completed(waiting):
-                found[waiting[future].id] = future.result()
+                found[waiting[future]] = future.result()
                 means.progress.advance()
         finally:
             for future in waiting:
                 future.cancel()
         means.progress.end()
-    return {session.id: found[session.id] for session in sessions}
+    return [found[key] for _, key in works]
 
 
 def _run_study(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> Entry:

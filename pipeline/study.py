@@ -170,6 +170,12 @@ class Estimator(BaseModel):
         return dict(self.model_extra or {})
 
 
+class Estimators(Frozen):
+    """A file of further estimators, as they stand in study.yaml."""
+
+    estimators: Mapping[str, Estimator]
+
+
 Adjustment = Literal["holm", "bonferroni", "benjamini_hochberg"]
 
 
@@ -331,6 +337,11 @@ class Study(Frozen):
             raise ValueError("names no data; give sessions, trials, questionnaires or measures")
         return self
 
+    def exclusion_of(self, session: Session) -> Exclusion | None:
+        """The first decision by which a session is left out as a whole."""
+        whole = (one for one in self.exclusions if one.measure is None and one.covers(**session.ids))
+        return next(whole, None)
+
     def _sensors_fit(self) -> None:
         for name, stream in self.sensor_streams.items():
             axes = None if isinstance(stream, AccelerationStream) else stream.axes
@@ -489,7 +500,19 @@ def load_study(folder: Path) -> Study:
     return study
 
 
-def parse(model: type[_Model], content: dict[str, Any], path: Path) -> _Model:
+def read_values(text: str) -> list[Any]:
+    """A list in YAML without its brackets, "3, 5"; ValueError where it is none."""
+    try:
+        found = yaml.load(f"[{text}]", Loader=_UniqueKeyLoader)  # noqa: S506 - safe
+    except (yaml.YAMLError, RecursionError) as error:
+        fault = error.problem if isinstance(error, yaml.MarkedYAMLError) else error
+        raise ValueError(f"not a list of values: {fault}") from None
+    if not isinstance(found, list) or any(value is None for value in found):
+        raise ValueError("a value is missing")
+    return found
+
+
+def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Model:
     """Content as a model; every fault in one PipelineError, a line each."""
     try:
         return model.model_validate(content)

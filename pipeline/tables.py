@@ -200,6 +200,46 @@ TABLES: Mapping[str, pa.Schema] = {
     ),
     "noise_residuals": _schema(("session", _TEXT), ("stream", _TEXT), ("axis", _TEXT), ("residual", _FLOAT)),
     "shown_at_selection": _schema(("condition", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("rmse_mm", _FLOAT)),
+    "replay_trials": _schema(
+        ("study", _TEXT),
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("trial", _COUNT),
+        ("estimator", _TEXT),
+        ("variant", _TEXT),
+        ("position_error_mm", _FLOAT),
+        ("squared_error_mm2", _FLOAT),
+    ),
+    "replay_means": _schema(  # study is null for all studies together
+        ("study", _TEXT),
+        ("rank", _COUNT),
+        ("estimator", _TEXT),
+        ("variant", _TEXT),
+        ("n", _COUNT),
+        *[
+            (f"{figure}{end}{unit}", _FLOAT)
+            for figure, unit in (
+                ("rmse", "_mm"),
+                ("sd", "_mm"),
+                ("coverage", "_95"),
+                ("lag", "_s"),
+                ("jitter", "_mm"),
+                ("selection_rmse", "_mm"),
+            )
+            for end in ("", "_low", "_high")
+        ],
+        ("selection_n", _COUNT),
+    ),
+    "replay_exclusions": _schema(
+        ("study", _TEXT),
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("variant", _TEXT),
+        ("what", _TEXT),
+        ("reason", _TEXT),
+    ),
     "exclusions": _schema(
         ("participant", _TEXT),
         ("condition", _TEXT),

@@ -17,6 +17,7 @@ _LABELS = {
     "measure": "measuring",
     "compare": "comparing",
     "report": "writing the report",
+    "replay": "replaying",
     "simulate": "simulating",
 }
 
@@ -64,7 +65,8 @@ class PlainLines:
             0,
             time.monotonic(),
         )
-        warn(f"{self._label} …" if total == 1 else f"{self._label}: {total} sessions …")
+        pieces = "sessions by variants" if stage == "replay" else "sessions"
+        warn(f"{self._label} …" if total == 1 else f"{self._label}: {total} {pieces} …")
 
     def advance(self) -> None:
         """Now and then a line."""

@@ -14,9 +14,7 @@ from pipeline.commands.run import for_each
 from pipeline.errors import PipelineError
 from pipeline.fitting import Fit, Parameter, fit
 from pipeline.runner import Result
-from pipeline.stages import STAGES
-
-_INGEST = STAGES[:1]
+from pipeline.stages import INGEST
 
 
 def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache: Path | None) -> None:
@@ -36,7 +34,7 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
             console.say(line)
         return result.exit_code
 
-    sys.exit(for_each(studies, _INGEST, jobs, cache, then))
+    sys.exit(for_each(studies, INGEST, jobs, cache, then))
 
 
 def _lines(name: str, found: Fit, first_s: float, recordings: dict[str, recording.Recording]) -> Iterator[str]:

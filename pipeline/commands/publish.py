@@ -24,20 +24,42 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     files.pop("entry.json")
     files["results.json"] = result.entry("compare") / "results.json"
-    _refuse_inputs(result, folder, files)
+    refuse_inputs(result, folder, files)
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
     for name, source in files.items():
         _copy(source, folder / name)
     provenance: dict[str, Any] = {
         "study": result.name,
+        **_program(command),
+        **_read(result),
+        "files": sorted(files),
+    }
+    _write_provenance(provenance, folder)
+
+
+def publish_provenance(results: Iterable[Result], folder: Path, command: Sequence[str]) -> None:
+    """provenance.json of something made from several studies."""
+    studies = {result.name: _read(result) for result in results}
+    _write_provenance({**_program(command), "studies": studies}, folder)
+
+
+def _program(command: Sequence[str]) -> dict[str, Any]:
+    """What ran."""
+    return {
         "command": [Path(command[0]).name, *command[1:]],
         "python": platform.python_version(),
         "versions": versions(["steadyhand", *LIBRARIES]),
-        "settings": json.loads(result.study.model_dump_json(exclude_defaults=True)),
-        "inputs_sha256": result.inputs,
-        "files": sorted(files),
     }
+
+
+def _read(result: Result) -> dict[str, Any]:
+    """What it read."""
+    settings = json.loads(result.study.model_dump_json(exclude_defaults=True))
+    return {"settings": settings, "inputs_sha256": result.inputs}
+
+
+def _write_provenance(provenance: dict[str, Any], folder: Path) -> None:
     text = json.dumps(provenance, indent=1, ensure_ascii=False) + "\n"
     (folder / _PROVENANCE).write_text(text, encoding="utf-8")
 
@@ -48,7 +70,7 @@ def refuse_study(folder: Path) -> None:
         raise PipelineError(f"--out {folder}: is a study, and its files are not changed; name a folder for the report")
 
 
-def _refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
+def refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
     """Nor over the files it was made from."""
     inputs = {(result.folder / name).resolve() for name in result.inputs}
     for name in files:
@@ -58,7 +80,7 @@ def _refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
 
 def publish_results(result: Result, folder: Path) -> None:
     """results.json alone."""
-    _refuse_inputs(result, folder, ["results.json"])
+    refuse_inputs(result, folder, ["results.json"])
     _copy(result.entry("compare") / "results.json", folder / "results.json")
 
 

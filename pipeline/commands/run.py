@@ -54,6 +54,7 @@ def for_each(
     then: Callable[[Path, Result], int],
     *,
     failed: Callable[[Path, PipelineError], None] = lambda _folder, _error: None,
+    bring: Callable[[Path, Sequence[Stage], Means], Result] = bring_up_to_date,
 ) -> int:
     """Bring each study up to date and do with it what `then` does; the highest of the exit codes.
 
@@ -64,7 +65,7 @@ def for_each(
         for folder in studies:
             try:
                 with console.progress() as progress:
-                    result = bring_up_to_date(folder, stages, Means(cache_in(cache), executor, progress))
+                    result = bring(folder, stages, Means(cache_in(cache), executor, progress))
                 code = max(code, then(folder, result))
             except PipelineError as error:
                 console.warn(f"steadyhand: {error}")
@@ -77,11 +78,16 @@ def _out_folders(studies: Sequence[Path], out: Path | None) -> list[Path]:
     """A folder a study; `--out` itself for a single one."""
     if out is not None and len(studies) == 1:
         return [out]
+    return [(out or reports_folder()) / name for name in refuse_same_names(studies)]
+
+
+def refuse_same_names(studies: Sequence[Path]) -> list[str]:
+    """The studies' names; PipelineError where two are the same."""
     names = [study.resolve().name for study in studies]
     for name in names:
         if names.count(name) > 1:
             raise PipelineError(f'two studies are called "{name}", and their reports would be one; rename a folder')
-    return [(out or reports_folder()) / name for name in names]
+    return names
 
 
 def report(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None) -> None:
@@ -105,11 +111,11 @@ def _run(
         _show(result)
         if stages is STAGES:
             publish(result, folders[study], sys.argv)
-            console.say(f"Report: {_short(folders[study] / 'report.html')}  {_short(folders[study] / 'report.pdf')}")
+            console.say(f"Report: {short(folders[study] / 'report.html')}  {short(folders[study] / 'report.pdf')}")
         else:
             publish_results(result, folders[study])
-            console.say(f"Results: {_short(folders[study] / 'results.json')}")
-        console.say(_what_was_done(result))
+            console.say(f"Results: {short(folders[study] / 'results.json')}")
+        console.say(what_was_done(result))
         return result.exit_code
 
     sys.exit(for_each(studies, stages, jobs, cache, write))
@@ -133,7 +139,7 @@ def _show(result: Result) -> None:
         console.say(line)
 
 
-def _short(path: Path) -> str:
+def short(path: Path) -> str:
     """Relative to where the user is, when that is shorter."""
     try:
         return str(path.resolve().relative_to(Path.cwd()))
@@ -141,7 +147,8 @@ def _short(path: Path) -> str:
         return str(path)
 
 
-def _what_was_done(result: Result) -> str:
+def what_was_done(result: Result) -> str:
+    """How much of each stage was computed, in how long."""
     done = [f"{stage} {count}" for stage, count in result.computed.items() if count]
     if not done:
         return f"Nothing had changed, so nothing was computed again ({result.seconds:.1f} s)."

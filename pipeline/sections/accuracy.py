@@ -20,7 +20,7 @@ _VIEW_S = 4.0  # long enough for a reach, short enough to see single frames
 _ROWS_MAX = 120
 
 
-_SMOOTHED = (
+SMOOTHED_REMARK = (
     " Estimates are held against all readings smoothed, before and after each instant, by the fusion filter. That"
     " leaves out whatever all sensors have wrong together, and is kinder to estimators that resemble it."
 )
@@ -34,7 +34,7 @@ def section(material: Material) -> Section | None:
     blocks: list[Block] = [Paragraph(_method(material))]
     if rows:
         if any(row["reference"] == SMOOTHED for row in rows):
-            blocks.append(Paragraph((Strong("No reference was recorded."), _SMOOTHED)))
+            blocks.append(Paragraph((Strong("No reference was recorded."), SMOOTHED_REMARK)))
         blocks.append(_summary_table(material, rows))
         blocks.append(_error_figure(material, pd.DataFrame(rows)))
     else:

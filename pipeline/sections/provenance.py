@@ -13,9 +13,15 @@ from pipeline.wording import counted
 _FILES_MAX = 60
 
 
+def libraries() -> Table:
+    """What made the report, in which version."""
+    used = {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
+    titles = (Column("Name", False), Column("Version", False))
+    return Table("table-versions", "Program and libraries.", titles, tuple(used.items()))
+
+
 def section(material: Material) -> Section:
     """Provenance."""
-    used = {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
     text = (
         f"Made by Steadyhand from the study folder “{material.name}”, {counted(len(material.inputs), 'file')}. Every"
         " number in this report stands in results.json and in the tables folder beside it; provenance.json holds the"
@@ -28,12 +34,7 @@ def section(material: Material) -> Section:
         "Provenance",
         (
             Paragraph((text,)),
-            Table(
-                "table-versions",
-                "Program and libraries.",
-                (Column("Name", False), Column("Version", False)),
-                tuple(used.items()),
-            ),
+            libraries(),
             Table(
                 "table-inputs",
                 f"Files that were read, with the beginning of their SHA-256: equal digests are equal files.{more}",

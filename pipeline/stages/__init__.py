@@ -73,5 +73,17 @@ STAGES: tuple[Stage, ...] = (
     ),
 )
 
+INGEST = STAGES[:1]
+"""What reads logs and goes no further."""
+
 COMPARE = STAGES[:-1]
 """What `steadyhand compare` runs: everything but figures and pages."""
+
+REPLAY = Stage(
+    "replay",
+    "session",
+    "pipeline.stages.replay:run",
+    reads=("ingest",),
+    settings=("streams", "estimators", "axes"),
+)
+"""What `steadyhand replay` runs for each session and variant, by a study that holds the one estimator alone."""

@@ -31,7 +31,7 @@ def run(work: Work) -> Outcome:
     for name, part in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False):
         tracks[str(name)] = part
     reference = recording.reference(study, loaded)
-    rows = [_accuracy(work, loaded, reference, name, rows) for name, rows in tracks.items()]
+    rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
     tables.write("accuracy", tables.frame("accuracy", [row for row in rows if row]), work.out)
     tables.write("replay_agreement", tables.frame("replay_agreement", _agreement(work, loaded)), work.out)
     phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]
@@ -39,7 +39,7 @@ def run(work: Work) -> Outcome:
     measured, residuals = _noise(study, session.id, loaded)
     tables.write("sensor_noise", tables.frame("sensor_noise", measured), work.out)
     tables.write("noise_residuals", residuals, work.out)
-    trials = list(_trials(work, tables.read("events", ingested), tracks))
+    trials = list(trial_rows(work, tables.read("events", ingested), tracks))
     tables.write("trials", tables.frame("trials", trials), work.out)
     return Outcome()
 
@@ -49,7 +49,7 @@ def _mean_and_sd(rows: pd.DataFrame, axes: tuple[str, ...]) -> tuple[FloatArray,
     return mean, rows[[f"sd_{axis}_mm" for axis in axes]].to_numpy(np.float64)
 
 
-def _accuracy(
+def accuracy_row(
     work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, rows: pd.DataFrame
 ) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
@@ -133,7 +133,7 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
     return noise.still_by_acceleration(samples) if samples is not None else None
 
 
-def _trials(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
+def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
     starts, selections = selections_by_trial(events)
     start: Any

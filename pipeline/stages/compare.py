@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from pipeline import results, study_tables, tables
 from pipeline.comparisons import compared, everything_asked
@@ -15,7 +14,7 @@ from pipeline.design_check import findings
 from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
 from pipeline.stage import Outcome, Work
-from pipeline.statistics.result import FloatArray
+from pipeline.statistics.descriptive import described
 from pipeline.study import Study
 from pipeline.wording import measure_order
 
@@ -97,12 +96,7 @@ def _sessions(work: Work) -> list[Row]:
 
 def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataFrame:
     """A session's facts go with it when it is excluded as a whole; the exclusions say so."""
-    out = {
-        session.id
-        for session in work.sessions
-        for excluded in study.exclusions
-        if excluded.measure is None and excluded.covers(**session.ids)
-    }
+    out = {session.id for session in work.sessions if study.exclusion_of(session)}
     return table[~table["session"].isin(out)]
 
 
@@ -114,18 +108,8 @@ def descriptives(study: Study, measures: pd.DataFrame) -> list[Row]:
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
             if len(values):
-                rows.append({"measure": measure, "condition": condition, **_described(values)})
+                rows.append({"measure": measure, "condition": condition, **described(values)})
     return rows + _root_rows(rows)
-
-
-def _described(values: FloatArray) -> Row:
-    n = len(values)
-    row: Row = {"n": n, "mean": float(values.mean()), "median": float(np.median(values))}
-    if n > 1:
-        sd = float(np.std(values, ddof=1))
-        margin = float(stats.t.ppf(0.975, n - 1)) * sd / np.sqrt(n)
-        row |= {"sd": sd, "ci_low": row["mean"] - margin, "ci_high": row["mean"] + margin}
-    return row
 
 
 def _root_rows(rows: Iterable[Row]) -> list[Row]:

@@ -68,6 +68,7 @@ def test_a_second_report_says_that_nothing_was_computed(study: Path, steadyhand:
         ("title: T", "title: Another", {"compare"}),
         ("fusion: {type: window_gp}", "fusion: {type: window_gp, window: 3}", {"fuse", "assess", "measure", "compare"}),
         ("title: T", "title: T\nalpha: 0.01", {"compare"}),
+        ("raw: {type: raw}", "held: {type: raw}", {"fuse", "assess", "measure", "compare"}),
         ("title: T", "title: T\ndisplay: {px_per_mm: 10}", {"measure", "compare"}),
         ("noise_sd_mm: 8", "noise_sd_mm: 9", {"ingest", "fuse", "assess", "measure", "compare"}),
     ],

@@ -1,0 +1,190 @@
+"""`replay`: estimators with other settings over one or many studies, and one report that ranks them."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from pipeline import results, tables
+from pipeline.cache import Entry
+from pipeline.commands import console
+from pipeline.commands.publish import publish_provenance, refuse_inputs, refuse_study
+from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
+from pipeline.document import html
+from pipeline.errors import PipelineError
+from pipeline.ranking import ranked
+from pipeline.runner import Means, Result, bring_up_to_date, over_settings
+from pipeline.sections.replay import document
+from pipeline.stage import Stage
+from pipeline.stages import INGEST, REPLAY
+from pipeline.study import Session, load_study
+from pipeline.variants import Variant, read_changes, read_estimators, variants
+from pipeline.wording import interval, number, seconds
+
+_PAGE, _RESULTS = "replay.html", "results.json"
+_TABLES = ("accuracy", "replay_trials", "replay_means", "replay_exclusions")
+_IN_RESULTS = ("accuracy", "replay_means", "replay_exclusions")
+Row = dict[str, Any]
+
+
+@dataclass
+class _Gathered:
+    """What all studies gave."""
+
+    studies: list[Row] = field(default_factory=list)
+    results: list[Result] = field(default_factory=list)
+    accuracy: list[pd.DataFrame] = field(default_factory=list)
+    trials: list[pd.DataFrame] = field(default_factory=list)
+    exclusions: list[Row] = field(default_factory=list)
+
+
+def replay(
+    studies: Sequence[Path],
+    changes: Sequence[str],
+    estimators: Path | None,
+    out: Path | None,
+    jobs: int | None,
+    cache: Path | None,
+) -> None:
+    """Replay the studies and write the report; exit with the highest of their codes."""
+    refuse_same_names(studies)
+    folder = out or reports_folder() / "replay"
+    refuse_study(folder)
+    wanted, further = read_changes(changes), read_estimators(estimators)
+    gathered = _Gathered()
+
+    def bring(study: Path, stages: Sequence[Stage], means: Means) -> Result:
+        try:
+            listed = variants(load_study(study), wanted, further, estimators)
+        except PipelineError as error:
+            raise PipelineError(_in_study(study, str(error))) from None
+        result = bring_up_to_date(study, stages, means)
+        kept, decided = _by_decision(result)
+        if not kept:
+            raise PipelineError(f"{study}: has no session to replay")
+        entries = over_settings(result, REPLAY, [variant.study for variant in listed], kept, means)
+        _gather(gathered, result, listed, zip(kept, entries, strict=True), decided)
+        return result
+
+    def then(_folder: Path, result: Result) -> int:
+        for line in what_befell(result):
+            console.warn(line)
+        console.say(f"{result.name}: {what_was_done(result)}")
+        return result.exit_code
+
+    code = for_each(studies, INGEST, jobs, cache, then, bring=bring)
+    if gathered.results:
+        _write(gathered, folder)
+    sys.exit(code)
+
+
+def _in_study(study: Path, message: str) -> str:
+    return message if message.startswith(str(study)) else f"{study}/{message}".replace("/--", ": --")
+
+
+def _by_decision(result: Result) -> tuple[list[Session], list[Row]]:
+    """The sessions to replay, and rows for those that study.yaml leaves out."""
+    kept, rows = [], []
+    for session in result.sessions:
+        decision = result.study.exclusion_of(session)
+        if decision is None:
+            kept.append(session)
+        else:
+            rows.append({**session.ids, "what": "excluded in study.yaml", "reason": decision.reason})
+    return kept, rows
+
+
+def _gather(
+    gathered: _Gathered,
+    result: Result,
+    listed: Sequence[Variant],
+    entries: Iterator[tuple[Session, list[Entry]]],
+    decided: list[Row],
+) -> None:
+    """Take a study's entries together; a variant that failed in a session is set aside there, and said."""
+    rows: list[Row] = [
+        *({**session.ids, "what": "session set aside", "reason": why} for session, why in result.set_aside),
+        *({**session.ids, "what": "session read in part", "reason": why} for session, why in result.in_part),
+        *({"session": name, "what": "file not used", "reason": why} for name, why in result.unused),
+        *decided,
+    ]
+    sessions = 0
+    for session, found in entries:
+        sessions += 1
+        for variant, entry in zip(listed, found, strict=True):
+            label = variant.label or variant.estimator
+            fault = entry.said["set_aside"]
+            if fault is not None:
+                result.set_aside.append((session, f"{label}: {fault}"))
+                rows.append({**session.ids, "variant": label, "what": "session set aside", "reason": fault})
+                continue
+            accuracy = tables.read("accuracy", entry.folder).assign(variant=variant.label)
+            if accuracy.empty:
+                reason = "no instant with both an estimate and a reference"
+                rows.append({**session.ids, "variant": label, "what": "no accuracy", "reason": reason})
+            gathered.accuracy.append(tables.as_table("accuracy", accuracy))
+            trials = tables.read("trials", entry.folder).assign(study=result.name, variant=variant.label)
+            gathered.trials.append(tables.as_table("replay_trials", trials))
+    gathered.results.append(result)
+    gathered.exclusions += [{"study": result.name, **row} for row in rows]
+    gathered.studies.append(
+        {
+            "name": result.name,
+            "title": result.study.title,
+            "data_origin": result.study.data_origin,
+            "sessions": sessions,
+            "variants": [_settings(variant) for variant in listed],
+        }
+    )
+
+
+def _settings(variant: Variant) -> Row:
+    """A variant with all that was set for it."""
+    settings = variant.study.estimators[variant.estimator].model_dump(mode="json", exclude_unset=True)
+    return {"estimator": variant.estimator, "variant": variant.label, "settings": settings}
+
+
+def _write(gathered: _Gathered, folder: Path) -> None:
+    """replay.html, results.json and the tables as Parquet; and the ranking, to the terminal."""
+    accuracy, trials = pd.concat(gathered.accuracy), pd.concat(gathered.trials)
+    found = {
+        "accuracy": accuracy,
+        "replay_trials": trials,
+        "replay_means": tables.frame("replay_means", ranked(accuracy, trials)),
+        "replay_exclusions": tables.frame("replay_exclusions", gathered.exclusions),
+    }
+    for result in gathered.results:
+        refuse_inputs(result, folder, [_PAGE, _RESULTS, *(f"{name}.parquet" for name in _TABLES)])
+    folder.mkdir(parents=True, exist_ok=True)
+    results.write_replay(folder / _RESULTS, gathered.studies, {name: found[name] for name in _IN_RESULTS})
+    for name in _TABLES:
+        tables.write(name, found[name], folder)
+    with tempfile.TemporaryDirectory() as drawn:
+        html.render(document(gathered.studies, found, Path(drawn)), Path(drawn), folder / _PAGE)
+    publish_provenance(gathered.results, folder, sys.argv)
+    _say(tables.records("replay_means", found["replay_means"]))
+    console.say(f"Report: {short(folder / _PAGE)}")
+
+
+def _say(rows: Sequence[Row]) -> None:
+    """The ranking: of all studies where there are several, else of the one."""
+    first = [row for row in rows if row["study"] == rows[0]["study"]]
+    header = ("variant", "sessions", "RMSE mm", "95 % interval", "lag ms", "jitter mm")
+    lines = [
+        (
+            row["variant"] or row["estimator"],
+            str(row["n"]),
+            number(row["rmse_mm"]),
+            interval(row["rmse_low_mm"], row["rmse_high_mm"]),
+            seconds(row["lag_s"]),
+            number(row["jitter_mm"]),
+        )
+        for row in first
+    ]
+    console.table(header, lines)
