@@ -11,6 +11,8 @@ import typer
 
 from pipeline import threads
 
+_INTERRUPTED = 130
+
 app = typer.Typer(
     name="steadyhand",
     help="From a folder of study logs to a report: does the tracking help people?",
@@ -240,9 +242,10 @@ def main() -> None:
 
         warn(f"steadyhand: {error}")
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
-        sys.exit(130)
+    except SystemExit as stop:
+        if stop.code == _INTERRUPTED:  # Typer makes this of Ctrl-C
+            print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
+        raise
     except OSError as error:
         where = error.filename or "a file"
         print(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache", file=sys.stderr)  # noqa: T201

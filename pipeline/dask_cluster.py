@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+import dask
 from distributed import Client, LocalCluster, WorkerPlugin
 from distributed.scheduler import KilledWorker
 
@@ -19,6 +21,7 @@ from pipeline.stage import Work
 
 _STAGES = "pipeline.stages"  # its digest follows the code of every stage
 _CONNECT_S = 10.0
+_LEAVE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # to the process that started us
 
 
 class OneThread(WorkerPlugin):
@@ -105,11 +108,18 @@ def on_dask(address: str | None, count: int, say: Callable[[str], None]) -> Iter
 
     Raises PipelineError where no scheduler answers.
     """
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is raised as well
+    for name in filter(re.compile(r"distributed\b").match, [*logging.root.manager.loggerDict]):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is raised as well
     with ExitStack() as open_until_done:
         if address is None:
+            # A session that kills its worker is tried again by itself; the others need not wait for it long.
+            open_until_done.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 1}))
             cluster = LocalCluster(
-                n_workers=count, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL
+                n_workers=count,
+                threads_per_worker=1,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+                preload=_LEAVE_CTRL_C,
             )
             open_until_done.enter_context(cluster)
             client = Client(cluster)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, as_completed
@@ -170,11 +171,8 @@ def _declared(study: Study, stage: Stage) -> Study:
 
 def _settings(study: Study, stage: Stage) -> Any:
     # Order matters in mappings too: it is the order in which streams and estimators are shown.
-    return (
-        json.loads(study.model_dump_json(include=set(stage.settings))),
-        list(study.streams),
-        list(study.estimators),
-    )
+    ordered = [list(getattr(study, name)) for name in ("streams", "estimators") if name in stage.settings]
+    return json.loads(study.model_dump_json(include=set(stage.settings))), ordered
 
 
 def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
@@ -349,8 +347,9 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
         if not _is_full(error):
             raise
         raise PipelineError(
-            f"{cache_root}: cannot be written any more: {error.strerror}; make room (`steadyhand cache prune` may) or"
-            " name another place with --cache; what was computed is kept, run it again to go on"
+            f"{cache_root}: cannot be written any more: {os.strerror(error.errno or 0)}; make room"
+            " (`steadyhand cache prune` may) or name another place with --cache; what was computed is kept, run it"
+            " again to go on"
         ) from None
 
 
