@@ -94,11 +94,7 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
     began = time.monotonic()
-    study = load_study(folder)
-    found = find_sessions(folder, study)
-    sessions = found.sessions
-    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
-    result.inputs = _input_digests(result.folder, study, sessions)
+    result, sessions = _before_the_stages(folder)
     for stage in stages:
         try:
             if stage.scope == "session":
@@ -113,17 +109,21 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     return result
 
 
+def _before_the_stages(folder: Path) -> tuple[Result, Sequence[Session]]:
+    study = load_study(folder)
+    found = find_sessions(folder, study)
+    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
+    result.inputs = _input_digests(result.folder, study, found.sessions)
+    return result, found.sessions
+
+
 def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[Path]:
     """The folders of the entries that a run over the study would take from the cache; nothing is computed.
 
     What follows from something that would have to be computed first cannot be known, and is not among them.
     Raises PipelineError where the study is bad.
     """
-    study = load_study(folder)
-    found = find_sessions(folder, study)
-    sessions = found.sessions
-    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
-    result.inputs = _input_digests(result.folder, study, sessions)
+    result, sessions = _before_the_stages(folder)
     used: set[Path] = set()
     complete = True
     for stage in stages:
