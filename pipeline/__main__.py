@@ -9,6 +9,10 @@ from typing import Annotated
 
 import typer
 
+from pipeline import threads
+
+_INTERRUPTED = 130
+
 app = typer.Typer(
     name="steadyhand",
     help="From a folder of study logs to a report: does the tracking help people?",
@@ -24,21 +28,35 @@ Out = Annotated[
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to compute in. Default: one a processor.")]
 CacheFolder = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")]
 
+ExecutorName = Annotated[
+    str,
+    typer.Option(
+        "--executor",
+        metavar="WHERE",
+        help="Where to compute: process (processes of this machine), inline (this process), dask (a Dask cluster of"
+        " this machine), dask://host:port (a Dask scheduler). The results are the same.",
+    ),
+]
+
 
 @app.command()
-def report(studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFolder = None) -> None:
+def report(
+    studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFolder = None, executor: ExecutorName = "process"
+) -> None:
     """Write each study's report: HTML, PDF, results.json, tables and figures."""
     from pipeline.commands import run
 
-    run.report(studies, out, jobs, cache)
+    run.report(studies, out, jobs, cache, executor)
 
 
 @app.command()
-def compare(studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFolder = None) -> None:
+def compare(
+    studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFolder = None, executor: ExecutorName = "process"
+) -> None:
     """Everything but figures and pages: print the comparisons and write results.json."""
     from pipeline.commands import run
 
-    run.compare(studies, out, jobs, cache)
+    run.compare(studies, out, jobs, cache, executor)
 
 
 @app.command()
@@ -53,6 +71,7 @@ def check(
     ] = None,
     jobs: Jobs = None,
     cache: CacheFolder = None,
+    executor: ExecutorName = "process",
 ) -> None:
     """Recompute and compare with expected.json in the study folder: a table of what moved, and by how much.
 
@@ -61,7 +80,7 @@ def check(
     """
     from pipeline.commands import check as command
 
-    command.check(studies, accept, junit, jobs, cache)
+    command.check(studies, accept, junit, jobs, cache, executor)
 
 
 @app.command()
@@ -196,11 +215,46 @@ def audit(
     command.audit(file, as_json)
 
 
+cache_app = typer.Typer(help="Show, prune and verify what earlier runs computed and kept.", no_args_is_help=True)
+app.add_typer(cache_app, name="cache")
+
+
+@cache_app.command("show")
+def cache_show(cache: CacheFolder = None) -> None:
+    """Say what is kept: entries, size and last use, stage by stage."""
+    from pipeline.commands import cache as command
+
+    command.show(cache)
+
+
+@cache_app.command("prune")
+def cache_prune(
+    older_than: Annotated[
+        float | None, typer.Option(min=0, metavar="DAYS", help="Remove what was not used for so many days.")
+    ] = None,
+    keep_current: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="STUDY", help="Remove what this study, as it is now, has no use for; may be repeated."),
+    ] = None,
+    cache: CacheFolder = None,
+) -> None:
+    """Remove entries; with both options, those to which both apply. What is needed again is computed again."""
+    from pipeline.commands import cache as command
+
+    command.prune_cache(cache, older_than, keep_current or [])
+
+
+@cache_app.command("verify")
+def cache_verify(cache: CacheFolder = None) -> None:
+    """Compare every entry with the SHA-256 of what was written, and remove the damaged. Exit code 1: some were."""
+    from pipeline.commands import cache as command
+
+    command.verify_cache(cache)
+
+
 def main() -> None:
     """Run the command; an error the user can mend is a message, not a traceback."""
-    # One thread a process: many small matrices, and processes for the rest. Set before NumPy is imported.
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
+    threads.one_a_process()
     from pipeline.errors import PipelineError
 
     try:
@@ -213,9 +267,10 @@ def main() -> None:
 
         warn(f"steadyhand: {error}")
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
-        sys.exit(130)
+    except SystemExit as stop:
+        if stop.code == _INTERRUPTED:  # Typer makes this of Ctrl-C
+            print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
+        raise
     except OSError as error:
         where = error.filename or "a file"
         print(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache", file=sys.stderr)  # noqa: T201

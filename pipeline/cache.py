@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import ast
+import fcntl
 import hashlib
 import json
+import os
 import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -23,6 +25,8 @@ _MODULE_TEXT = re.compile(rf"(?:{'|'.join(_OURS)})(?:\.\w+)+")
 _DISTRIBUTIONS = {"yaml": "PyYAML", "mcap_ros2": "mcap-ros2-support"}
 _DATA_FILES = (".css", ".jinja", ".typ")
 _MANIFEST = "entry.json"
+_NEW = "new"
+_KEY_LENGTH = 64
 
 
 def digest_of(value: object) -> str:
@@ -127,20 +131,46 @@ class Cache:
         """The entry, or None if there is none or a file of it is missing or not what was written."""
         folder = self._folder(stage, key)
         try:
-            manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
-            for name, stated in manifest["files"].items():
-                path = folder / name
-                if path.stat().st_size != stated["size"] or file_digest(path) != stated["sha256"]:
-                    return None
-        except (OSError, ValueError, KeyError, TypeError):
+            entry = _read(folder)
+        except _DamagedError:
             return None
-        return Entry(folder, manifest["said"], manifest["content"])
+        with suppress(OSError):  # when it was last of use, for `prune`
+            os.utime(folder / _MANIFEST)
+        return entry
+
+    def fault(self, stage: str, key: str) -> str | None:
+        """What is wrong with an entry that is there; None where there is none, or nothing is wrong."""
+        return fault_of(self._folder(stage, key))
+
+    def entries(self) -> Iterator[Path]:
+        """The folders of all entries, whole or damaged: stage/xx/key."""
+        for folder in sorted(self.root.glob(f"*/??/{'?' * _KEY_LENGTH}")):
+            if folder.is_dir():
+                yield folder
+
+    def remnants(self) -> Iterator[Path]:
+        """What runs that were killed left behind, and what runs at work are writing now."""
+        with suppress(FileNotFoundError):
+            yield from sorted((self.root / _NEW).iterdir())
+
+    def remove(self, folder: Path) -> None:
+        """Remove an entry or a remnant. An entry goes at once, not file by file."""
+        with self._alone():
+            _discard(folder, self.root / _NEW)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Two runs must not take away what the other has just put in place."""
+        self.root.mkdir(parents=True, exist_ok=True)
+        with (self.root / "lock").open("a") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            yield
 
     @contextmanager
     def new(self, stage: str) -> Iterator[Path]:
         """A folder to fill; it is removed unless `keep` takes it over."""
-        (self.root / "new").mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=f"{stage}-", dir=self.root / "new"))
+        (self.root / _NEW).mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"{stage}-", dir=self.root / _NEW))
         try:
             yield folder
         finally:
@@ -158,15 +188,62 @@ class Cache:
         (folder / _MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
         final = self._folder(stage, key)
         final.parent.mkdir(parents=True, exist_ok=True)
-        there = self.get(stage, key)
-        if there is not None:
-            return there  # another run was first
-        shutil.rmtree(final, ignore_errors=True)
-        try:
-            folder.rename(final)
-        except OSError:
+        with self._alone():
             there = self.get(stage, key)
-            if there is None:
-                raise
-            return there
+            if there is not None:
+                return there  # another run was first
+            _discard(final, self.root / _NEW)
+            folder.rename(final)
         return Entry(final, dict(said), content)
+
+
+class _DamagedError(Exception):
+    """Why a folder is not a whole entry."""
+
+
+def last_used_s(folder: Path) -> float:
+    """When an entry was last of use, in seconds since 1970; of a folder that is none, when it was last changed."""
+    manifest = folder / _MANIFEST
+    return (manifest if manifest.is_file() else folder).stat().st_mtime
+
+
+def fault_of(folder: Path) -> str | None:
+    """What is wrong with the entry in a folder; None where nothing is, or there is none."""
+    if not folder.is_dir():
+        return None
+    try:
+        _read(folder)
+    except _DamagedError as damage:
+        return str(damage)
+    return None
+
+
+def _read(folder: Path) -> Entry:
+    """The entry in a folder, each file of it compared with the digest of what was written. Raises _DamagedError."""
+    try:
+        manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+        files, said, content = manifest["files"], manifest["said"], manifest["content"]
+        if digest_of([files, said]) != content or manifest["key"] != folder.name:
+            raise _DamagedError(f"{_MANIFEST} is not what was written")
+        for name, stated in files.items():
+            path = folder / name
+            if path.stat().st_size != stated["size"] or file_digest(path) != stated["sha256"]:
+                raise _DamagedError(f"{name} is not what was written")
+    except FileNotFoundError as error:
+        raise _DamagedError(f"{Path(error.filename).name} is missing") from None
+    except OSError as error:
+        raise _DamagedError(f"{Path(error.filename or folder).name} cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise _DamagedError(f"{_MANIFEST} cannot be read") from None
+    return Entry(folder, said, content)
+
+
+def _discard(folder: Path, trash: Path) -> None:
+    """Take a folder out of its place in one step, then remove it."""
+    if not folder.exists():
+        return
+    trash.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(prefix="gone-", dir=trash))
+    with suppress(FileNotFoundError):
+        folder.rename(aside / "it")
+    shutil.rmtree(aside, ignore_errors=True)

@@ -16,6 +16,10 @@ class SessionError(PipelineError):
     """One session cannot be used; the others go on. Its text is the reason in the exclusions."""
 
 
+class WorkerLostError(Exception):
+    """The process that computed something died of it, or was killed; its text says by what."""
+
+
 def did_you_mean(found: str, known: Iterable[str]) -> str:
     """`; did you mean "x"?` for the likeliest of the known words, else what there is to choose from."""
     words = list(known)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from pipeline.cache import Cache, Entry, code_digest, digest_of, file_digest
-from pipeline.errors import PipelineError, SessionError
+from pipeline.errors import PipelineError, SessionError, WorkerLostError
 from pipeline.stage import Outcome, Stage, Work
 from pipeline.study import Session, Study, find_sessions, load_study
 
@@ -48,7 +50,7 @@ class Result:
     """A study brought up to date: what each stage gave, by session, and what happened to the sessions.
 
     `sessions` are those that went through every stage. The entry of a stage of scope "study" stands under an empty
-    name.
+    name. `damaged` has stage, session and fault of each entry that was kept but could not be used any more.
     """
 
     folder: Path
@@ -59,6 +61,7 @@ class Result:
     set_aside: list[tuple[Session, str]] = field(default_factory=list)
     in_part: list[tuple[Session, str]] = field(default_factory=list)
     unused: list[tuple[str, str]] = field(default_factory=list)
+    damaged: list[tuple[str, str, str]] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -92,11 +95,7 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
     began = time.monotonic()
-    study = load_study(folder)
-    found = find_sessions(folder, study)
-    sessions = found.sessions
-    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
-    result.inputs = _input_digests(result.folder, study, sessions)
+    result, sessions = _before_the_stages(folder)
     for stage in stages:
         try:
             if stage.scope == "session":
@@ -122,6 +121,40 @@ def over_settings(
     entries = _entries(stage, result, works, means)
     result.seconds += time.monotonic() - began
     return [entries[at : at + len(settings)] for at in range(0, len(entries), len(settings))]
+
+
+def _before_the_stages(folder: Path) -> tuple[Result, list[Session]]:
+    study = load_study(folder)
+    found = find_sessions(folder, study)
+    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
+    result.inputs = _input_digests(result.folder, study, found.sessions)
+    return result, found.sessions
+
+
+def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[Path]:
+    """The folders of the entries that a run over the study would take from the cache; nothing is computed.
+
+    What follows from something that would have to be computed first cannot be known, and is not among them.
+    Raises PipelineError where the study is bad.
+    """
+    result, sessions = _before_the_stages(folder)
+    used: set[Path] = set()
+    complete = True
+    for stage in stages:
+        if stage.scope == "study" and not complete:
+            break
+        parts = [[session] for session in sessions] if stage.scope == "session" else [sessions]
+        entries = {}
+        for part in parts:
+            entry = cache.get(stage.name, _work(stage, result, part)[1])
+            if entry is not None:
+                entries[part[0].id if stage.scope == "session" else ""] = entry
+        used |= {entry.folder for entry in entries.values()}
+        complete = complete and len(entries) == len(parts)
+        result.entries[stage.name] = entries
+        if stage.scope == "session":
+            sessions = _still_usable(result, [one for one in sessions if one.id in entries], entries)
+    return used
 
 
 def _with_context(folder: Path, result: Result, message: str) -> str:
@@ -152,10 +185,8 @@ def _declared(study: Study, stage: Stage) -> Study:
 
 def _settings(study: Study, stage: Stage) -> Any:
     # Order matters in mappings too: it is the order in which streams and estimators are shown.
-    return (
-        json.loads(study.model_dump_json(include=set(stage.settings))),
-        [list(getattr(study, name)) for name in ("streams", "estimators") if name in stage.settings],
-    )
+    ordered = [list(getattr(study, name)) for name in ("streams", "estimators") if name in stage.settings]
+    return json.loads(study.model_dump_json(include=set(stage.settings))), ordered
 
 
 def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
@@ -197,6 +228,9 @@ def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Wo
     return work, key
 
 
+_Missing = tuple[Session, Work, str]  # with the key of the result
+
+
 def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[Entry]:
     return [found[""]] if "" in found else [found[session.id] for session in sessions if session.id in found]
 
@@ -210,35 +244,94 @@ def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], mea
 def _entries(stage: Stage, result: Result, works: Sequence[tuple[Work, str]], means: Means) -> list[Entry]:
     """The entry of each piece of work with its key, each key computed once, where the cache has none."""
     found: dict[str, Entry] = {}
-    missing: dict[str, Work] = {}
+    missing: dict[str, _Missing] = {}
     for work, key in works:
         if key in found or key in missing:
             continue
-        entry = means.cache.get(stage.name, key)
+        entry = _look_up(stage, key, work.session.id, result, means.cache)
         if entry is None:
-            missing[key] = work
+            missing[key] = (work.session, work, key)
         else:
             found[key] = entry
     result.computed[stage.name] = len(missing)
     if missing:
+        means.cache.root.mkdir(parents=True, exist_ok=True)  # a worker elsewhere looks whether it is there
         means.progress.begin(stage.name, len(missing))
-        waiting = {
-            means.executor.submit(compute, stage, work, key, means.cache.root): key for key, work in missing.items()
-        }
-        try:
-            for future in as_completed(waiting):
-                found[waiting[future]] = future.result()
-                means.progress.advance()
-        finally:
-            for future in waiting:
-                future.cancel()
+        for key, entry in _computed(stage, list(missing.values()), means):
+            found[key] = entry
+            means.progress.advance()
         means.progress.end()
     return [found[key] for _, key in works]
 
 
+def _computed(stage: Stage, missing: Sequence[_Missing], means: Means) -> Iterator[tuple[str, Entry]]:
+    """Entries by their keys, as they are done.
+
+    A session whose worker died is tried once more after the others, by itself: it may have been another's doing, or
+    the machine's. If it is lost again, it is set aside, and tried again in the next run.
+    """
+    lost: list[_Missing] = []
+    waiting: dict[Future[Entry], _Missing] = {}
+    try:
+        for done in _as_completed(stage, missing, means, waiting):
+            try:
+                yield waiting[done][2], _at_hand(done.result())
+            except WorkerLostError:
+                lost.append(waiting[done])
+    finally:
+        for future in waiting:
+            future.cancel()
+    for _, work, key in lost:
+        try:
+            entry = means.executor.submit(compute, stage, work, key, means.cache.root).result()
+        except WorkerLostError as error:
+            reason = f"the process that computed {stage.name} died twice ({error}); its memory may not have sufficed"
+            entry = _keep_unusable(means.cache, stage, key, reason)
+        yield key, _at_hand(entry)
+
+
+def _as_completed(
+    stage: Stage, missing: Sequence[_Missing], means: Means, waiting: dict[Future[Entry], _Missing]
+) -> Iterator[Future[Entry]]:
+    """Submit all, each noted in `waiting`; futures as they are done, those of this process between submissions."""
+    at_once = set()
+    for one in missing:
+        future = means.executor.submit(compute, stage, *one[1:], means.cache.root)
+        waiting[future] = one
+        if future.done():
+            at_once.add(future)
+            yield future
+    yield from as_completed(waiting.keys() - at_once)
+
+
+def _at_hand(entry: Entry) -> Entry:
+    """An entry that another machine may have computed."""
+    if not entry.folder.is_dir():
+        raise PipelineError(
+            f"{entry.folder}: was computed by a worker and is not here; put --cache on a file system that all share"
+        )
+    return entry
+
+
+def _keep_unusable(cache: Cache, stage: Stage, key: str, reason: str) -> Entry:
+    """That a session cannot be used, under a key of its own, so that the next run tries again."""
+    with cache.new(stage.name) as out:
+        return cache.keep(stage.name, digest_of([key, reason]), out, asdict(Outcome(set_aside=reason)))
+
+
+def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache) -> Entry | None:
+    """What the cache has. That an entry is damaged is noted: it will be computed again."""
+    entry = cache.get(stage.name, key)
+    if entry is None:
+        fault = cache.fault(stage.name, key)
+        if fault is not None:
+            result.damaged.append((stage.name, session, fault))
+    return entry
+
+
 def _run_study(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> Entry:
     work, key = _work(stage, result, sessions)
-    entry = means.cache.get(stage.name, key)
+    entry = _look_up(stage, key, "", result, means.cache)
     result.computed[stage.name] = int(entry is None)
     if entry is None:
         means.progress.begin(stage.name, 1)
@@ -256,20 +349,34 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
     """
     cache = Cache(cache_root)
     module, name = stage.function.split(":")
-    with cache.new(stage.name) as out:
-        try:
-            outcome = getattr(import_module(module), name)(replace(work, out=out))
-        except SessionError as error:
-            outcome = Outcome(set_aside=str(error))
-        except PipelineError:
-            raise
-        except Exception as error:
-            if stage.scope != "session":
+    try:
+        with cache.new(stage.name) as out:
+            try:
+                outcome = getattr(import_module(module), name)(replace(work, out=out))
+            except SessionError as error:
+                outcome = Outcome(set_aside=str(error))
+            except PipelineError:
                 raise
-            fault = f"{type(error).__name__}: {error}"
-            outcome = Outcome(set_aside=f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}")
-            key = digest_of([key, fault])
-        return cache.keep(stage.name, key, out, asdict(outcome))
+            except Exception as error:
+                if stage.scope != "session" or _is_full(error):
+                    raise
+                fault = f"{type(error).__name__}: {error}"
+                reason = f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}"
+                return _keep_unusable(cache, stage, key, reason)
+            return cache.keep(stage.name, key, out, asdict(outcome))
+    except OSError as error:
+        if not _is_full(error):
+            raise
+        raise PipelineError(
+            f"{cache_root}: cannot be written any more: {os.strerror(error.errno or 0)}; make room"
+            " (`steadyhand cache prune` may) or name another place with --cache; what was computed is kept, run it"
+            " again to go on"
+        ) from None
+
+
+def _is_full(error: Exception) -> bool:
+    """A disk without room, or none to write to: no session's fault."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
 
 def _still_usable(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:

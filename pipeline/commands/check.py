@@ -46,7 +46,14 @@ class Change:
     relative: str = NOTHING
 
 
-def check(studies: Sequence[Path], accept: bool, junit_file: Path | None, jobs: int | None, cache: Path | None) -> None:
+def check(
+    studies: Sequence[Path],
+    accept: bool,
+    junit_file: Path | None,
+    jobs: int | None,
+    cache: Path | None,
+    executor: str,
+) -> None:
     """Compare each study with its expected.json, or write it; exit with 3 where a number moved."""
     if junit_file is not None:
         if accept:
@@ -77,7 +84,7 @@ def check(studies: Sequence[Path], accept: bool, junit_file: Path | None, jobs: 
         name = folder.resolve().name
         suites.append(Suite(name, [Case(name, "can be checked", _headed(str(error)), broken=True)]))
 
-    code = for_each(studies, COMPARE, jobs, cache, compare, failed=failed)
+    code = for_each(studies, COMPARE, jobs, cache, compare, failed=failed, where=executor)
     if junit_file is not None:
         junit.write(junit_file, suites)
     sys.exit(code)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,13 +14,15 @@ from pipeline.cache import Cache
 from pipeline.commands import console
 from pipeline.commands.publish import publish, publish_results, refuse_study
 from pipeline.commands.summary import summary
-from pipeline.errors import PipelineError
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.executors import Processes
 from pipeline.runner import InThisProcess, Means, Result, bring_up_to_date
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, STAGES
 
 _CLONE = Path(__file__).resolve().parents[2]
 CACHE_FOLDER = ".steadyhand-cache"
+PROCESS, INLINE, DASK = "process", "inline", "dask"
 
 
 def reports_folder() -> Path:
@@ -30,20 +32,39 @@ def reports_folder() -> Path:
 
 def cache_in(folder: Path | None) -> Cache:
     """The cache in a folder, or beside the reports."""
-    return Cache(folder if folder is not None else reports_folder().parent / CACHE_FOLDER)
+    return Cache((folder if folder is not None else reports_folder().parent / CACHE_FOLDER).resolve())
 
 
 @contextmanager
-def executor_of(jobs: int | None) -> Iterator[Executor]:
-    """This process for one job, a pool of processes for more; no process starts before there is work."""
-    count = jobs or os.cpu_count() or 1
-    if count == 1:
-        yield InThisProcess()
-        return
-    import multiprocessing
+def executor_of(jobs: int | None, where: str = PROCESS) -> Iterator[Executor]:
+    """What computes, by its name; no process of this machine's pool starts before there is work.
 
-    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield pool
+    Raises PipelineError where the name is none of ours, or Dask is not installed or does not answer.
+    """
+    count = jobs or os.cpu_count() or 1
+    if where == INLINE or (where == PROCESS and count == 1):
+        yield InThisProcess()
+    elif where == PROCESS:
+        with Processes(count) as processes:
+            yield processes
+    elif where == DASK or (where.startswith(f"{DASK}://") and where != f"{DASK}://"):
+        _require_dask(where)
+        from pipeline.dask_cluster import on_dask
+
+        with on_dask(where.partition("://")[2] or None, count, console.warn) as cluster:
+            yield cluster
+    else:
+        known = (PROCESS, INLINE, DASK, f"{DASK}://host:port")
+        raise PipelineError(f'--executor: there is no "{where}"{did_you_mean(where, known)}')
+
+
+def _require_dask(where: str) -> None:
+    try:
+        import distributed  # noqa: F401 - whether it is there
+    except ImportError:
+        raise PipelineError(
+            f'--executor {where}: Dask is not installed here; install it with: pip install "steadyhand[dask]"'
+        ) from None
 
 
 def for_each(
@@ -55,17 +76,20 @@ def for_each(
     *,
     failed: Callable[[Path, PipelineError], None] = lambda _folder, _error: None,
     bring: Callable[[Path, Sequence[Stage], Means], Result] = bring_up_to_date,
+    where: str = PROCESS,
 ) -> int:
     """Bring each study up to date and do with it what `then` does; the highest of the exit codes.
 
     A study with which either cannot be done is said, handed to `failed`, and does not stop the others.
     """
     code = 0
-    with executor_of(jobs) as executor:
+    with executor_of(jobs, where) as executor:
         for folder in studies:
             try:
                 with console.progress() as progress:
                     result = bring(folder, stages, Means(cache_in(cache), executor, progress))
+                for line in _mended(result):
+                    console.warn(line)
                 code = max(code, then(folder, result))
             except PipelineError as error:
                 console.warn(f"steadyhand: {error}")
@@ -90,18 +114,23 @@ def refuse_same_names(studies: Sequence[Path]) -> list[str]:
     return names
 
 
-def report(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None) -> None:
+def report(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None, executor: str) -> None:
     """Write reports; exit with 1 where some session was set aside or read in part."""
-    _run(studies, STAGES, out, jobs, cache)
+    _run(studies, STAGES, out, jobs, cache, executor)
 
 
-def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None) -> None:
+def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None, executor: str) -> None:
     """Write results.json only."""
-    _run(studies, COMPARE, out, jobs, cache)
+    _run(studies, COMPARE, out, jobs, cache, executor)
 
 
 def _run(
-    studies: Sequence[Path], stages: Sequence[Stage], out: Path | None, jobs: int | None, cache: Path | None
+    studies: Sequence[Path],
+    stages: Sequence[Stage],
+    out: Path | None,
+    jobs: int | None,
+    cache: Path | None,
+    executor: str,
 ) -> None:
     folders = dict(zip(studies, _out_folders(studies, out), strict=True))
     for folder in folders.values():
@@ -118,7 +147,14 @@ def _run(
         console.say(what_was_done(result))
         return result.exit_code
 
-    sys.exit(for_each(studies, stages, jobs, cache, write))
+    sys.exit(for_each(studies, stages, jobs, cache, write, where=executor))
+
+
+def _mended(result: Result) -> Iterator[str]:
+    """A line a damaged entry of the cache."""
+    for stage, session, fault in result.damaged:
+        which = f"{stage} of session {session}" if session else stage
+        yield f"{result.name}: what was kept of {which} was damaged ({fault}), and has been computed again"
 
 
 def what_befell(result: Result) -> Iterator[str]:

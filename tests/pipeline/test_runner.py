@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -67,6 +65,7 @@ def test_a_second_report_says_that_nothing_was_computed(study: Path, steadyhand:
     [
         ("title: T", "title: Another", {"compare"}),
         ("fusion: {type: window_gp}", "fusion: {type: window_gp, window: 3}", {"fuse", "assess", "measure", "compare"}),
+        ("raw: {type: raw}", "raw: {type: raw}\n  holt: {type: holt}", {"fuse", "assess", "measure", "compare"}),
         ("title: T", "title: T\nalpha: 0.01", {"compare"}),
         ("raw: {type: raw}", "held: {type: raw}", {"fuse", "assess", "measure", "compare"}),
         ("title: T", "title: T\ndisplay: {px_per_mm: 10}", {"measure", "compare"}),
@@ -128,14 +127,6 @@ def test_a_damaged_entry_is_computed_again(update: Callable[[], Result]) -> None
     (entry / "tracks.parquet").write_bytes(b"half")
     assert update().computed["fuse"] == 1
     assert update().computed["fuse"] == 0
-
-
-def test_processes_give_the_same_entries_as_this_process(study: Path, tmp_path: Path) -> None:
-    here = bring_up_to_date(study, COMPARE, Means(Cache(tmp_path / "one"), InThisProcess(), PlainLines()))
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        there = bring_up_to_date(study, COMPARE, Means(Cache(tmp_path / "two"), pool, PlainLines()))
-    for stage, entries in here.entries.items():
-        assert {key: e.content for key, e in entries.items()} == {k: e.content for k, e in there.entries[stage].items()}
 
 
 def test_a_fault_of_ours_in_one_session_is_said_and_tried_again(

@@ -1,0 +1,79 @@
+"""`cache`: show, prune and verify what is kept."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.cache import Cache
+from pipeline.commands import console
+from pipeline.commands.run import cache_in
+from pipeline.errors import PipelineError
+from pipeline.runner import current_entries
+from pipeline.stages import STAGES
+from pipeline.upkeep import Held, held, prune, verify
+
+_DAY_S = 24 * 3600.0
+_MB = 1e6
+DAMAGED = 1  # the exit code
+
+
+def show(folder: Path | None) -> None:
+    """A line a stage: entries, size, and how long ago the one used least recently was of use."""
+    cache = _existing(folder)
+    found = list(held(cache))
+    order = [stage.name for stage in STAGES]
+    stages = sorted({one.stage for one in found}, key=lambda name: (not name, name not in order, order.index(name)))
+    console.say(f"{cache.root}: {_amount(found)}")
+    lines = []
+    for stage in stages:
+        of_stage = [one for one in found if one.stage == stage]
+        oldest, newest = (_days_ago(pick(one.used_s for one in of_stage)) for pick in (min, max))
+        lines.append((stage or "(unfinished)", str(len(of_stage)), _megabytes(of_stage), oldest, newest))
+    if lines:
+        console.table(("stage", "entries", "MB", "longest unused, days", "last used, days ago"), lines)
+
+
+def prune_cache(folder: Path | None, older_than_days: float | None, studies: Sequence[Path]) -> None:
+    """Remove what was not used for some days, or what the studies as they are now have no use for."""
+    if older_than_days is None and not studies:
+        raise PipelineError("cache prune: say what may go: --older-than DAYS, --keep-current STUDY, or both")
+    cache = _existing(folder)
+    keep = set[Path]().union(*(current_entries(study, STAGES, cache) for study in studies)) if studies else None
+    unused_s = None if older_than_days is None else older_than_days * _DAY_S
+    gone = prune(cache, time.time(), unused_s, keep)
+    console.say(f"Removed {_amount(gone.removed)}; {_amount(gone.left)} left.")
+
+
+def verify_cache(folder: Path | None) -> None:
+    """Exit with 1 where an entry was damaged; it is removed, and computed again when it is needed."""
+    cache = _existing(folder)
+
+    def say(one: Held, fault: str) -> None:
+        console.warn(f"{one.folder.relative_to(cache.root)}: damaged, removed: {fault}")
+
+    gone = verify(cache, say)
+    whole = [one for one in gone.left if one.stage]
+    console.say(f"{_amount(whole)} whole, {len(gone.removed)} damaged and removed.")
+    sys.exit(DAMAGED if gone.removed else 0)
+
+
+def _existing(folder: Path | None) -> Cache:
+    cache = cache_in(folder)
+    if not cache.root.is_dir():
+        raise PipelineError(f"{cache.root}: there is no cache; name its folder with --cache")
+    return cache
+
+
+def _amount(found: Sequence[Held]) -> str:
+    return f"{len(found)} {'entry' if len(found) == 1 else 'entries'} ({_megabytes(found)} MB)"
+
+
+def _megabytes(found: Sequence[Held]) -> str:
+    return f"{sum(one.size for one in found) / _MB:.1f}"
+
+
+def _days_ago(used_s: float) -> str:
+    return f"{max(time.time() - used_s, 0.0) / _DAY_S:.1f}"

@@ -1,0 +1,137 @@
+"""Sessions computed by the workers of a Dask cluster. Imports Dask, so it is imported only where Dask is asked for."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Executor, Future
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import dask
+from distributed import Client, LocalCluster, WorkerPlugin
+from distributed.scheduler import KilledWorker
+
+from pipeline import threads
+from pipeline.cache import code_digest
+from pipeline.errors import PipelineError, WorkerLostError
+from pipeline.stage import Work
+
+_STAGES = "pipeline.stages"  # its digest follows the code of every stage
+_CONNECT_S = 10.0
+_LEAVE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # to the process that started us
+
+
+class OneThread(WorkerPlugin):
+    """Tells a worker, before it imports NumPy for us, to keep numeric libraries from starting threads."""
+
+    name = "steadyhand-one-thread"
+
+    def setup(self, worker: Any) -> None:
+        """Also where a worker is started anew."""
+        threads.one_a_process()
+
+
+class OnDask(Executor):
+    """The workers of a cluster. Dask itself hands on the work of one that died."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._code = code_digest(_STAGES)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute on some worker, if its code is the same as here and it sees the folders."""
+        folders = [arg.folder if isinstance(arg, Work) else arg for arg in args if isinstance(arg, Work | Path)]
+        asked = self._client.submit(_guarded, self._code, folders, fn, args, kwargs, pure=False)
+        future = _Asked(asked)
+        asked.add_done_callback(future.take)
+        return future
+
+
+class _Asked(Future[Any]):
+    """A future of Python's for one of Dask's."""
+
+    def __init__(self, asked: Any) -> None:
+        super().__init__()
+        self._asked = asked
+
+    def cancel(self) -> bool:
+        """Let go of it here and there."""
+        cancelled = super().cancel()
+        if cancelled:
+            self._asked.cancel()
+        return cancelled
+
+    def take(self, asked: Any) -> None:
+        """The outcome, once Dask has it."""
+        if not self.set_running_or_notify_cancel():
+            return
+        try:
+            self.set_result(asked.result())
+        except KilledWorker:
+            self.set_exception(WorkerLostError("several workers died of it"))
+        except (CancelledError, ConnectionError, TimeoutError):
+            self.set_exception(PipelineError("the Dask scheduler went away; what was computed is kept, run it again"))
+        except ImportError as error:
+            self.set_exception(_other_code(f"one cannot import {error.name}"))
+        except Exception as error:  # noqa: BLE001 - handed on by the future
+            self.set_exception(error)
+
+
+def _guarded(
+    code: str, folders: list[Path], fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> Any:
+    """Call it, on a worker that gives the same result as the process that asks would."""
+    if code_digest(_STAGES) != code:
+        raise _other_code("their code, Python or libraries differ")
+    for folder in folders:
+        if not folder.is_dir():
+            raise PipelineError(
+                f"--executor dask: a worker does not see {folder}; put the studies and --cache on a file system that"
+                " all workers share, under the same path"
+            )
+    return fn(*args, **kwargs)
+
+
+def _other_code(found: str) -> PipelineError:
+    return PipelineError(
+        f"--executor dask: the workers do not run the same Steadyhand as this command: {found}; install the same"
+        " version with the same libraries on them, and start them anew"
+    )
+
+
+@contextmanager
+def on_dask(address: str | None, count: int, say: Callable[[str], None]) -> Iterator[Executor]:
+    """The executor of the scheduler at an address, or of a cluster of `count` processes of this machine.
+
+    Raises PipelineError where no scheduler answers.
+    """
+    for name in filter(re.compile(r"distributed\b").match, [*logging.root.manager.loggerDict]):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is raised as well
+    with ExitStack() as open_until_done:
+        if address is None:
+            # A session that kills its worker is tried again by itself; the others need not wait for it long.
+            open_until_done.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 1}))
+            cluster = LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+                preload=_LEAVE_CTRL_C,
+            )
+            open_until_done.enter_context(cluster)
+            client = Client(cluster)
+        else:
+            try:
+                client = Client(f"tcp://{address}", timeout=_CONNECT_S)
+            except (OSError, ValueError) as error:
+                raise PipelineError(
+                    f"--executor dask://{address}: no Dask scheduler answers there ({error}); start one with:"
+                    " dask scheduler"
+                ) from None
+        open_until_done.enter_context(client)
+        client.register_plugin(OneThread())
+        say(f"Dask's dashboard: {client.dashboard_link}")
+        yield OnDask(client)
