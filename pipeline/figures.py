@@ -27,6 +27,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _GREY = "#6b757d"
 _WIDTH = 7.2  # inches: a page's text
 _NAME_LENGTH = 32
+_LABEL_PIXELS = 14  # closer marks have one label
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -405,14 +406,20 @@ def trade_off(means: pd.DataFrame) -> Figure:
 
 
 def _ranks(axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
-    """Each mark's rank beside it; marks that lie on one another share a label."""
+    """Each mark's rank beside it; marks that all but touch share a label."""
     known = values.notna().to_numpy(bool)
     points = np.column_stack([means["rmse_mm"], values])[known]
-    at: dict[tuple[int, ...], list[int]] = {}
-    for index, pixel in enumerate(axes.transData.transform(points)):
-        at.setdefault(tuple(np.rint(pixel / 8).astype(int)), []).append(index)
+    pixels = axes.transData.transform(points)
+    groups: list[list[int]] = []
+    for index, pixel in enumerate(pixels):
+        near = (group for group in groups if np.hypot(*(pixels[group[0]] - pixel)) < _LABEL_PIXELS)
+        group = next(near, None)
+        if group is None:
+            groups.append([index])
+        else:
+            group.append(index)
     ranks = means["rank"].to_numpy()[known]
-    for together in at.values():
+    for together in groups:
         label = ", ".join(str(ranks[index]) for index in together)
         axes.annotate(label, tuple(points[together[0]]), (6, 5), textcoords="offset points", fontsize=8)
 

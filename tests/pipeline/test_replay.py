@@ -146,6 +146,8 @@ def test_the_report_ranks_and_says_everything(study: Path, steadyhand: Steadyhan
     assert "fusion[window=3]" in page
     assert "Tried &lt;again&gt; &amp; again" in page
     assert "data:image/svg" in page
+    assert "At the selections" in page
+    assert {row["selection_n"] for row in means} == {2}
     assert "fusion[window=3]" in ran.out
     for name in ("accuracy", "replay_trials", "replay_means", "replay_exclusions"):
         assert (steadyhand.out / f"{name}.parquet").is_file()
