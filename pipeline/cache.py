@@ -163,7 +163,8 @@ class Cache:
         """Two runs must not take away what the other has just put in place."""
         self.root.mkdir(parents=True, exist_ok=True)
         with (self.root / "lock").open("a") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
+            with suppress(OSError):  # some network file systems have no locks; renames are whole even so
+                fcntl.flock(file, fcntl.LOCK_EX)
             yield
 
     @contextmanager
