@@ -22,7 +22,8 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
 
     def then(folder: Path, result: Result) -> int:
         recordings = {
-            session: recording.load(result.study, entry.folder) for session, entry in result.entries["ingest"].items()
+            session.id: recording.load(result.study, result.entries["ingest"][session.id].folder)
+            for session in result.sessions
         }
         if not recordings:
             raise PipelineError(f"{folder}: has no logs to fit to")
