@@ -36,13 +36,6 @@ def rotations(quaternion_xyzw: FloatArray) -> FloatArray:
     return np.stack(columns, axis=2)
 
 
-def tracker_acceleration(
-    specific_force_mm_s2: FloatArray, quaternion_xyzw: FloatArray, gravity_mm_s2: FloatArray
-) -> FloatArray:
-    """Acceleration (n, 3) in the tracker frame: a = R f + g. At rest f points up and a is zero."""
-    return rotate(quaternion_xyzw, specific_force_mm_s2) + gravity_mm_s2
-
-
 def carried(
     time: FloatArray, quaternion_xyzw: FloatArray, angular_velocity_rad_s: FloatArray, longest_s: float = 1.0
 ) -> FloatArray:

@@ -38,7 +38,7 @@ class Body:
     gravity_mm_s2: FloatArray
 
     def acceleration(self) -> Samples:
-        """In the tracker's frame."""
+        """In the tracker's frame: a = R f + g. At rest f points up and a is zero."""
         value = np.einsum("nij,nj->ni", self.rotation, self.force_mm_s2) + self.gravity_mm_s2
         return Samples(self.time, self.arrival, value, self.rotation)
 

@@ -16,7 +16,7 @@ from fusion_core.event_time import EventTime
 from fusion_core.fixed_gain import FixedGain
 from fusion_core.motion import Matern72, Prior, Wiener
 from fusion_core.samples import FloatArray, Sample, Samples, Track
-from fusion_core.sensors import Sensor, position_sensor, require_fit
+from fusion_core.sensors import Sensor, position_sensor, require_covered, require_fit
 
 _BIASED = 2  # the order of derivative whose sensors have a bias: accelerometers
 
@@ -69,12 +69,7 @@ class FusionKalman:
         require_one_of("prior", self.prior, ("wiener", "matern72"))
         require_one_of("bias_frame", self.bias_frame, ("body", "tracker"))
         require_one_of("path", self.path, ("event_time", "fixed_gain"))
-        for name, sensor in self.sensors.items():
-            if sensor.latency_s > self.history_s:
-                raise ValueError(
-                    f"history_s must cover the latency of every sensor: {name} is {sensor.latency_s} s late, "
-                    f"history_s is {self.history_s}"
-                )
+        require_covered(self.sensors, "history_s", self.history_s)
         _ = self.steps  # what does not fit together is an error now, not at the first reading
 
     @property

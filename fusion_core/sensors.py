@@ -108,3 +108,13 @@ def require_fit(sensors: Mapping[str, Sensor]) -> int:
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
     return dimension
+
+
+def require_covered(sensors: Mapping[str, Sensor], name: str, span_s: float) -> None:
+    """ValueError that names the sensor that is later than the span that an estimator keeps, its parameter `name`."""
+    for late, sensor in sensors.items():
+        if sensor.latency_s > span_s:
+            raise ValueError(
+                f"{name} must cover the latency of every sensor: {late} is {sensor.latency_s} s late, "
+                f"{name} is {span_s}"
+            )

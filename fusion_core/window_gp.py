@@ -14,7 +14,7 @@ from fusion_core.checks import require_not_negative, require_one_of, require_pos
 from fusion_core.estimator import replay_loop, require_reading, require_readings, unknown
 from fusion_core.kernels import IntArray, SquaredExponential
 from fusion_core.samples import FloatArray, Sample, Samples, Track
-from fusion_core.sensors import Sensor, Term, position_sensor, require_fit
+from fusion_core.sensors import Sensor, Term, position_sensor, require_covered, require_fit
 
 _ACCELERATION = 2
 _CHUNK_NUMBERS = 4_000_000  # covariance entries held at once: 32 MB
@@ -72,12 +72,7 @@ class WindowGP:
         require_positive(horizon_s=self.horizon_s, difference_step_s=self.difference_step_s)
         require_not_negative(bias_sd_mm_s2=self.bias_sd_mm_s2)
         SquaredExponential(self.signal_variance_mm2, self.inverse_scale_s2)
-        for name, sensor in self.sensors.items():
-            if sensor.latency_s > self.horizon_s:
-                raise ValueError(
-                    f"horizon_s must cover the latency of every sensor: {name} is {sensor.latency_s} s late, "
-                    f"horizon_s is {self.horizon_s}"
-                )
+        require_covered(self.sensors, "horizon_s", self.horizon_s)
 
     @cached_property
     def _kernel(self) -> SquaredExponential:
