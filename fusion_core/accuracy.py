@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from fusion_core import lag_steps
 from fusion_core.samples import FloatArray, Samples
 
 BoolArray = npt.NDArray[np.bool_]
@@ -75,8 +76,14 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     and does not count.
     """
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
-    distance = np.stack(
-        [np.sum((estimate - interpolate(reference, time - shift)) ** 2, axis=1) for shift in shifts], axis=1
+    order = np.argsort(reference.time, kind="stable")
+    distance = lag_steps.squared_distances(
+        np.asarray(time, dtype=np.float64),
+        np.ascontiguousarray(estimate, dtype=np.float64),
+        np.asarray(reference.time[order], dtype=np.float64),
+        np.ascontiguousarray(reference.value[order], dtype=np.float64),
+        shifts,
+        GAP_S,
     )
     usable = np.isfinite(distance).all(axis=1)
     if not usable.any() or np.ptp(time[usable]) < 1.0:
@@ -90,9 +97,7 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     cumulative = np.vstack([np.zeros(len(shifts)), np.cumsum(distance, axis=0)])
     sums = cumulative[block:] - cumulative[:-block]
     picks = random.integers(len(sums), size=(_RESAMPLES, max(1, len(distance) // block)))
-    resampled = np.zeros((_RESAMPLES, len(shifts)))
-    for column in picks.T:
-        resampled += sums[column]
+    resampled = lag_steps.resampled(sums, picks)
     resampled = resampled[~_flat(resampled)]
     if len(resampled) < _RESAMPLES // 2:
         return Interval(float(whole), np.nan, np.nan)
