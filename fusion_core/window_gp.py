@@ -9,14 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from fusion_core import window_steps
+from fusion_core import window_gains, window_steps
 from fusion_core.checks import require_not_negative, require_one_of, require_positive
 from fusion_core.estimator import replay_loop, require_reading, require_readings, unknown
-from fusion_core.kernels import IntArray, SquaredExponential
+from fusion_core.kernels import IntArray
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, Term, position_sensor, require_covered, require_fit
 
 _ACCELERATION = 2
+_MEANS = {"zero": window_gains.ZERO, "constant": window_gains.CONSTANT, "window": window_gains.WINDOW}
 _CHUNK_NUMBERS = 4_000_000  # covariance entries held at once: 32 MB
 _MOST_SETS = 64  # of patterns
 _MOST_PATTERNS = 4096  # of regular windows whose weights are remembered
@@ -71,12 +72,8 @@ class WindowGP:
         require_one_of("path", self.path, ("auto", "event_time"))
         require_positive(horizon_s=self.horizon_s, difference_step_s=self.difference_step_s)
         require_not_negative(bias_sd_mm_s2=self.bias_sd_mm_s2)
-        SquaredExponential(self.signal_variance_mm2, self.inverse_scale_s2)
+        require_positive(signal_variance_mm2=self.signal_variance_mm2, inverse_scale_s2=self.inverse_scale_s2)
         require_covered(self.sensors, "horizon_s", self.horizon_s)
-
-    @cached_property
-    def _kernel(self) -> SquaredExponential:
-        return SquaredExponential(self.signal_variance_mm2, self.inverse_scale_s2)
 
     @cached_property
     def _tracker(self) -> str:
@@ -100,56 +97,32 @@ class WindowGP:
         `lag` (…, m) is each reading's time minus now in s, `names` the m sensors. Returns weights (…, m) and variance
         (…). With a constant mean the weights of positions sum to 1.
         """
-        terms = [(row, term) for row, name in enumerate(names) for term in self._terms(name)]
-        owner = np.array([row for row, _ in terms])
-        order = np.array([term.derivative for _, term in terms])
-        weight = np.array([term.weight for _, term in terms])
-        at = lag[..., owner] + np.array([term.at_s for _, term in terms])
-        now, zero = np.zeros((*lag.shape[:-1], 1)), np.zeros(1, np.int64)
-        among = self._kernel.covariance(at, order, at, order)
-        with_now = self._kernel.covariance(at, order, now, zero)
-        observe = np.zeros((len(names), len(terms)))
-        observe[owner, np.arange(len(terms))] = weight
-        if not np.array_equal(observe, np.eye(len(names))):
-            among, with_now = observe @ among @ observe.T, observe @ with_now
-        constant = observe @ (order == 0)
-        solved = self._solved(among + self._noise(names), with_now, constant)
-        return self._with_mean(*solved, with_now[..., 0], constant, names)
+        index = np.array([self._index[name] for name in names], np.int64)
+        flat = np.ascontiguousarray(lag, dtype=np.float64).reshape(-1, len(names))
+        weights, variance = window_gains.gains(self._prior, flat, index)
+        return weights.reshape(lag.shape), variance.reshape(lag.shape[:-1])
 
-    def _noise(self, names: Sequence[str]) -> FloatArray:
-        """The readings' own covariance: noise, and what an accelerometer's bias makes its readings share."""
-        noise: FloatArray = np.diag([self.sensors[name].noise_sd ** 2 for name in names]).astype(np.float64)
-        if self.bias_sd_mm_s2 > 0:
-            for biased in {name for name in names if self.sensors[name].order == _ACCELERATION}:
-                mask = np.array([name == biased for name in names])
-                noise += self.bias_sd_mm_s2**2 * np.outer(mask, mask)
-        return noise
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.sensors)}
 
-    @staticmethod
-    def _solved(among: FloatArray, with_now: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
-        columns = np.broadcast_to(constant[:, None], with_now.shape)
-        solved = np.linalg.solve(among, np.concatenate([with_now, columns], axis=-1))
-        return solved[..., 0], solved[..., 1]
-
-    def _with_mean(
-        self,
-        weights: FloatArray,
-        constant_weights: FloatArray,
-        with_now: FloatArray,
-        constant: FloatArray,
-        names: Sequence[str],
-    ) -> tuple[FloatArray, FloatArray]:
-        """Weights and variance with what the prior's mean adds to them."""
-        variance = self.signal_variance_mm2 - np.sum(with_now * weights, axis=-1)
-        missing = 1.0 - weights @ constant
-        if self.mean == "constant":
-            precision = constant_weights @ constant
-            weights = weights + constant_weights * (missing / precision)[..., None]
-            variance = variance + missing**2 / precision
-        elif self.mean == "window":
-            is_position = np.array([name == self._tracker for name in names])
-            weights = weights + missing[..., None] * (is_position / is_position.sum())
-        return weights, variance
+    @cached_property
+    def _prior(self) -> window_gains.Prior:
+        terms = [self._terms(name) for name in self.sensors]
+        flat = [term for own in terms for term in own]
+        accelerations = np.array([sensor.order == _ACCELERATION for sensor in self.sensors.values()])
+        return window_gains.Prior(
+            float(self.signal_variance_mm2),
+            float(self.inverse_scale_s2),
+            _MEANS[self.mean],
+            noise_variance=np.array([sensor.noise_sd**2 for sensor in self.sensors.values()], np.float64),
+            bias_variance=np.where(accelerations, self.bias_sd_mm_s2**2, 0.0),
+            is_tracker=np.array([name == self._tracker for name in self.sensors]),
+            begins=np.cumsum([0, *map(len, terms)]),
+            weight=np.array([term.weight for term in flat], np.float64),
+            derivative=np.array([term.derivative for term in flat], np.int64),
+            at_s=np.array([term.at_s for term in flat], np.float64),
+        )
 
     def start(self) -> Window:
         """An empty window."""
