@@ -15,18 +15,20 @@ from pathlib import Path
 _PACKAGE = Path(__file__).parent
 
 
-def keep_apart() -> None:
+def keep_apart(package: Path = _PACKAGE) -> None:
     """Set Numba's cache folder to one of the sources' own, and remove those of earlier sources.
 
-    Must come before any function is compiled. A folder that the user set (NUMBA_CACHE_DIR) is left alone.
+    Must come before any function of `package`, a folder, is compiled; its sources and those of this package count. A
+    folder that the user set (NUMBA_CACHE_DIR) is left alone.
     """
     import numba
 
     if os.environ.get("NUMBA_CACHE_DIR"):
         return
-    stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sorted(_PACKAGE.glob("*.py"))]
+    sources = sorted({*_PACKAGE.glob("*.py"), *package.glob("*.py")})
+    stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sources]
     digest = hashlib.sha256(repr((numba.__version__, stamps)).encode()).hexdigest()[:16]
-    folder = _PACKAGE / "__pycache__"
+    folder = package / "__pycache__"
     for earlier in folder.glob("compiled-*"):
         if earlier.name != f"compiled-{digest}":
             shutil.rmtree(earlier, ignore_errors=True)

@@ -24,6 +24,35 @@ def _shift_down(history: History, first: int, count: int) -> None:
 
 
 @njit(cache=True)
+def arrive(
+    model: Model,
+    history: History,
+    span: tuple[int, int],
+    time: float,
+    sensor: int,
+    value: FloatArray,
+    coupling: FloatArray,
+    history_s: float,
+) -> tuple[int, int]:
+    """A reading put into `history`, whose rows in use are `span`; returns those that are in use with it.
+
+    The first must be a position. One that comes too late changes nothing.
+    """
+    oldest, count = span
+    if count == 0:
+        history.time[0], history.sensor[0], history.value[0], history.coupling[0] = time, sensor, value, coupling
+        begin(model, history)
+        return 0, 1
+    if count == len(history.time):
+        _shift_down(history, oldest, count)
+        oldest, count = 0, count - oldest
+    if insert(model, history, oldest, count, time, sensor, value, coupling) > oldest:
+        count += 1
+        oldest = oldest_needed(history.time, oldest, count, history_s)
+    return oldest, count
+
+
+@njit(cache=True)
 def replay(
     model: Model,
     readings: Readings,
@@ -48,17 +77,7 @@ def replay(
         while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
             time, sensor = readings.time[upcoming], readings.sensor[upcoming]
             value, coupling = readings.value[upcoming], readings.coupling[upcoming]
-            if count == 0:
-                recent[0], history.sensor[0], history.value[0], history.coupling[0] = time, sensor, value, coupling
-                begin(model, history)
-                count = 1
-            else:
-                if count == len(recent):
-                    _shift_down(history, oldest, count)
-                    oldest, count = 0, count - oldest
-                if insert(model, history, oldest, count, time, sensor, value, coupling) > oldest:
-                    count += 1
-                    oldest = oldest_needed(recent, oldest, count, history_s)
+            oldest, count = arrive(model, history, (oldest, count), time, sensor, value, coupling, history_s)
             upcoming += 1
         if count > 0:
             if len(constants[0]):

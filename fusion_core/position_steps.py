@@ -1,0 +1,79 @@
+"""The position-only Kalman filter, compiled: one axis' covariance serves all, since they have the same sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fusion_core.motion import add_wiener_noise
+from fusion_core.samples import FloatArray
+
+
+@njit(cache=True)
+def begin(
+    value: FloatArray, noise_variance: float, speed_sd: float, acceleration_sd: float
+) -> tuple[FloatArray, FloatArray]:
+    """Mean (3, d) and covariance (3, 3) at the first frame."""
+    mean, covariance = np.zeros((3, len(value))), np.zeros((3, 3))
+    mean[0] = value
+    covariance[0, 0], covariance[1, 1], covariance[2, 2] = noise_variance, speed_sd**2, acceleration_sd**2
+    return mean, covariance
+
+
+@njit(cache=True)
+def moved(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float) -> tuple[FloatArray, FloatArray]:
+    """Both `dt` seconds on, by the Wiener-process-acceleration model."""
+    transition = np.eye(3)
+    transition[0, 1] = transition[1, 2] = dt
+    transition[0, 2] = dt * dt / 2.0
+    later = transition @ covariance @ transition.T
+    add_wiener_noise(jerk_psd_mm2_s5, dt, later, 1, 0)
+    return transition @ mean, later
+
+
+@njit(cache=True)
+def correct(mean: FloatArray, covariance: FloatArray, value: FloatArray, noise_variance: float) -> None:
+    """A frame taken in, in place. Joseph's form keeps the covariance symmetric and positive."""
+    gain = covariance[:, 0] / (covariance[0, 0] + noise_variance)
+    innovation = value - mean[0]
+    keep = np.eye(3)
+    for row in range(3):
+        keep[row, 0] -= gain[row]
+        for axis in range(len(value)):
+            mean[row, axis] += gain[row] * innovation[axis]
+    covariance[:] = keep @ covariance @ keep.T + noise_variance * np.outer(gain, gain)
+
+
+@njit(cache=True)
+def ahead(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float) -> tuple[FloatArray, float]:
+    """Position (d,) and its SD `dt` seconds after the newest frame."""
+    later, spread = moved(mean, covariance, dt, jerk_psd_mm2_s5)
+    return later[0], np.sqrt(spread[0, 0])
+
+
+@njit(cache=True)
+def replay(
+    arrival: FloatArray,
+    value: FloatArray,
+    times: FloatArray,
+    noise_variance: float,
+    initial_sd: tuple[float, float],
+    jerk_psd_mm2_s5: float,
+    ahead_s: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD (n, d) at `times`, which rise, of frames (m, d) in order of arrival."""
+    shown, sd = np.full((len(times), value.shape[1]), np.nan), np.full((len(times), value.shape[1]), np.nan)
+    mean, covariance, upcoming = np.zeros((3, value.shape[1])), np.zeros((3, 3)), 0
+    for index in range(len(times)):
+        while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
+            if upcoming == 0:
+                mean, covariance = begin(value[0], noise_variance, initial_sd[0], initial_sd[1])
+            else:
+                dt = arrival[upcoming] - arrival[upcoming - 1]
+                mean, covariance = moved(mean, covariance, dt, jerk_psd_mm2_s5)
+                correct(mean, covariance, value[upcoming], noise_variance)
+            upcoming += 1
+        if upcoming > 0:
+            dt = max(times[index] - arrival[upcoming - 1], 0.0) + ahead_s
+            shown[index], sd[index] = ahead(mean, covariance, dt, jerk_psd_mm2_s5)
+    return shown, sd
