@@ -12,7 +12,7 @@ from typing import Any
 from pipeline.cache import versions
 from pipeline.errors import PipelineError
 from pipeline.provenance import LIBRARIES
-from pipeline.runner import Result
+from pipeline.runner.result import Result
 from pipeline.study import SETTINGS_FILE
 
 _PROVENANCE = "provenance.json"

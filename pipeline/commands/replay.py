@@ -19,7 +19,9 @@ from pipeline.commands.run import for_each, refuse_same_names, reports_folder, s
 from pipeline.document import html
 from pipeline.errors import PipelineError
 from pipeline.ranking import ranked
-from pipeline.runner import Means, Result, bring_up_to_date, over_settings
+from pipeline.runner.means import Means
+from pipeline.runner.result import Result
+from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.sections.replay import document
 from pipeline.stage import Stage
 from pipeline.stages import INGEST, REPLAY

@@ -20,7 +20,9 @@ from pipeline.commands.console import PlainLines
 from pipeline.commands.run import executor_of
 from pipeline.errors import PipelineError, WorkerLostError
 from pipeline.executors import Processes
-from pipeline.runner import Means, Result, bring_up_to_date
+from pipeline.runner.means import Means
+from pipeline.runner.result import Result
+from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE
 from tests.conftest import STREAMS, session_messages, write_session
