@@ -115,7 +115,7 @@ def replay(
     jobs: Jobs = None,
     cache: CacheFolder = None,
 ) -> None:
-    """Run variants of the estimators over studies and rank them: replay.html, results.json and Parquet."""
+    """Run variants of the estimators over studies and rank them: HTML, PDF, results.json and Parquet."""
     from pipeline.commands import replay as command
 
     command.replay(studies, changes or [], estimators, out, jobs, cache)
