@@ -53,6 +53,7 @@ def replay(
     out: Path | None,
     jobs: int | None,
     cache: Path | None,
+    executor: str,
 ) -> None:
     """Replay the studies and write the report; exit with the highest of their codes."""
     refuse_same_names(studies)
@@ -80,7 +81,7 @@ def replay(
         console.say(f"{result.name}: {what_was_done(result)}")
         return result.exit_code
 
-    code = for_each(studies, INGEST, jobs, cache, then, bring=bring)
+    code = for_each(studies, INGEST, jobs, cache, then, bring=bring, where=executor)
     if gathered.results:
         _write(gathered, folder)
     sys.exit(code)

@@ -134,7 +134,7 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: pytest.MonkeyPatc
 def test_an_executor_that_is_none_is_said(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for command in ("report", "compare", "check"):
+    for command in ("report", "compare", "check", "replay"):
         ran = run(capsys, monkeypatch, command, study, "--executor", "proces")
         assert ran.code == 2
         assert '--executor: there is no "proces"; did you mean "process"?' in ran.err
