@@ -114,11 +114,12 @@ def replay(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; one report for all studies.")] = None,
     jobs: Jobs = None,
     cache: CacheFolder = None,
+    executor: ExecutorName = "process",
 ) -> None:
-    """Run variants of the estimators over studies and rank them: replay.html, results.json and Parquet."""
+    """Run variants of the estimators over studies and rank them: HTML, PDF, results.json and Parquet."""
     from pipeline.commands import replay as command
 
-    command.replay(studies, changes or [], estimators, out, jobs, cache)
+    command.replay(studies, changes or [], estimators, out, jobs, cache, executor)
 
 
 @app.command()

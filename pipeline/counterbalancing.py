@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, permutations, product
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -43,10 +43,20 @@ def assigned(conditions: int, participants: int, seed: int | None = None) -> lis
 
 @dataclass(frozen=True)
 class Balance:
-    """The fewest and the most times that a condition stands in a period, and that one follows another."""
+    """How many times each condition stands in each period, a count a period, and one comes straight before another."""
 
-    period: tuple[int, int]
-    neighbours: tuple[int, int]
+    in_periods: Mapping[Hashable, tuple[int, ...]]
+    in_pairs: Mapping[tuple[Hashable, Hashable], int]
+
+    @property
+    def period(self) -> tuple[int, int]:
+        """The fewest and the most times that a condition stands in a period."""
+        return _range(times for counts in self.in_periods.values() for times in counts)
+
+    @property
+    def neighbours(self) -> tuple[int, int]:
+        """The fewest and the most times that one condition follows another."""
+        return _range(self.in_pairs.values())
 
     @property
     def complete(self) -> bool:
@@ -54,14 +64,14 @@ class Balance:
         return len(set(self.period)) == len(set(self.neighbours)) == 1
 
 
-def balance(orders: Sequence[Order]) -> Balance:
+def balance(orders: Sequence[Sequence[Hashable]]) -> Balance:
     """How evenly the orders, each of all the conditions, spread them."""
-    conditions = range(len(orders[0]))
-    periods = Counter((place, condition) for order in orders for place, condition in enumerate(order))
+    conditions = orders[0]
+    periods = Counter((condition, place) for order in orders for place, condition in enumerate(order))
     follows = Counter(pair for order in orders for pair in pairwise(order))
     return Balance(
-        _range(periods[cell] for cell in product(conditions, conditions)),
-        _range(follows[pair] for pair in permutations(conditions, 2)),
+        {condition: tuple(periods[condition, place] for place in range(len(conditions))) for condition in conditions},
+        {pair: follows[pair] for pair in permutations(conditions, 2)},
     )
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations, pairwise, permutations
+from itertools import combinations
 from typing import Any
 
 import pandas as pd
 
 from pipeline import model_rows, orders
 from pipeline.cells import Asked
+from pipeline.counterbalancing import balance
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
 from pipeline.statistics.crossover import crossover
@@ -95,9 +96,9 @@ def _balance(conditions: Sequence[str], known: Sequence[Order]) -> Iterator[Row]
     people, count = len(known), len(conditions)
     low, over = divmod(people, count)
     share = f"{low} or {low + 1}" if over else str(low)
+    spread = balance(known)
     for condition in conditions:
-        periods = Counter(order.index(condition) for order in known)
-        times = [periods[period] for period in range(count)]
+        times = spread.in_periods[condition]
         yield {
             "what": "times in each period",
             "condition": condition,
@@ -106,17 +107,16 @@ def _balance(conditions: Sequence[str], known: Sequence[Order]) -> Iterator[Row]
             "remark": None if _even(times, over) else "not balanced over the periods",
         }
     if count > 2:
-        follows = Counter(pair for order in known for pair in pairwise(order))
-        times = [follows[pair] for pair in permutations(conditions, 2)]
+        pairs = spread.in_pairs.values()
         yield {
             "what": "times each condition comes just before each other",
-            "found": _span(times),
+            "found": _span(pairs),
             "expected": share,
-            "remark": None if _even(times, over) else "not balanced for what came just before",
+            "remark": None if _even(pairs, over) else "not balanced for what came just before",
         }
 
 
-def _even(times: Sequence[int], over: int) -> bool:
+def _even(times: Collection[int], over: int) -> bool:
     """As equal as can be, with so many people over a whole number of rounds?"""
     return max(times) - min(times) <= (1 if over else 0)
 

@@ -1,4 +1,4 @@
-"""Where sessions are computed: processes of this machine that may die without taking the others with them."""
+"""Where sessions are computed: this process, or processes that may die without taking the others with them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,19 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from pipeline.errors import WorkerLostError
+
+
+class InThisProcess(Executor):
+    """An executor that computes when asked to."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute now."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - handed on by the future
+            future.set_exception(error)
+        return future
 
 
 class Processes(Executor):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
+from pipeline import label_places
 from pipeline.typeface import showable
 from pipeline.wording import MINUS, THIN, measure_label, short_label, unit_of
 
@@ -27,7 +29,9 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _GREY = "#6b757d"
 _WIDTH = 7.2  # inches: a page's text
 _NAME_LENGTH = 32
-_LABEL_PIXELS = 14  # closer marks have one label
+_LABEL_APART = 10  # points (1/72 inch), as are these: closer marks have one label
+_LABEL_GAP = 4  # beside a label
+_MARK_RADIUS = 5.5  # with its ring
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -398,30 +402,36 @@ def trade_off(means: pd.DataFrame) -> Figure:
             panel.scatter(errors_mm[0][own], values[0][own], **ring)
         panel.axhline(0, color=_GREY, linewidth=0.8)
         panel.set_ylabel(label)
+        panel.margins(0.2, 0.1)  # room for labels
         _along_rmse(panel, means["rmse_mm"])
-        _ranks(panel, means, scale * means[f"{stem}{unit}"])
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    figure.draw_without_rendering()  # only then is it known how far apart marks are
+    for panel, (stem, unit, scale, _) in zip(axes, known, strict=False):
+        _ranks(figure, panel, means, scale * means[f"{stem}{unit}"])
     return figure
 
 
-def _ranks(axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
-    """Each mark's rank beside it; marks that all but touch share a label."""
+def _ranks(figure: Figure, axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
+    """Each mark's rank beside it; marks without room for that share a label. The layout must be settled."""
     known = values.notna().to_numpy(bool)
     points = np.column_stack([means["rmse_mm"], values])[known]
     pixels = axes.transData.transform(points)
-    groups: list[list[int]] = []
-    for index, pixel in enumerate(pixels):
-        near = (group for group in groups if np.hypot(*(pixels[group[0]] - pixel)) < _LABEL_PIXELS)
-        group = next(near, None)
-        if group is None:
-            groups.append([index])
-        else:
-            group.append(index)
-    ranks = means["rank"].to_numpy()[known]
-    for together in groups:
-        label = ", ".join(str(ranks[index]) for index in together)
-        axes.annotate(label, tuple(points[together[0]]), (6, 5), textcoords="offset points", fontsize=8)
+    point = figure.dpi / 72  # in pixels
+    look: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "in_layout": False}
+
+    def size(text: str) -> tuple[float, float]:
+        tried = axes.annotate(text, (0, 0), (0, 0), **look)
+        box = tried.get_window_extent()
+        tried.remove()
+        return box.width + _LABEL_GAP * point, box.height
+
+    ranks = means["rank"].to_numpy()[known].tolist()
+    frame = np.array(axes.bbox.extents)
+    for label in label_places.placed(pixels, ranks, cache(size), frame, _LABEL_APART * point, _MARK_RADIUS * point):
+        mark = label.marks[0]
+        offset = (label.box[:2] - pixels[mark]) / point
+        axes.annotate(label.text, tuple(points[mark]), (offset[0] + _LABEL_GAP / 2, offset[1]), va="bottom", **look)
 
 
 def _arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from pipeline.cache import Cache
 from pipeline.commands import console
 from pipeline.commands.run import cache_in
 from pipeline.errors import PipelineError
-from pipeline.runner import current_entries
+from pipeline.runner.up_to_date import current_entries
 from pipeline.stages import STAGES
 from pipeline.upkeep import Held, held, prune, verify
 

@@ -17,7 +17,7 @@ from pipeline.commands import console, junit
 from pipeline.commands.junit import Case, Suite
 from pipeline.commands.run import for_each, what_befell
 from pipeline.errors import PipelineError
-from pipeline.runner import Result
+from pipeline.runner.result import Result
 from pipeline.stages import COMPARE
 from pipeline.wording import NOTHING
 

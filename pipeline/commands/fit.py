@@ -13,7 +13,7 @@ from pipeline.commands import console
 from pipeline.commands.run import for_each
 from pipeline.errors import PipelineError
 from pipeline.fitting import Fit, Parameter, fit
-from pipeline.runner import Result
+from pipeline.runner.result import Result
 from pipeline.stages import INGEST
 
 

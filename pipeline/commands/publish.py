@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from pipeline.cache import versions
 from pipeline.errors import PipelineError
 from pipeline.provenance import LIBRARIES
-from pipeline.runner import Result
+from pipeline.runner.result import Result
 from pipeline.study import SETTINGS_FILE
 
 _PROVENANCE = "provenance.json"
@@ -28,7 +30,7 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
     for name, source in files.items():
-        _copy(source, folder / name)
+        copy(source, folder / name)
     provenance: dict[str, Any] = {
         "study": result.name,
         **_program(command),
@@ -61,7 +63,8 @@ def _read(result: Result) -> dict[str, Any]:
 
 def _write_provenance(provenance: dict[str, Any], folder: Path) -> None:
     text = json.dumps(provenance, indent=1, ensure_ascii=False) + "\n"
-    (folder / _PROVENANCE).write_text(text, encoding="utf-8")
+    with _whole(folder / _PROVENANCE) as beside:
+        beside.write_text(text, encoding="utf-8")
 
 
 def refuse_study(folder: Path) -> None:
@@ -81,7 +84,7 @@ def refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
 def publish_results(result: Result, folder: Path) -> None:
     """results.json alone."""
     refuse_inputs(result, folder, ["results.json"])
-    _copy(result.entry("compare") / "results.json", folder / "results.json")
+    copy(result.entry("compare") / "results.json", folder / "results.json")
 
 
 def _published(folder: Path) -> list[str]:
@@ -95,8 +98,21 @@ def _published(folder: Path) -> list[str]:
     return [name for name in ours if (root / name).resolve().is_relative_to(root)]
 
 
-def _copy(source: Path, target: Path) -> None:
+def copy(source: Path, target: Path) -> None:
+    """Bring a file to its place, whole or not at all; one that is the same already stays."""
     if target.is_file() and target.read_bytes() == source.read_bytes():
         return
+    with _whole(target) as beside:
+        shutil.copyfile(source, beside)
+
+
+@contextmanager
+def _whole(target: Path) -> Iterator[Path]:
+    """A file to fill, which then takes the target's place at once: who is interrupted leaves what was there before."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, target)
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        yield beside
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)

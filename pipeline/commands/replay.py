@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,14 @@ import pandas as pd
 from pipeline import results, tables
 from pipeline.cache import Entry
 from pipeline.commands import console
-from pipeline.commands.publish import publish_provenance, refuse_inputs, refuse_study
+from pipeline.commands.publish import copy, publish_provenance, refuse_inputs, refuse_study
 from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
-from pipeline.document import html
+from pipeline.document import html, pdf
 from pipeline.errors import PipelineError
 from pipeline.ranking import ranked
-from pipeline.runner import Means, Result, bring_up_to_date, over_settings
+from pipeline.runner.means import Means
+from pipeline.runner.result import Result
+from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.sections.replay import document
 from pipeline.stage import Stage
 from pipeline.stages import INGEST, REPLAY
@@ -27,7 +29,7 @@ from pipeline.study import Session, load_study
 from pipeline.variants import Variant, read_changes, read_estimators, variants
 from pipeline.wording import interval, number, seconds
 
-_PAGE, _RESULTS = "replay.html", "results.json"
+_PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"
 _TABLES = ("accuracy", "replay_trials", "replay_means", "replay_exclusions")
 _IN_RESULTS = ("accuracy", "replay_means", "replay_exclusions")
 Row = dict[str, Any]
@@ -51,6 +53,7 @@ def replay(
     out: Path | None,
     jobs: int | None,
     cache: Path | None,
+    executor: str,
 ) -> None:
     """Replay the studies and write the report; exit with the highest of their codes."""
     refuse_same_names(studies)
@@ -78,7 +81,7 @@ def replay(
         console.say(f"{result.name}: {what_was_done(result)}")
         return result.exit_code
 
-    code = for_each(studies, INGEST, jobs, cache, then, bring=bring)
+    code = for_each(studies, INGEST, jobs, cache, then, bring=bring, where=executor)
     if gathered.results:
         _write(gathered, folder)
     sys.exit(code)
@@ -151,7 +154,7 @@ def _settings(variant: Variant) -> Row:
 
 
 def _write(gathered: _Gathered, folder: Path) -> None:
-    """replay.html, results.json and the tables as Parquet; and the ranking, to the terminal."""
+    """replay.html, replay.pdf, results.json and the tables as Parquet; and the ranking, to the terminal."""
     accuracy, trials = pd.concat(gathered.accuracy), pd.concat(gathered.trials)
     found = {
         "accuracy": accuracy,
@@ -159,17 +162,26 @@ def _write(gathered: _Gathered, folder: Path) -> None:
         "replay_means": tables.frame("replay_means", ranked(accuracy, trials)),
         "replay_exclusions": tables.frame("replay_exclusions", gathered.exclusions),
     }
+    files = [_PAGE, _PRINT, _RESULTS, *(f"{name}.parquet" for name in _TABLES)]
     for result in gathered.results:
-        refuse_inputs(result, folder, [_PAGE, _RESULTS, *(f"{name}.parquet" for name in _TABLES)])
-    folder.mkdir(parents=True, exist_ok=True)
-    results.write_replay(folder / _RESULTS, gathered.studies, {name: found[name] for name in _IN_RESULTS})
-    for name in _TABLES:
-        tables.write(name, found[name], folder)
-    with tempfile.TemporaryDirectory() as drawn:
-        html.render(document(gathered.studies, found, Path(drawn)), Path(drawn), folder / _PAGE)
+        refuse_inputs(result, folder, files)
+    with tempfile.TemporaryDirectory() as written, tempfile.TemporaryDirectory() as drawn:
+        _fill(gathered.studies, found, Path(drawn), Path(written))
+        for name in files:
+            copy(Path(written) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
     _say(tables.records("replay_means", found["replay_means"]))
-    console.say(f"Report: {short(folder / _PAGE)}")
+    console.say(f"Report: {short(folder / _PAGE)}  {short(folder / _PRINT)}")
+
+
+def _fill(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path, folder: Path) -> None:
+    """Write every file of the report into a folder of its own, and the figures it shows into `drawn`."""
+    results.write_replay(folder / _RESULTS, studies, {name: found[name] for name in _IN_RESULTS})
+    for name in _TABLES:
+        tables.write(name, found[name], folder)
+    shown = document(studies, found, drawn)
+    html.render(shown, drawn, folder / _PAGE)
+    pdf.render(shown, drawn, folder / _PRINT)
 
 
 def _say(rows: Sequence[Row]) -> None:

@@ -15,8 +15,10 @@ from pipeline.commands import console
 from pipeline.commands.publish import publish, publish_results, refuse_study
 from pipeline.commands.summary import summary
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.executors import Processes
-from pipeline.runner import InThisProcess, Means, Result, bring_up_to_date
+from pipeline.executors import InThisProcess, Processes
+from pipeline.runner.means import Means
+from pipeline.runner.result import Result
+from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, STAGES
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +21,7 @@ from pipeline.document.model import (
 from pipeline.typeface import font_folder, showable
 
 _HERE = Path(__file__).parent
+_UNBROKEN = 24  # characters: a longer word in a table may be broken behind punctuation
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
 
@@ -29,7 +31,7 @@ def render(document: Document, figures: Path, path: Path) -> None:
 
     content = _content(document)
     shown = _showable(content)
-    shown["lacking"] = shown != content
+    shown |= {"lacking": shown != content, "unbroken": _UNBROKEN}
     compiler = typst.Compiler(
         (_HERE / "report.typ").read_bytes(),
         root=figures.resolve(),
@@ -106,12 +108,17 @@ def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
 
 
 def _shares(table: Table) -> list[float]:
-    """How wide each column wants to be, from its longest cells: text may wrap, numbers may not."""
+    """How wide each column wants to be, from its longest cells: text may wrap, numbers and words may not."""
     wanted = []
     for index, column in enumerate(table.columns):
-        cells = [len(row[index]) for row in table.rows]
-        longest, heading = max(cells, default=1), max((len(word) for word in column.title.split()), default=1)
+        texts = [row[index] for row in table.rows]
+        cells = [len(text) for text in texts]
+        longest, heading = max(cells, default=1), _longest_word([column.title])
         typical = sum(cells) / max(len(cells), 1)
         width = longest if column.numeric else min(longest, max(12, 1.6 * typical))
-        wanted.append(float(max(width, heading) + 3))
+        wanted.append(float(max(width, heading, min(_longest_word(texts), _UNBROKEN)) + 3))
     return wanted
+
+
+def _longest_word(texts: Sequence[str]) -> int:
+    return max((len(word) for text in texts for word in text.split()), default=1)

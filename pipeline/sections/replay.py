@@ -1,4 +1,4 @@
-"""The page of a replay: variants ranked, what each costs in lag and jitter, and what is not in it."""
+"""The report of a replay: variants ranked, what each costs in lag and jitter, and what is not in it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _NOTE_SELECTION = (
 
 
 def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Document:
-    """The whole page. `studies` are as in results.json, `found` its tables; figures go into the folder `drawn`."""
+    """The whole report. `studies` are as in results.json, `found` its tables; figures go into the folder `drawn`."""
     origins = dict.fromkeys(ORIGINS[study["data_origin"]] for study in studies)
     sections = [Section("variants", "Variants side by side", tuple(_variants(studies, found, drawn)))]
     left_out = _left_out(found["replay_exclusions"])
@@ -156,10 +156,12 @@ def _left_out(excluded: pd.DataFrame) -> Table | None:
         for row in rows[:_ROWS_MAX]
     )
     titles = columns(("Study", "Session", "Variant", "What", "Why"), 5)
-    return Table("table-exclusions", f"Sessions and files that are not wholly in this page.{more}", titles, cells)
+    return Table("table-exclusions", f"Sessions and files that are not wholly in this report.{more}", titles, cells)
 
 
 def _studies(studies: Sequence[Row]) -> Table:
     cells = tuple((study["name"], study["title"], study["data_origin"], str(study["sessions"])) for study in studies)
     titles = columns(("Study", "Title", "Data", "Sessions"), 3)
-    return Table("table-studies", "What was replayed; every number of this page stands in results.json.", titles, cells)
+    return Table(
+        "table-studies", "What was replayed; every number of this report stands in results.json.", titles, cells
+    )

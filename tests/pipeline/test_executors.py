@@ -20,7 +20,9 @@ from pipeline.commands.console import PlainLines
 from pipeline.commands.run import executor_of
 from pipeline.errors import PipelineError, WorkerLostError
 from pipeline.executors import Processes
-from pipeline.runner import Means, Result, bring_up_to_date
+from pipeline.runner.means import Means
+from pipeline.runner.result import Result
+from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE
 from tests.conftest import STREAMS, session_messages, write_session
@@ -132,7 +134,7 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: pytest.MonkeyPatc
 def test_an_executor_that_is_none_is_said(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for command in ("report", "compare", "check"):
+    for command in ("report", "compare", "check", "replay"):
         ran = run(capsys, monkeypatch, command, study, "--executor", "proces")
         assert ran.code == 2
         assert '--executor: there is no "proces"; did you mean "process"?' in ran.err

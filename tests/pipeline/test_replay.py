@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from pypdf import PdfReader
 from scipy import stats
 
 from pipeline import tables
@@ -148,7 +149,12 @@ def test_the_report_ranks_and_says_everything(study: Path, steadyhand: Steadyhan
     assert "data:image/svg" in page
     assert "At the selections" in page
     assert {row["selection_n"] for row in means} == {2}
+    reader = PdfReader(steadyhand.out / "replay.pdf")
+    printed = " ".join("".join(sheet.extract_text() for sheet in reader.pages).split())
+    for words in ("fusion[window=3]", "Tried <again> & again", "At the selections", "The best of many"):
+        assert words in printed
     assert "fusion[window=3]" in ran.out
+    assert "replay.pdf" in ran.out
     for name in ("accuracy", "replay_trials", "replay_means", "replay_exclusions"):
         assert (steadyhand.out / f"{name}.parquet").is_file()
     whole = tables.records("accuracy", tables.read("accuracy", steadyhand.out))

@@ -121,6 +121,21 @@ def test_hostile_text_stays_text_in_pdf(hostile_document: Document, tmp_path: Pa
     assert "is shown as □" in text
 
 
+def test_a_long_name_in_a_pdf_table_is_broken_behind_punctuation_and_stays_in_its_column(tmp_path: Path) -> None:
+    name = "kalman_fusion[jerk_psd_mm2_s5=30000000.0,bias_walk_mm_s2_per_sqrt_s=0.00001,gate_sd=4.5]"
+    figures = tuple(f"{number} [1, 2]" * 3 for number in range(4))
+    titles = (Column("Estimator", False), *(Column(f"c{number}") for number in range(4)))
+    table = Table("t", "Names", titles, ((name, *figures), *(("raw", *figures),) * 8))
+    pdf.render(Document("d", "", "", (Section("s", "S", (table,)),)), tmp_path, tmp_path / "r.pdf")
+    (page,) = PdfReader(tmp_path / "r.pdf").pages
+    pieces = [line.strip("\u200b ") for line in page.extract_text().splitlines()]
+    begin = next(index for index, line in enumerate(pieces) if line.startswith("kalman"))
+    end = next(index for index, line in enumerate(pieces) if "4.5]" in line)
+    assert end > begin
+    assert all(line[-1] in "[,_=/" for line in pieces[begin:end])
+    assert name in "".join(pieces).replace("\u200b", "")
+
+
 def test_hostile_names_of_a_whole_study(folder: Folder, steadyhand: Steadyhand) -> None:
     """Ids, measures, titles and a log's facts with markup, formulas and paths reach every output as text."""
     evil = '=cmd()<b>&"x'

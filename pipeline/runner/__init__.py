@@ -1,0 +1,1 @@
+"""Brings a study's tables up to date: which entries there are, which must be computed, and where."""

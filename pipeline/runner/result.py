@@ -1,0 +1,44 @@
+"""What a run gives: the entries of each stage, and what happened to the sessions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipeline.cache import Entry
+from pipeline.study import Session, Study
+
+
+@dataclass
+class Result:
+    """A study brought up to date: what each stage gave, by session, and what happened to the sessions.
+
+    `sessions` are those that went through every stage. The entry of a stage of scope "study" stands under an empty
+    name. `damaged` has stage, session and fault of each entry that was kept but could not be used any more.
+    """
+
+    folder: Path
+    study: Study
+    sessions: list[Session] = field(default_factory=list)
+    entries: dict[str, dict[str, Entry]] = field(default_factory=dict)
+    computed: dict[str, int] = field(default_factory=dict)
+    set_aside: list[tuple[Session, str]] = field(default_factory=list)
+    in_part: list[tuple[Session, str]] = field(default_factory=list)
+    unused: list[tuple[str, str]] = field(default_factory=list)
+    damaged: list[tuple[str, str, str]] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The study's name: its folder's."""
+        return self.folder.name
+
+    @property
+    def exit_code(self) -> int:
+        """1 where some session was set aside or read in part."""
+        return 1 if self.set_aside or self.in_part else 0
+
+    def entry(self, stage: str) -> Path:
+        """The folder of a stage of scope "study"."""
+        return self.entries[stage][""].folder

@@ -1,0 +1,65 @@
+"""Which sessions a study has, and which of them go on after a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.cache import Entry, file_digest
+from pipeline.errors import PipelineError
+from pipeline.runner.result import Result
+from pipeline.stage import Outcome
+from pipeline.study import Session, Study, find_sessions, load_study
+
+
+def found_in(folder: Path) -> tuple[Result, list[Session]]:
+    """A study before its first stage, and its sessions as their names say. Raises PipelineError for a bad study."""
+    study = load_study(folder)
+    found = find_sessions(folder, study)
+    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
+    result.inputs = _input_digests(result.folder, study, found.sessions)
+    return result, found.sessions
+
+
+def _input_digests(root: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
+    """SHA-256 of every file of the study that is read, by its path in the study."""
+    paths = [root / "study.yaml", *(session.path for session in sessions)]
+    for field_name in ("participants", "trials", "questionnaires", "measures", "printed"):
+        name = getattr(study, field_name)
+        if name is not None:
+            paths.append(root / name)
+    return {path.relative_to(root).as_posix(): file_digest(path) for path in paths}
+
+
+def still_usable(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:
+    """The sessions that go on, with participant and condition as the log says; the others are set aside."""
+    usable = []
+    for session in sessions:
+        outcome = Outcome(**entries[session.id].said)
+        known = replace(
+            session,
+            participant=outcome.participant or session.participant,
+            condition=outcome.condition or session.condition,
+        )
+        if outcome.set_aside is not None:
+            result.set_aside.append((known, outcome.set_aside))
+            continue
+        if outcome.in_part is not None:
+            result.in_part.append((known, outcome.in_part))
+        usable.append(known)
+    return usable
+
+
+def require_something(folder: Path, result: Result, sessions: Sequence[Session]) -> None:
+    """A study without tables needs one usable session: PipelineError where there is none."""
+    study = result.study
+    if sessions or study.trials or study.questionnaires or study.measures:
+        return
+    if result.set_aside:
+        reasons = "\n".join(f"  {session.id}: {reason}" for session, reason in result.set_aside)
+        raise PipelineError(f"{folder}: no session can be used:\n{reasons}")
+    hint = "".join(f"\n  {name}: {reason}" for name, reason in result.unused)
+    if study.simulation is not None:
+        hint = f"; its logs are made by: steadyhand simulate {folder}"
+    raise PipelineError(f'{folder}: no file matches sessions: "{study.sessions}"{hint}')

@@ -1,0 +1,68 @@
+"""A piece of work, and the key of its result: everything that may change it, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.cache import Entry, code_digest, digest_of
+from pipeline.runner.result import Result
+from pipeline.stage import Stage, Work
+from pipeline.study import Session, Study
+
+
+def work_and_key(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
+    """A piece of work without its folder, and the key of its result."""
+    read = {name: _entries_for(result.entries[name], sessions) for name in stage.reads}
+    names = [getattr(result.study, field_name) for field_name in stage.files]
+    inputs = {name: result.inputs[Path(name).as_posix()] for name in names if name is not None}
+    if stage.reads_log:
+        path = sessions[0].path.relative_to(result.folder).as_posix()
+        inputs[path] = result.inputs[path]
+    if stage.names_inputs:
+        inputs = dict(result.inputs)
+    whole = stage.scope == "study"
+    work = Work(
+        result.name,
+        _declared(result.study, stage),
+        result.folder,
+        Path(),
+        tuple(sessions),
+        {name: tuple(entry.folder for entry in found) for name, found in read.items()},
+        tuple(result.set_aside) if whole else (),
+        tuple(result.in_part) if whole else (),
+        tuple(result.unused) if whole else (),
+        inputs,
+    )
+    key = digest_of(
+        [
+            stage.name,
+            code_digest(stage.function.split(":")[0]),
+            _settings(result.study, stage),
+            result.name,
+            [[session.id, session.participant, session.condition] for session in sessions],
+            inputs,
+            {name: [entry.content for entry in found] for name, found in read.items()},
+            [[session.id, reason] for session, reason in (*work.set_aside, *work.in_part)],
+            work.unused,
+        ]
+    )
+    return work, key
+
+
+def _declared(study: Study, stage: Stage) -> Study:
+    """The study as the stage may see it: settings it did not declare are at their defaults."""
+    kept = {name: getattr(study, name) for name in stage.settings}
+    return Study.model_construct(**kept)
+
+
+def _settings(study: Study, stage: Stage) -> Any:
+    # Order matters in mappings too: it is the order in which streams and estimators are shown.
+    ordered = [list(getattr(study, name)) for name in ("streams", "estimators") if name in stage.settings]
+    return json.loads(study.model_dump_json(include=set(stage.settings))), ordered
+
+
+def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[Entry]:
+    return [found[""]] if "" in found else [found[session.id] for session in sessions if session.id in found]
