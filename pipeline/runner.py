@@ -215,7 +215,7 @@ def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Wo
     key = digest_of(
         [
             stage.name,
-            code_digest(stage.function.split(":")[0]),
+            code_digest(stage.module),
             _settings(result.study, stage),
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],

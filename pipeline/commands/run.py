@@ -142,7 +142,7 @@ def _run(
             publish(result, folders[study], sys.argv)
             console.say(f"Report: {short(folders[study] / 'report.html')}  {short(folders[study] / 'report.pdf')}")
         else:
-            publish_results(result, folders[study])
+            publish_results(result, folders[study], sys.argv)
             console.say(f"Results: {short(folders[study] / 'results.json')}")
         console.say(what_was_done(result))
         return result.exit_code
