@@ -88,7 +88,7 @@ def for_each(
             try:
                 with console.progress() as progress:
                     result = bring(folder, stages, Means(cache_in(cache), executor, progress))
-                for line in _mended(result):
+                for line in mended(result):
                     console.warn(line)
                 code = max(code, then(folder, result))
             except PipelineError as error:
@@ -150,7 +150,7 @@ def _run(
     sys.exit(for_each(studies, stages, jobs, cache, write, where=executor))
 
 
-def _mended(result: Result) -> Iterator[str]:
+def mended(result: Result) -> Iterator[str]:
     """A line a damaged entry of the cache."""
     for stage, session, fault in result.damaged:
         which = f"{stage} of session {session}" if session else stage
