@@ -46,6 +46,8 @@ STAGE_OF: Mapping[str, str] = {
 """The tables of a study by the stage that has them whole."""
 _OF_SESSIONS = tuple(stage.name for stage in COMPARE if stage.scope == "session")
 
+_MAIN = "MainProcess"  # what multiprocessing calls the process that was not started by another
+
 
 @dataclass(frozen=True)
 class Tables(Mapping[str, pd.DataFrame]):
@@ -115,7 +117,7 @@ def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str =
 
     Raises PipelineError where nothing can be done.
     """
-    if jobs > 1 and multiprocessing.parent_process() is not None:
+    if jobs > 1 and multiprocessing.current_process().name != _MAIN:
         raise PipelineError(
             "a script that loads with several jobs is run by each; put it under: if __name__ == '__main__'"
         )
