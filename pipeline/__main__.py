@@ -84,6 +84,30 @@ def check(
 
 
 @app.command()
+def diff(
+    before: Annotated[Path, typer.Argument(metavar="A", help="A results.json, or a folder that holds one.")],
+    now: Annotated[Path, typer.Argument(metavar="B", help="Another.")],
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            max=1,
+            help="By which share of the larger numbers may differ and count as the same; below 1e-12 all do. With 0,"
+            " every bit counts.",
+        ),
+    ] = 1e-9,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
+) -> None:
+    """Show what changed between two results, by how much, and which settings, inputs or versions may explain it.
+
+    Exit codes: 0 no result changed, 2 a file cannot be compared, 3 numbers moved, rows came or went, or text changed.
+    """
+    from pipeline.commands import diff as command
+
+    command.diff(before, now, tolerance, as_json)
+
+
+@app.command()
 def fit(
     studies: Studies,
     first: Annotated[float, typer.Option(min=5, metavar="S", help="Seconds of each session to fit on.")] = 30.0,

@@ -89,7 +89,8 @@ def _imports(path: Path) -> tuple[str, ...]:
         if isinstance(node, ast.Import):
             found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found += (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+            modules = [name for alias in node.names if _source(name := f"{node.module}.{alias.name}") is not None]
+            found += modules if len(modules) == len(node.names) else [node.module, *modules]
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             named = _MODULE_TEXT.match(node.value)
             if named:

@@ -1,5 +1,7 @@
 """What a report says of its own making."""
 
+PROVENANCE = "provenance.json"
+"""The file beside results.json that says how they were made."""
 LIBRARIES = (
     "numpy",
     "scipy",

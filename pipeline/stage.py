@@ -28,6 +28,11 @@ class Stage:
     reads_log: bool = False
     names_inputs: bool = False  # its output lists every file of the study that was read
 
+    @property
+    def module(self) -> str:
+        """The module of its function."""
+        return self.function.split(":")[0]
+
 
 @dataclass(frozen=True)
 class Outcome:

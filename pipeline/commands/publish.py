@@ -11,13 +11,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline.cache import versions
+from pipeline.cache import code_digest, file_digest, versions
 from pipeline.errors import PipelineError
-from pipeline.provenance import LIBRARIES
+from pipeline.provenance import LIBRARIES, PROVENANCE
 from pipeline.runner.result import Result
+from pipeline.stage import Stage
+from pipeline.stages import COMPARE, INGEST, REPLAY
 from pipeline.study import SETTINGS_FILE
 
-_PROVENANCE = "provenance.json"
+_RESULTS = "results.json"
 
 
 def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
@@ -25,33 +27,34 @@ def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
     entry = result.entry("report")
     files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     files.pop("entry.json")
-    files["results.json"] = result.entry("compare") / "results.json"
-    refuse_inputs(result, folder, files)
+    files[_RESULTS] = result.entry("compare") / _RESULTS
+    refuse_inputs(result, folder, [*files, PROVENANCE])
     for stale in set(_published(folder)) - set(files):
         (folder / stale).unlink(missing_ok=True)
     for name, source in files.items():
         copy(source, folder / name)
-    provenance: dict[str, Any] = {
-        "study": result.name,
-        **_program(command),
-        **_read(result),
-        "files": sorted(files),
-    }
-    _write_provenance(provenance, folder)
+    _publish_provenance(result, folder, command, files)
+
+
+def _publish_provenance(result: Result, folder: Path, command: Sequence[str], files: Iterable[str]) -> None:
+    _write_provenance(
+        {"study": result.name, **_program(command, COMPARE), **_read(result), "files": sorted(files)}, folder
+    )
 
 
 def publish_provenance(results: Iterable[Result], folder: Path, command: Sequence[str]) -> None:
-    """provenance.json of something made from several studies."""
+    """provenance.json of a replay of several studies."""
     studies = {result.name: _read(result) for result in results}
-    _write_provenance({**_program(command), "studies": studies}, folder)
+    _write_provenance({**_program(command, (*INGEST, REPLAY)), "studies": studies}, folder)
 
 
-def _program(command: Sequence[str]) -> dict[str, Any]:
-    """What ran."""
+def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
+    """What ran; the digest of a stage's code is one of the libraries it uses too."""
     return {
         "command": [Path(command[0]).name, *command[1:]],
         "python": platform.python_version(),
         "versions": versions(["steadyhand", *LIBRARIES]),
+        "code_sha256": {stage.name: code_digest(stage.module) for stage in stages},
     }
 
 
@@ -62,8 +65,9 @@ def _read(result: Result) -> dict[str, Any]:
 
 
 def _write_provenance(provenance: dict[str, Any], folder: Path) -> None:
+    provenance["results_sha256"] = file_digest(folder / _RESULTS)
     text = json.dumps(provenance, indent=1, ensure_ascii=False) + "\n"
-    with _whole(folder / _PROVENANCE) as beside:
+    with _whole(folder / PROVENANCE) as beside:
         beside.write_text(text, encoding="utf-8")
 
 
@@ -81,16 +85,17 @@ def refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
             raise PipelineError(f"--out {folder}: {name} there is the study's own; name a folder for the report alone")
 
 
-def publish_results(result: Result, folder: Path) -> None:
-    """results.json alone."""
-    refuse_inputs(result, folder, ["results.json"])
-    copy(result.entry("compare") / "results.json", folder / "results.json")
+def publish_results(result: Result, folder: Path, command: Sequence[str]) -> None:
+    """results.json and where it came from; what a report left there is still listed, for the next one to clear."""
+    refuse_inputs(result, folder, [_RESULTS, PROVENANCE])
+    copy(result.entry("compare") / _RESULTS, folder / _RESULTS)
+    _publish_provenance(result, folder, command, {*_published(folder), _RESULTS})
 
 
 def _published(folder: Path) -> list[str]:
     """The files an earlier report put there, inside the folder only."""
     try:
-        listed = json.loads((folder / _PROVENANCE).read_text(encoding="utf-8"))["files"]
+        listed = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError, KeyError, TypeError):
         return []
     root = folder.resolve()

@@ -90,7 +90,7 @@ def for_each(
             try:
                 with console.progress() as progress:
                     result = bring(folder, stages, Means(cache_in(cache), executor, progress))
-                for line in _mended(result):
+                for line in mended(result):
                     console.warn(line)
                 code = max(code, then(folder, result))
             except PipelineError as error:
@@ -144,7 +144,7 @@ def _run(
             publish(result, folders[study], sys.argv)
             console.say(f"Report: {short(folders[study] / 'report.html')}  {short(folders[study] / 'report.pdf')}")
         else:
-            publish_results(result, folders[study])
+            publish_results(result, folders[study], sys.argv)
             console.say(f"Results: {short(folders[study] / 'results.json')}")
         console.say(what_was_done(result))
         return result.exit_code
@@ -152,7 +152,7 @@ def _run(
     sys.exit(for_each(studies, stages, jobs, cache, write, where=executor))
 
 
-def _mended(result: Result) -> Iterator[str]:
+def mended(result: Result) -> Iterator[str]:
     """A line a damaged entry of the cache."""
     for stage, session, fault in result.damaged:
         which = f"{stage} of session {session}" if session else stage

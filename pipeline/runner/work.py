@@ -39,7 +39,7 @@ def work_and_key(stage: Stage, result: Result, sessions: Sequence[Session]) -> t
     key = digest_of(
         [
             stage.name,
-            code_digest(stage.function.split(":")[0]),
+            code_digest(stage.module),
             _settings(result.study, stage),
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],

@@ -31,7 +31,19 @@ def test_help_imports_no_heavy_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=CLONE)
     assert done.stdout.splitlines()[-1] == "[]"
-    for command in ("report", "compare", "check", "fit", "simulate", "inspect", "power", "plan", "audit", "cache"):
+    for command in (
+        "report",
+        "compare",
+        "check",
+        "diff",
+        "fit",
+        "simulate",
+        "inspect",
+        "power",
+        "plan",
+        "audit",
+        "cache",
+    ):
         assert command in done.stdout
 
 

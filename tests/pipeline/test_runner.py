@@ -108,7 +108,7 @@ def test_edited_code_invalidates_what_it_touches(monkeypatch: pytest.MonkeyPatch
 
     def digests() -> dict[str, str]:
         code_digest.cache_clear()
-        return {stage.name: code_digest(stage.function.split(":")[0]) for stage in STAGES}
+        return {stage.name: code_digest(stage.module) for stage in STAGES}
 
     def touched(path: str) -> set[str]:
         before = digests()

@@ -1,0 +1,233 @@
+"""Two sets of results, figure by figure: what is the same but for rounding, what moved, what came and what went."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pipeline.wording import NOTHING
+
+Row = Mapping[str, Any]
+Figures = Mapping[str, Any]
+
+OF_A_STUDY: Mapping[str, tuple[str, ...]] = {
+    "descriptives": ("measure", "condition"),
+    "comparisons": ("measure", "test", "effect", "contrast"),
+    "accuracy": ("session", "estimator", "variant"),
+    "replay_agreement": ("session", "estimator"),
+    "quality": ("session", "stream"),
+    "exclusions": ("participant", "condition", "session", "measure", "what"),
+    "sensor_noise": ("session", "stream"),
+    "phones": ("session", "stream"),
+    "shown_at_selection": ("condition", "estimator"),
+    "accuracy_means": ("estimator",),
+    "printed": ("source", "what", "check"),
+    "design_check": ("what", "measure", "condition"),
+}
+"""The tables of a study's results.json, and the columns by which the rows of each are told apart."""
+OF_A_REPLAY: Mapping[str, tuple[str, ...]] = {
+    "accuracy": ("study", "session", "estimator", "variant"),
+    "replay_means": ("study", "estimator", "variant"),
+    "replay_exclusions": ("study", "participant", "condition", "session", "variant", "what"),
+}
+"""The same for the results.json of a replay."""
+
+_NEAR_ZERO = 1e-12  # a difference that should be none is as large as the rounding of what was subtracted
+_STUDY, _STUDIES = "study", "studies"
+_FACTS: Mapping[str, tuple[str, ...]] = {_STUDY: (), _STUDIES: ("name",)}
+
+
+class _Absent:
+    """There is no such figure."""
+
+
+ABSENT = _Absent()
+
+
+@dataclass(frozen=True)
+class Change:
+    """A figure that is another, new or gone: its name, and its value before and now, or ABSENT."""
+
+    name: str
+    before: Any
+    now: Any
+
+    @property
+    def of_number(self) -> bool:
+        """Is or was it a number?"""
+        return is_number(self.before) or is_number(self.now)
+
+    @property
+    def difference(self) -> float | None:
+        """Now − before, where both are numbers."""
+        return float(self.now - self.before) if is_number(self.before) and is_number(self.now) else None
+
+    @property
+    def relative(self) -> float | None:
+        """The difference over the size of the value before, where that is not 0."""
+        by = self.difference
+        return by / abs(self.before) if by is not None and self.before else None
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Before, now, difference and relative difference, for a table."""
+        by, relative = self.difference, self.relative
+        return (
+            cell(self.before),
+            cell(self.now),
+            NOTHING if by is None else f"{by:+.4g}",
+            NOTHING if relative is None else f"{100 * relative:+.3g} %",
+        )
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A row by its table and what tells it from the others there."""
+
+    table: str
+    key: Mapping[str, str | None]
+
+    @property
+    def name(self) -> str:
+        """`completion_time_s | t_paired | condition | a - b`."""
+        return " | ".join(str(value) for value in self.key.values() if value is not None)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A row that is in both, and its figures that changed."""
+
+    row: Identified
+    changes: Sequence[Change]
+
+
+@dataclass
+class Differences:
+    """What two sets of results do not share; `compared` is the number of figures that both have."""
+
+    compared: int = 0
+    moved: list[Moved] = field(default_factory=list)
+    gone: list[Identified] = field(default_factory=list)
+    came: list[Identified] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        return bool(self.moved or self.gone or self.came)
+
+
+def is_number(value: object) -> bool:
+    """A number, and not true or false."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def cell(value: object) -> str:
+    """A figure as a table shows it."""
+    if value is ABSENT:
+        return "absent"
+    if value is None:
+        return "undefined"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def figures(row: Row) -> Iterator[tuple[str, Any]]:
+    """A row's columns, and instead of `details` what is in them."""
+    for column, value in row.items():
+        if column == "details":
+            yield from detailed(value)
+        else:
+            yield column, value
+
+
+def detailed(details: Figures | None) -> Iterator[tuple[str, Any]]:
+    """The details of a comparison by their names, the parts of a list each with its index."""
+    for name, detail in (details or {}).items():
+        parts = detail if isinstance(detail, list) else [detail]
+        for index, part in enumerate(parts):
+            yield f"{name}{f' {index}' if len(parts) > 1 else ''}", part
+
+
+def changes(before: Figures, now: Figures, relative: float) -> list[Change]:
+    """The figures that are new, gone, or differ by more than `relative` of the larger; in their order.
+
+    Numbers that differ by less than 1e-12 are the same too, unless `relative` is 0.
+    """
+    absolute = _NEAR_ZERO if relative else 0.0
+    found = []
+    for name in dict.fromkeys([*before, *now]):
+        old, new = before.get(name, ABSENT), now.get(name, ABSENT)
+        if is_number(old) and is_number(new):
+            same = math.isclose(old, new, rel_tol=relative, abs_tol=absolute)
+        else:
+            same = old == new and type(old) is type(new)
+        if not same:
+            found.append(Change(name, old, new))
+    return found
+
+
+def between(
+    before: Mapping[str, Any], now: Mapping[str, Any], identity: Mapping[str, Sequence[str]], relative: float
+) -> Differences:
+    """What changed in the tables that `identity` names, and in what is said of participants or studies.
+
+    `before` and `now` are contents of results.json.
+    """
+    found = Differences()
+    for table, columns in [*_FACTS.items(), *identity.items()]:
+        olds, news = (_by_key(_rows(content, table), columns) for content in (before, now))
+        for key in dict.fromkeys([*olds, *news]):
+            row = Identified(table, dict(zip(columns, key, strict=True)))
+            pairs, gone, came = _paired(olds.get(key, []), news.get(key, []))
+            for old, new in pairs:
+                _compare(found, row, _others(old, columns), _others(new, columns), relative)
+            found.gone += [row] * gone
+            found.came += [row] * came
+    return found
+
+
+def _rows(content: Mapping[str, Any], table: str) -> Sequence[Row]:
+    """A table's rows; what is said of a study's participants, and of the studies of a replay, as tables too."""
+    if table == _STUDY:
+        people = content[_STUDY].get("participants", {}) if _STUDY in content else {}
+        return [{f"participants {name}": value for name, value in people.items()}]
+    if table == _STUDIES:
+        return [{"name": study["name"], "sessions": study.get("sessions")} for study in content.get(_STUDIES, [])]
+    found: Sequence[Row] = content.get(table, [])
+    return found
+
+
+def _compare(found: Differences, row: Identified, before: Row, now: Row, relative: float) -> None:
+    old, new = dict(figures(before)), dict(figures(now))
+    found.compared += len(old.keys() & new.keys())
+    moved = changes(old, new, relative)
+    if moved:
+        found.moved.append(Moved(row, moved))
+
+
+def _by_key(rows: Sequence[Row], columns: Sequence[str]) -> dict[tuple[str | None, ...], list[Row]]:
+    found: dict[tuple[str | None, ...], list[Row]] = {}
+    for row in rows:
+        found.setdefault(tuple(row[column] for column in columns), []).append(row)
+    return found
+
+
+def _others(row: Row, columns: Sequence[str]) -> Row:
+    """What does not tell a row from others, and is not the name of its study's folder."""
+    return {column: value for column, value in row.items() if column not in (*columns, _STUDY)}
+
+
+def _paired(before: Sequence[Row], now: Sequence[Row]) -> tuple[list[tuple[Row, Row]], int, int]:
+    """Rows of one key in pairs, and how many are left on each side: equal ones first, the others in their order.
+
+    A key stands twice where study.yaml asks for one test with several options.
+    """
+    olds, news = list(before), list(now)
+    pairs = []
+    if len(olds) + len(news) > 2:
+        for row in before:
+            if row in news:
+                pairs.append((row, row))
+                olds.remove(row)
+                news.remove(row)
+    rest = list(zip(olds, news, strict=False))
+    return pairs + rest, len(olds) - len(rest), len(news) - len(rest)

@@ -1,0 +1,157 @@
+"""Why two sets of results differ: what of their settings, inputs, versions and code is not the same."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline import results
+from pipeline.cache import file_digest
+from pipeline.differences import ABSENT, Change
+from pipeline.errors import PipelineError
+from pipeline.provenance import PROVENANCE
+
+Content = Mapping[str, Any]
+_TOLD_APART = {"comparisons": ("measure", "test"), "variants": ("estimator", "variant")}
+_STATED = ("title", "data_origin", "conditions", "alpha", "variants")  # in results.json itself
+
+
+@dataclass(frozen=True)
+class Made:
+    """Results, and what stands beside them of their making; None with the reason where nothing can be said of it."""
+
+    path: Path
+    content: Content
+    provenance: Content | None
+    unknown: str | None = None
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What is not the same. `complete` says that the making of both is known."""
+
+    complete: bool
+    settings: Sequence[Change]
+    inputs: Sequence[Change]
+    versions: Sequence[Change]
+    code: Sequence[Change]
+
+
+def made(path: Path) -> Made:
+    """A results.json with the provenance.json beside it, as far as that belongs to it.
+
+    Raises PipelineError where the former cannot be used.
+    """
+    content = results.read_checked(path)
+    beside = path.parent / PROVENANCE
+    if not beside.is_file():
+        return Made(path, content, None, f"{path}: there is no {PROVENANCE} beside it")
+    try:
+        provenance = results.read_object(beside)
+    except (PipelineError, OSError) as error:
+        return Made(path, content, None, f"{error}; it is not used")
+    if provenance.get("results_sha256", digest := file_digest(path)) != digest:
+        return Made(path, content, None, f"{beside}: belongs to other results than {path.name} there; it is not used")
+    return Made(path, content, provenance)
+
+
+def explained(before: Made, now: Made) -> Explanation:
+    """What is not the same in the making of two results, as far as it is known of both."""
+    old, new = before.provenance, now.provenance
+    stated = (_stated(before.content), _stated(now.content))
+    if old is None or new is None:
+        return Explanation(False, tuple(_changed((), *stated)), (), (), ())
+    made_of = [_made_of(one) for one in (old, new)]
+    settings = [_over(known["settings"], said) for known, said in zip(made_of, stated, strict=True)]
+    return Explanation(
+        True,
+        tuple(_changed((), *settings)),
+        *(tuple(_changed((), *(one[part] for one in made_of))) for part in ("inputs", "versions", "code")),
+    )
+
+
+def _stated(content: Content) -> Content:
+    """The settings that results.json holds itself; those of a replay by study."""
+    if "study" in content:
+        return {key: content["study"][key] for key in _STATED if key in content["study"]}
+    return {study["name"]: {key: study[key] for key in _STATED if key in study} for study in content["studies"]}
+
+
+def _made_of(provenance: Content) -> dict[str, Content]:
+    """Settings, digests of inputs, versions, and digests of code; those of several studies by their names."""
+    studies = provenance.get("studies")
+    if isinstance(studies, Mapping):
+        settings: Content = {name: _mapping(study, "settings") for name, study in studies.items()}
+        inputs: Content = {
+            f"{name}/{file}": digest
+            for name, study in studies.items()
+            for file, digest in _mapping(study, "inputs_sha256").items()
+        }
+    else:
+        settings, inputs = _mapping(provenance, "settings"), _mapping(provenance, "inputs_sha256")
+    versions = {"Python": provenance.get("python"), **_mapping(provenance, "versions")}
+    return {
+        "settings": settings,
+        "inputs": inputs,
+        "versions": versions,
+        "code": _mapping(provenance, "code_sha256"),
+    }
+
+
+def _mapping(content: Any, key: str) -> Content:
+    found = content.get(key) if isinstance(content, Mapping) else None
+    return found if isinstance(found, Mapping) else {}
+
+
+def _over(settings: Content, stated: Content) -> Content:
+    """Settings with those that the results state themselves, defaults among them."""
+    merged = dict(settings)
+    for key, value in stated.items():
+        below = settings.get(key)
+        merged[key] = {**below, **value} if isinstance(below, Mapping) and isinstance(value, Mapping) else value
+    return merged
+
+
+def _changed(path: tuple[str, ...], before: Any, now: Any) -> Iterator[Change]:
+    """Each setting that differs, by its path; of a list of objects, such as comparisons, each that came or went."""
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        for key in dict.fromkeys([*before, *now]):
+            yield from _changed((*path, str(key)), before.get(key, ABSENT), now.get(key, ABSENT))
+        return
+    if json_text(before) == json_text(now):
+        return
+    if not (_of_objects(before) and _of_objects(now)):
+        yield Change(".".join(path), before, now)
+        return
+    olds, news = (_entries(_without(*pair), path[-1]) for pair in ((before, now), (now, before)))
+    if not olds and not news:
+        yield Change(".".join(path), before, now)  # in another order
+    for name in dict.fromkeys([*olds, *news]):
+        both = name in olds and name in news
+        yield from _changed((*path, name) if both else path, olds.get(name, ABSENT), news.get(name, ABSENT))
+
+
+def _of_objects(value: Any) -> bool:
+    return value is ABSENT or (isinstance(value, list) and all(isinstance(one, Mapping) for one in value))
+
+
+def _without(listed: Any, other: Any) -> list[Content]:
+    """The objects of a list that another one does not have."""
+    return [] if listed is ABSENT else [one for one in listed if other is ABSENT or one not in other]
+
+
+def _entries(listed: Sequence[Content], of: str) -> dict[str, Content]:
+    """Objects by what tells them apart in such a list, and by themselves where that does not."""
+    names = [", ".join(str(one[key]) for key in _TOLD_APART.get(of, ()) if one.get(key)) for one in listed]
+    return {
+        name if name and names.count(name) == 1 else f"{name} {json_text(one)}": one
+        for name, one in zip(names, listed, strict=True)
+    }
+
+
+def json_text(value: Any) -> str:
+    """A setting in one line; nothing for one that is absent."""
+    return "" if value is ABSENT else json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,143 @@
+"""A study's tables for a notebook: brought up to date as a command does, read when they are asked for."""
+
+from __future__ import annotations
+
+import multiprocessing
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+
+from pipeline import tables, threads
+from pipeline.commands import console
+from pipeline.commands.run import PROCESS, cache_in, executor_of, mended, what_befell
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.runner.means import Means
+from pipeline.runner.result import Result
+from pipeline.runner.up_to_date import bring_up_to_date
+from pipeline.stages import COMPARE
+from pipeline.study import Session, Study
+
+STAGE_OF: Mapping[str, str] = {
+    **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),
+    "tracks": "fuse",
+    "noise_residuals": "assess",
+    **dict.fromkeys(("observations", "orders"), "measure"),
+    **dict.fromkeys(
+        (
+            "descriptives",
+            "comparisons",
+            "design_check",
+            "measures",
+            "trials",
+            "accuracy",
+            "accuracy_means",
+            "shown_at_selection",
+            "replay_agreement",
+            "sensor_noise",
+            "phones",
+            "quality",
+            "exclusions",
+            "printed",
+        ),
+        "compare",
+    ),
+}
+"""The tables of a study by the stage that has them whole."""
+_OF_SESSIONS = tuple(stage.name for stage in COMPARE if stage.scope == "session")
+
+_MAIN = "MainProcess"  # what multiprocessing calls the process that was not started by another
+
+
+@dataclass(frozen=True)
+class Tables(Mapping[str, pd.DataFrame]):
+    """A study's tables by name: `tables.comparisons`, or `tables["comparisons"]`. pipeline.tables has their columns.
+
+    A table of the whole study is read once and kept. What is of each session (positions, imu, tracks, …) is read anew
+    each time it is asked for, of all sessions; `in_session` gives it of one.
+    """
+
+    study: Study
+    sessions: tuple[Session, ...]
+    _folders: Mapping[str, Sequence[Path]] = field(repr=False)
+    _kept: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, compare=False)
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        if name not in self._folders:
+            raise KeyError(f'there is no table "{name}"{did_you_mean(name, self._folders)}')
+        if name in self._kept:
+            return self._kept[name]
+        for folder in self._folders[name]:
+            if not folder.is_dir():
+                raise PipelineError(f"{folder}: has gone from the cache since the study was loaded; load it again")
+        table = tables.read(name, self._folders[name])
+        if STAGE_OF[name] not in _OF_SESSIONS:
+            self._kept[name] = table
+        return table
+
+    def __getattr__(self, name: str) -> pd.DataFrame:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._folders)
+
+    def __len__(self) -> int:
+        return len(self._folders)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._folders]
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} tables of {len(self.sessions)} sessions: {', '.join(self)}>"
+
+    def in_session(self, session: str) -> Tables:
+        """The tables of one session: those that are of each session. Raises KeyError where there is no such session."""
+        ids = [one.id for one in self.sessions]
+        if session not in ids:
+            raise KeyError(f'there is no session "{session}"{did_you_mean(session, ids)}')
+        at = ids.index(session)
+        folders = {name: [where[at]] for name, where in self._folders.items() if STAGE_OF[name] in _OF_SESSIONS}
+        return Tables(self.study, (self.sessions[at],), folders)
+
+    def participant_means(self, measure: str) -> pd.DataFrame:
+        """A row a participant, a column a condition in the study's order; what `figures.paired` draws."""
+        known = list(dict.fromkeys(self["measures"]["measure"]))
+        if measure not in known:
+            raise KeyError(f'there is no measure "{measure}"{did_you_mean(measure, known)}')
+        return tables.participant_means(self["measures"], measure, self.study.conditions)
+
+
+def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str = PROCESS) -> Tables:
+    """A study brought up to date. What befell sessions, and what of the cache was damaged, is a warning.
+
+    Raises PipelineError where nothing can be done.
+    """
+    if jobs > 1 and multiprocessing.current_process().name != _MAIN:
+        raise PipelineError(
+            "a script that loads with several jobs is run by each; put it under: if __name__ == '__main__'"
+        )
+    threads.one_a_process()
+    with executor_of(jobs, executor) as where, console.progress() as progress:
+        result = bring_up_to_date(folder, COMPARE, Means(cache_in(cache), where, progress))
+    for line in (*mended(result), *what_befell(result)):
+        warnings.warn(line, stacklevel=3)
+    return _tables(result)
+
+
+def _tables(result: Result) -> Tables:
+    folders = {
+        name: [result.entries[stage][key].folder for key in _keys(result, stage)] for name, stage in STAGE_OF.items()
+    }
+    return Tables(result.study, tuple(result.sessions), folders)
+
+
+def _keys(result: Result, stage: str) -> list[str]:
+    """By what a stage's entries are known: the sessions that went through every stage, or nothing for the study."""
+    return [session.id for session in result.sessions] if stage in _OF_SESSIONS else [""]
