@@ -18,8 +18,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.formats import read_log
 from pipeline.formats.log import Content, Readings, Wanted
-from pipeline.formats.mcap import cdr, payload
-from pipeline.formats.mcap.payload import SCHEMAS
+from pipeline.formats.mcap import cdr, ros2
+from pipeline.formats.mcap.schemas import SCHEMAS
 from pipeline.formats.mcap.writer import _IMU, _POINT_STAMPED
 from tests.conftest import CLONE, write_session
 from tests.pipeline.test_mcap import faulty
@@ -169,13 +169,13 @@ def test_random_messages_as_the_stock_decoder_reads_them(
 
 def test_the_stock_decoder_is_not_called_for_each_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    kept = payload._kept
+    kept = ros2._kept
 
     def counted(message: object, content: str) -> list[float]:
         calls.append(content)
         return kept(message, content)
 
-    monkeypatch.setattr(payload, "_kept", counted)
+    monkeypatch.setattr(ros2, "_kept", counted)
     frames = [b"a", b"a name of another length", "имя".encode()]
     numbers = [float(value) for value in range(37)]
     sent = [encoded("<>"[at % 2], at, 0, frames[at % 3], numbers) for at in range(600)]
