@@ -45,7 +45,7 @@ _UNUSUAL = (ValueError, TypeError, LookupError, OverflowError)
 
 
 def decoder(_: Channel, schema: Schema | None, content: str) -> Decoder:
-    """ValueError if the schema is not JSON's. Fields are found by their names, so it does not matter how it is called."""
+    """ValueError if the schema is not JSON's; how it is called does not matter, fields are found by their names."""
     if schema is not None and schema.encoding not in ("jsonschema", ""):
         raise ValueError(f'its schema is written as "{schema.encoding}", not jsonschema')
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -18,6 +19,7 @@ from pipeline.formats.mcap.container import Walk
 from pipeline.formats.mcap.events import EVENTS_LIMIT, event
 from pipeline.formats.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields
 from pipeline.formats.mcap.messages import Messages, joined
+from pipeline.formats.mcap.schemas import SAMPLED
 
 _DECODERS: Mapping[str, str] = {
     "cdr": "pipeline.formats.mcap.ros2",
@@ -55,7 +57,22 @@ def decode(walk: Walk, topic: str, content: Content) -> Readings:
         tuple(events[index] for index in kept.tolist()) if content == "events" else (),
         _lost(walk, topic, len(failures)),
         _notes(failures),
+        content in SAMPLED,
     )
+
+
+def counted(walk: Walk, topic: str) -> Readings:
+    """A topic's messages, all of them; those that a study could not decode are said, as far as the schema tells."""
+    every = decode(walk, topic, "anything")
+    content = walk.topics[topic].content
+    if content is None:
+        return every
+    try:
+        notes = decode(walk, topic, content).notes
+    except SessionError as error:
+        notes = (str(error),)
+    said = tuple(f"counted, but a study would lose them: {note}" for note in notes)
+    return replace(every, notes=said, sampled=content in SAMPLED)
 
 
 def _notes(failures: Failures) -> tuple[str, ...]:
@@ -70,7 +87,7 @@ def _lost(walk: Walk, topic: str, undecodable: int) -> int | None:
     """How many messages the log says it held and that are not there; None where it does not say."""
     gathered = walk.topics[topic]
     if walk.stated is not None:
-        stated = sum(walk.stated.get(key, 0) for key, channel in walk.channels.items() if channel.topic == topic)
+        stated = sum(walk.stated.get(channel, 0) for channel in gathered.channels)
         return max(stated - gathered.read, gathered.in_damaged_chunks) + undecodable
     if walk.unknown_loss:
         return None
