@@ -7,6 +7,7 @@ from typing import Any
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
+from mcap_protobuf.schema import build_file_descriptor_set
 
 Types = dict[str, dict[str, str]]
 
@@ -68,3 +69,8 @@ def message_class(name: str, types: Types) -> Any:
 def changed(types: Types, name: str, **fields: str) -> Types:
     """With other types of some of a message's fields."""
     return {**types, name: {**types[name], **fields}}
+
+
+def schema_of(kind: Any) -> bytes:
+    """A class's descriptor and those it needs, as a log holds them."""
+    return bytes(build_file_descriptor_set(kind).SerializeToString())

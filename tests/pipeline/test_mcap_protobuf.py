@@ -22,7 +22,7 @@ from pipeline.formats import read_log
 from pipeline.formats.log import Content, Readings, Wanted
 from pipeline.formats.mcap import protobuf
 from pipeline.formats.mcap.protobuf_template import Declined, Template
-from tests.pipeline.protobuf_types import FOXGLOVE, ROS, changed, message_class
+from tests.pipeline.protobuf_types import FOXGLOVE, ROS, changed, message_class, schema_of
 from tests.pipeline.test_mcap_fast import assert_same, figures
 
 POINT = message_class("foxglove.Point3InFrame", FOXGLOVE)
@@ -41,7 +41,7 @@ def write_log(path: Path, kind: Any, payloads: Iterable[bytes], schema: bytes | 
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
-        described = build_file_descriptor_set(kind).SerializeToString() if schema is None else schema
+        described = schema_of(kind) if schema is None else schema
         number = writer.register_schema(kind.DESCRIPTOR.full_name, "protobuf", described)
         channel = writer.register_channel("/t", "protobuf", number)
         for time, data in enumerate(payloads):
@@ -310,7 +310,7 @@ def test_a_schema_of_something_else_costs_its_topic(kind: Any, content: Content,
         (b"", "is missing that schema"),
         (b"\xff\xff", "its schema cannot be read"),
         (b"\0" * 300_000, "its schema is 292 KiB long"),
-        (build_file_descriptor_set(POINT).SerializeToString()[:-20], "its schema cannot be read"),
+        (schema_of(POINT)[:-20], "its schema cannot be read"),
         (build_file_descriptor_set(POINT).file[-1].SerializeToString(), "schema"),
     ],
 )
@@ -325,7 +325,7 @@ def test_a_schema_that_cannot_be_followed_costs_its_topic(schema: bytes, message
 def test_a_damaged_schema_is_followed_or_costs_its_topic(
     data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    whole = bytearray(build_file_descriptor_set(POSE).SerializeToString())
+    whole = bytearray(schema_of(POSE))
     for _ in range(data.draw(st.integers(1, 3))):
         whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
     path = write_log(tmp_path_factory.getbasetemp() / "schema.mcap", POSE, steady(POSE, 4), bytes(whole))

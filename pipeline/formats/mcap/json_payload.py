@@ -143,7 +143,7 @@ def _decode_block(messages: Messages, which: IntArray, content: str, found: Fiel
     if messages.length[which].max() > PAYLOAD_LIMIT:
         return
     try:
-        parsed = [orjson.loads(messages.payload(index)) for index in which.tolist()]
+        parsed = [orjson.loads(payload) for payload in messages.payloads(which)]
         if len(set(map(tuple, parsed))) > 1:
             return
         names = _names(parsed[0], content)

@@ -47,6 +47,12 @@ class Messages:
         """The bytes of one message."""
         return self.data[self.start[index] : self.start[index] + self.length[index]]
 
+    def payloads(self, which: IntArray) -> list[bytes]:
+        """The bytes of some messages."""
+        begin = self.start[which]
+        end = begin + self.length[which]
+        return [self.data[first:last] for first, last in zip(begin.tolist(), end.tolist(), strict=True)]
+
     def rows(self, which: IntArray) -> npt.NDArray[np.uint8]:
         """The payloads of messages that are equally long, shape (len(which), length)."""
         length = int(self.length[which[0]])
@@ -61,7 +67,7 @@ class Messages:
         if len(length) and np.all(length == length[0]):
             data = self.rows(which).tobytes() if length[0] else b""
         else:
-            data = b"".join([self.payload(index) for index in which])
+            data = b"".join(self.payloads(which))
         start = np.cumsum(length) - length
         return Messages(self.log_time[which], self.publish_time[which], self.channel[which], start, length, data)
 
