@@ -282,13 +282,12 @@ def _take_records(walk: Walk, data: bytes) -> bool:
 
 def _share_out(walk: Walk, messages: Messages) -> None:
     """Each message to its topic, in the order of the file; the bytes of the wanted topics only are kept."""
-    ids: dict[str | None, list[int]] = {}
-    for channel_id in np.unique(messages.channel).tolist():
+    shares: dict[str | None, list[IntArray]] = {}
+    for channel_id, share in messages.by_channel():
         channel = walk.channels.get(channel_id)
-        ids.setdefault(None if channel is None else channel.topic, []).append(channel_id)
-    for topic, channels in ids.items():
-        own = messages.channel == channels[0] if len(channels) == 1 else np.isin(messages.channel, channels)
-        which: IntArray = np.flatnonzero(own)
+        shares.setdefault(None if channel is None else channel.topic, []).append(share)
+    for topic, parts in shares.items():
+        which = parts[0] if len(parts) == 1 else np.sort(np.concatenate(parts))
         if topic is None:
             walk.orphans.append(messages.chosen(which))
         else:

@@ -61,6 +61,14 @@ class Messages:
         every = np.ndarray((len(self.data) - length + 1,), f"V{length}", self.data, strides=(1,))
         return every[self.start[which]].view(np.uint8).reshape(len(which), length)
 
+    def by_channel(self) -> list[tuple[int, IntArray]]:
+        """Each channel's number and the indices of its messages, sorted once however many channels there are."""
+        if not len(self):
+            return []
+        order: IntArray = np.argsort(self.channel, kind="stable")
+        numbers, begins = np.unique(self.channel[order], return_index=True)
+        return list(zip(numbers.tolist(), np.split(order, begins[1:]), strict=True))
+
     def chosen(self, which: IntArray, payloads: bool = True) -> Messages:
         """Some of the messages, holding on to no bytes but their own, or to none."""
         length = self.length[which] if payloads else np.zeros(len(which), np.int64)

@@ -30,6 +30,8 @@ _DECODERS: Mapping[str, str] = {
 
 _TIME_LIMIT_NS = 2**62
 _PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond it the bytes are something else
+_TYPES_LIMIT = 64  # of one topic; following a schema takes its time
+_REASON_LIMIT = 300  # characters: names in a log may be long
 _NOTES = 3  # reasons told apart; the rest are counted together
 
 Failures = dict[int, str]
@@ -71,8 +73,8 @@ def counted(walk: Walk, topic: str) -> Readings:
         notes = decode(walk, topic, content).notes
     except SessionError as error:
         notes = (str(error),)
-    said = tuple(f"counted, but a study would lose them: {note}" for note in notes)
-    return replace(every, notes=said, sampled=content in SAMPLED)
+    said = tuple(f"counted, but a study would lose them: {note}" for note in notes if note not in every.notes)
+    return replace(every, notes=(*every.notes, *said), sampled=content in SAMPLED)
 
 
 def _notes(failures: Failures) -> tuple[str, ...]:
@@ -98,10 +100,12 @@ def _measured(walk: Walk, messages: Messages, content: str, failures: Failures) 
     """Stamps (ns) and values of positions or accelerations."""
     found = Fields.none_of(len(messages), content)
     decoders: dict[tuple[str, int], Decoder | str] = {}
-    for channel_id in np.unique(messages.channel).tolist():
-        own: IntArray = np.flatnonzero(messages.channel == channel_id)
+    for channel_id, own in messages.by_channel():
         channel = walk.channels[channel_id]
         key = channel.message_encoding, channel.schema_id
+        if key not in decoders and len(decoders) == _TYPES_LIMIT:
+            failures.update(dict.fromkeys(own.tolist(), f"its topic holds more than {_TYPES_LIMIT} types of messages"))
+            continue
         if key not in decoders:
             decoders[key] = _decoder(channel, walk.schemas.get(channel.schema_id), content)
         decoder = decoders[key]
@@ -115,7 +119,7 @@ def _measured(walk: Walk, messages: Messages, content: str, failures: Failures) 
                     messages.payload(index)
                 )
             except UNDECODABLE as error:
-                failures[index] = str(error) or type(error).__name__
+                failures[index] = _reason(error)
     return _judged(found, content, failures)
 
 
@@ -127,8 +131,13 @@ def _decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder |
     try:
         decoder: Decoder = import_module(module).decoder(channel, schema, content)
     except UNDECODABLE as error:
-        return str(error) or type(error).__name__
+        return _reason(error)
     return decoder
+
+
+def _reason(error: Exception) -> str:
+    text = str(error) or type(error).__name__
+    return text if len(text) <= _REASON_LIMIT else f"{text[:_REASON_LIMIT]} …"
 
 
 def _judged(found: Fields, content: str, failures: Failures) -> tuple[IntArray, FloatArray]:
@@ -158,5 +167,5 @@ def _events(walk: Walk, messages: Messages, failures: Failures) -> dict[int, Map
             channel = walk.channels[int(messages.channel[index])]
             events[index] = event(channel, messages.payload(index), _PLAUSIBLE["position"])
         except UNDECODABLE as error:
-            failures[index] = str(error) or type(error).__name__
+            failures[index] = _reason(error)
     return events
