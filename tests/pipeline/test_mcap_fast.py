@@ -51,7 +51,7 @@ def figures(message: object, content: str) -> list[float]:
     values = [getattr(message.linear_acceleration, axis) for axis in "xyz"]  # type: ignore[attr-defined]
     values += [getattr(message.angular_velocity, axis) for axis in "xyz"]  # type: ignore[attr-defined]
     turn = [getattr(message.orientation, axis) for axis in "xyzw"]  # type: ignore[attr-defined]
-    known = message.orientation_covariance[0] != -1 and 0.8 < sum(part**2 for part in turn) < 1.25  # type: ignore[attr-defined]
+    known = message.orientation_covariance[0] != -1 and 0.8 < sum(part * part for part in turn) < 1.25  # type: ignore[attr-defined]
     return values + (turn if known else [np.nan] * 4)
 
 

@@ -196,6 +196,19 @@ def test_damaged_messages_are_read_as_the_stock_decoder_does_or_lost_and_counted
     assert_same(fast, [stock[time] for time in fast.arrival_ns.tolist()])
 
 
+@pytest.mark.parametrize("name", KINDS)
+def test_every_single_bit_flipped(name: str, tmp_path: Path) -> None:
+    """Many damaged messages of one length, so that each is held against the template of a whole one."""
+    kind, content = KINDS[name]
+    whole = build(kind, 1_700_000_000, 123_456_789, "phone", [0.1 * at for at in range(1, 12)]).SerializeToString()
+    sent = [whole, *(flipped(whole, at) for at in range(8 * len(whole)))]
+    path = write_log(tmp_path / "a.mcap", kind, sent)
+    fast, slow = read_topic(path, content), read_slowly(path, content)
+    assert_same(fast, list(zip(slow.arrival_ns.tolist(), slow.stamp_ns.tolist(), slow.values.tolist(), strict=True)))
+    assert (fast.lost, fast.notes) == (slow.lost, slow.notes)
+    assert 0 < fast.read < len(sent)
+
+
 def steady(kind: Any, count: int) -> list[bytes]:
     random = np.random.default_rng(0)
     times = 1_700_000_000_000_000_000 + np.arange(count) * 11_111_111

@@ -133,15 +133,16 @@ def _varints(cells: Bytes, kind: int) -> IntArray:
 
 
 def _take_apart(data: bytes, begin: int, end: int, descriptor: Descriptor, path: Path, found: _Shape) -> None:
-    """Note the shape and places of the fields between two places; Declined at anything out of the ordinary."""
-    seen: set[int] = set()
+    """Note the shape and places of the fields between two places; Declined at anything out of the ordinary.
+
+    Of a field that is sent twice the last counts, as in protobuf.
+    """
     at = begin
     while at < end:
         tag, value = _varint(data, at, end)
         known = descriptor.fields_by_number.get(tag >> 3)
-        if known is None or known.number in seen or len(path) > _DEPTH_LIMIT:
+        if known is None or len(path) > _DEPTH_LIMIT:
             raise Declined
-        seen.add(known.number)
         found.shape[at:value] = 0xFF
         at = _take_field(data, value, end, known, tag & 7, (*path, known.name), found)
 
