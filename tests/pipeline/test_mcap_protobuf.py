@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import struct
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -256,6 +257,15 @@ def test_other_types_of_numbers_are_followed(
     readings = read_topic(path, "position")
     assert (readings.read, readings.lost) == (20, 0)
     assert_same(readings, by_the_stock_decoder(path, "position"))
+
+
+def test_a_signalling_nan_is_a_nan_like_any_other(tmp_path: Path) -> None:
+    kind = message_class("foxglove.Point3InFrame", changed(FOXGLOVE, "foxglove.Point3", x="float"))
+    whole = kind(timestamp={"seconds": 5}, frame_id="a", point={"x": 1.5}).SerializeToString()
+    spoilt = whole.replace(struct.pack("<f", 1.5), struct.pack("<I", 0x7FA00000))
+    readings = read_topic(write_log(tmp_path / "a.mcap", kind, [whole, spoilt]), "position")
+    assert (readings.read, readings.lost) == (2, 0)
+    assert np.isnan(readings.values[1, 0])
 
 
 def test_a_message_of_another_type_is_not_taken_for_a_position(tmp_path: Path) -> None:

@@ -118,7 +118,8 @@ class Template:
             if index < 2:
                 stamps[index] = _varints(cells, place.kind)
             else:
-                values[:, index - 2] = cells.view(f"<f{place.length}")[:, 0]
+                with np.errstate(invalid="ignore"):  # float32 has NaNs that warn as they are widened
+                    values[:, index - 2] = cells.view(f"<f{place.length}")[:, 0]
         fits = ((rows[:, self.at] & self.shape) == self.bits).all(axis=1)
         return Fields(stamps[0], stamps[1], values, fits & holds_stamps(stamps[0], stamps[1]))
 
