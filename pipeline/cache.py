@@ -22,7 +22,12 @@ from typing import Any
 _ROOT = Path(__file__).resolve().parent.parent
 _OURS = ("pipeline", "fusion_core")
 _MODULE_TEXT = re.compile(rf"(?:{'|'.join(_OURS)})(?:\.\w+)+")
-_DISTRIBUTIONS = {"yaml": "PyYAML", "mcap_ros2": "mcap-ros2-support"}
+_DISTRIBUTIONS = {
+    "yaml": "PyYAML",
+    "mcap_ros2": "mcap-ros2-support",
+    "mcap_protobuf": "mcap-protobuf-support",
+    "google": "protobuf",
+}
 _DATA_FILES = (".css", ".jinja", ".typ")
 _MANIFEST = "entry.json"
 _NEW = "new"

@@ -11,6 +11,8 @@ LIBRARIES = (
     "pydantic",
     "mcap",
     "mcap_ros2",
+    "mcap_protobuf",
+    "orjson",
     "matplotlib",
     "jinja2",
     "typst",

@@ -40,7 +40,7 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
         row["gap_max_s"] = float(steps.max())
         row["jitter_ms"] = float(np.std(regular) * 1e3) if len(regular) > 1 else None
         row["latency_s"] = float(np.median(arrival - stamp) * _SECONDS)
-        if missing and stream != "events":
+        if missing and readings.sampled:
             remarks.append(f"{missing} samples missing ({missing / (missing + len(steps) + 1):.1%})")
     row["note"] = "; ".join(remarks) or None
     return row

@@ -29,6 +29,7 @@ class Readings:
 
     `values` are SI, by content: position (n, 3) m; acceleration (n, 10): specific force in m/s², angular velocity
     in rad/s, orientation xyzw (NaN where unknown); events and anything (n, 0). `events` holds the decoded objects.
+    `sampled` says that they come at a steady rate, so that one which is missing can be told.
     """
 
     stamp_ns: IntArray
@@ -37,6 +38,7 @@ class Readings:
     events: tuple[Mapping[str, object], ...] = ()
     lost: int | None = 0
     notes: tuple[str, ...] = ()
+    sampled: bool = False
 
     @property
     def read(self) -> int:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mcap.writer import Writer
 
 from tests.conftest import CLONE, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand, run
@@ -104,6 +105,35 @@ def test_inspect_prints_the_rows_of_quality(
     ran = run(capsys, monkeypatch, "inspect", path)
     assert ran.code == 2
     assert "not an MCAP file" in ran.err
+
+
+def test_inspect_counts_every_message_and_says_which_a_study_would_lose(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    position = b'{"header": {"stamp": {"sec": 1, "nanosec": 2}}, "point": {"x": 1, "y": 2, "z": 3}}'
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for topic, schema, payloads in (
+            ("/position", "geometry_msgs/msg/PointStamped", [position] * 3 + [b"{}"] + [position] * 2),
+            ("/events", "steadyhand.Event", [b'{"type": "selection"}'] * 6),
+            ("/other", "something.Else", [b"{}"] * 6),
+        ):
+            channel = writer.register_channel(topic, "json", writer.register_schema(schema, "jsonschema", b"{}"))
+            for time, payload in zip((0, 1, 2, 3, 4, 50), payloads, strict=True):
+                writer.add_message(channel, time * 10**9, payload, time * 10**9)
+        writer.finish()  # type: ignore[no-untyped-call]
+    rows = {row["stream"]: row for row in json.loads(run(capsys, monkeypatch, "inspect", path, "--json").out)}
+    assert {name: (row["messages_read"], row["messages_lost"]) for name, row in rows.items()} == dict.fromkeys(
+        ("/position", "/events", "/other"), (6, 0)
+    )
+    assert rows["/position"]["note"] == (
+        "counted, but a study would lose them: 1 messages cannot be read: it has no header.stamp or timestamp; "
+        "45 samples missing (88.2%)"
+    )
+    assert rows["/events"]["note"] is None  # they come as they come, and none is missing
+    assert rows["/other"]["note"] is None
 
 
 def test_simulate_writes_the_same_messages_from_the_same_seed(

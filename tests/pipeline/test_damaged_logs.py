@@ -379,6 +379,42 @@ def test_lengths_that_lead_out_of_their_chunk_end_it(tmp_path: Path) -> None:
     assert any("chunk 1 ends in mid-record" in fault for fault in log.faults)
 
 
+def test_very_many_topics_take_no_longer_than_their_messages(tmp_path: Path) -> None:
+    """With a channel and a message each."""
+    count = 2**14
+    channels, sent = [], []
+    for number in range(1, count):
+        body = struct.pack("<HH", number, 0) + text(b"/%d" % number) + text(b"json") + struct.pack("<I", 0)
+        channels.append(struct.pack("<BQ", 4, len(body)) + body)
+        sent.append(struct.pack("<BQHIQQ", 5, 22, number, 0, 0, 0))
+    stated = b"".join(struct.pack("<HQ", number, 1) for number in range(1, count))
+    statistics = struct.pack("<QHIIIIQQ", count - 1, 0, count - 1, 0, 0, 0, 0, 0) + text(stated)
+    end = struct.pack("<BQI", 15, 4, 0) + struct.pack("<BQ", 11, len(statistics)) + statistics
+    path = tmp_path / "a.mcap"
+    path.write_bytes(MAGIC + b"".join(channels + sent) + end + struct.pack("<BQQQI", 2, 20, 0, 0, 0) + MAGIC)
+    began = time.perf_counter()
+    log = read_log(path, [])
+    assert time.perf_counter() - began < 10.0
+    assert {readings.read for readings in log.topics.values()} == {1}
+    assert {readings.lost for readings in log.topics.values()} == {0}
+
+
+def test_a_topic_of_very_many_types_is_bounded(tmp_path: Path) -> None:
+    """Following a schema takes milliseconds, and a reason may quote a name as long as the log makes it."""
+    inner = b""
+    for number in range(1, 101):
+        schema = struct.pack("<H", number) + text(b"n" * 5000) + text(b"ros2msg") + text(b"")
+        body = struct.pack("<HH", number, number) + text(b"/tracker/position") + text(b"cdr") + struct.pack("<I", 0)
+        inner += struct.pack("<BQ", 3, len(schema)) + schema + struct.pack("<BQ", 4, len(body)) + body
+        inner += struct.pack("<BQHIQQ", 5, 22, number, 0, 0, 0)
+    path = tmp_path / "a.mcap"
+    path.write_bytes(MAGIC + chunk(inner, zstandard.compress(inner), b"zstd"))
+    readings = read_log(path, WANTED).topics["/tracker/position"]
+    assert readings.read == 0
+    assert max(map(len, readings.notes)) < 400
+    assert any("36 messages cannot be read: its topic holds more than 64 types" in note for note in readings.notes)
+
+
 @pytest.mark.parametrize("name", ["crc_zstd", "crc_lz4"])
 def test_others_flipped_bytes_are_counted(name: str) -> None:
     log = read_log(faulty(name), [])

@@ -18,8 +18,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.formats import read_log
 from pipeline.formats.log import Content, Readings, Wanted
-from pipeline.formats.mcap import cdr, payload
-from pipeline.formats.mcap.payload import SCHEMAS
+from pipeline.formats.mcap import cdr, ros2
+from pipeline.formats.mcap.schemas import SCHEMAS
 from pipeline.formats.mcap.writer import _IMU, _POINT_STAMPED
 from tests.conftest import CLONE, write_session
 from tests.pipeline.test_mcap import faulty
@@ -51,7 +51,7 @@ def figures(message: object, content: str) -> list[float]:
     values = [getattr(message.linear_acceleration, axis) for axis in "xyz"]  # type: ignore[attr-defined]
     values += [getattr(message.angular_velocity, axis) for axis in "xyz"]  # type: ignore[attr-defined]
     turn = [getattr(message.orientation, axis) for axis in "xyzw"]  # type: ignore[attr-defined]
-    known = message.orientation_covariance[0] != -1 and 0.8 < sum(part**2 for part in turn) < 1.25  # type: ignore[attr-defined]
+    known = message.orientation_covariance[0] != -1 and 0.8 < sum(part * part for part in turn) < 1.25  # type: ignore[attr-defined]
     return values + (turn if known else [np.nan] * 4)
 
 
@@ -169,13 +169,13 @@ def test_random_messages_as_the_stock_decoder_reads_them(
 
 def test_the_stock_decoder_is_not_called_for_each_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    kept = payload._kept
+    kept = ros2._kept
 
     def counted(message: object, content: str) -> list[float]:
         calls.append(content)
         return kept(message, content)
 
-    monkeypatch.setattr(payload, "_kept", counted)
+    monkeypatch.setattr(ros2, "_kept", counted)
     frames = [b"a", b"a name of another length", "имя".encode()]
     numbers = [float(value) for value in range(37)]
     sent = [encoded("<>"[at % 2], at, 0, frames[at % 3], numbers) for at in range(600)]

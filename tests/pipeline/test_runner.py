@@ -119,6 +119,7 @@ def test_edited_code_invalidates_what_it_touches(monkeypatch: pytest.MonkeyPatch
 
     assert touched("fusion_core/window_gp.py") == {"fuse", "assess", "compare", "report"}
     assert touched("pipeline/formats/mcap/container.py") == {"ingest"}
+    assert touched("pipeline/formats/mcap/protobuf_template.py") == {"ingest"}
     assert touched("pipeline/statistics/rank.py") == {"compare"}
     assert touched("pipeline/document/style.css") == {"report"}
     assert touched("pipeline/wording.py") >= {"compare", "report"}

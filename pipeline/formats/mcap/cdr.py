@@ -8,12 +8,12 @@ their frame is called. (OMG DDS-XTypes 1.3, 7.4: plain CDR; alignment counts fro
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.formats.log import FloatArray, IntArray
+from pipeline.formats.log import IntArray
+from pipeline.formats.mcap.fields import Fields, Reading
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -31,26 +31,11 @@ _NAME = 16  # where the frame's name begins, its length before it
 _EMPTY_NAME_BYTES = 20
 
 
-@dataclass(frozen=True)
-class Fields:
-    """What n messages hold: stamps (n,), the kept float64 (n, w), and which of the messages fit the layout (n,)."""
-
-    seconds: IntArray
-    nanoseconds: IntArray
-    values: FloatArray
-    fits: npt.NDArray[np.bool_]
-
-
 def fields(rows: Bytes, content: str) -> Fields:
     """The fields of equally long messages, shape (n, length); of those that do not fit nothing is to be believed."""
     count, length = rows.shape
     body = length - (length - _HEADER) % 8 - 8 * NUMBERS[content]
-    result = Fields(
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        np.zeros((count, len(COLUMNS[content]))),
-        np.zeros(count, bool),
-    )
+    result = Fields.none_of(count, content)
     if body < _EMPTY_NAME_BYTES:
         return result
     for flag, order in ((0, ">"), (1, "<")):
@@ -96,7 +81,7 @@ def _is_text(name: bytes, size: int) -> bool:
     return True
 
 
-def laid_out_alike(row: Bytes, content: str, stock: Callable[[bytes], tuple[int, int, list[float]]]) -> bool:
+def laid_out_alike(row: Bytes, content: str, stock: Callable[[bytes], Reading]) -> bool:
     """Whether the stock decoder finds the fields of such a message where they are looked for here.
 
     It follows the log's own schema. It is given the message with other figures in it, each different and the stamp

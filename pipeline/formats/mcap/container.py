@@ -23,6 +23,7 @@ from pipeline.formats.log import Content, IntArray
 from pipeline.formats.mcap.inflate import CHUNK_LIMIT, DAMAGED, check_stated_size, inflate
 from pipeline.formats.mcap.messages import Messages, joined, messages_at, record_starts
 from pipeline.formats.mcap.resume import next_place
+from pipeline.formats.mcap.schemas import content_of
 
 _Record = TypeVar("_Record", bound=McapRecord)
 
@@ -46,6 +47,8 @@ class Topic:
     """What is gathered of one topic while the file is walked."""
 
     parts: list[Messages] = field(default_factory=list)
+    channels: list[int] = field(default_factory=list)
+    content: Content | None = None  # by the schema of its channels, as far as that tells
     in_damaged_chunks: int = 0
 
     @property
@@ -58,7 +61,7 @@ class Topic:
 class Walk:
     """What is known so far. A damaged chunk's message indexes follow it and say what it held."""
 
-    wanted: Mapping[str, Content]
+    wanted: Mapping[str, Content] | None
     inflated_limit: int
     messages_limit: int
     messages: int = 0
@@ -85,9 +88,10 @@ class Walk:
             self.faults.append(fault)
 
 
-def walk_log(path: Path, wanted: Mapping[str, Content]) -> Walk:
+def walk_log(path: Path, wanted: Mapping[str, Content] | None) -> Walk:
     """Everything of a log: its facts, its channels, and the messages of the wanted topics (of others the number only).
 
+    With None, topics whose schema tells what they hold are wanted.
     SessionError if it is no log, is a bomb, or contradicts itself.
     """
     size = path.stat().st_size
@@ -278,17 +282,18 @@ def _take_records(walk: Walk, data: bytes) -> bool:
 
 def _share_out(walk: Walk, messages: Messages) -> None:
     """Each message to its topic, in the order of the file; the bytes of the wanted topics only are kept."""
-    ids: dict[str | None, list[int]] = {}
-    for channel_id in np.unique(messages.channel).tolist():
+    shares: dict[str | None, list[IntArray]] = {}
+    for channel_id, share in messages.by_channel():
         channel = walk.channels.get(channel_id)
-        ids.setdefault(None if channel is None else channel.topic, []).append(channel_id)
-    for topic, channels in ids.items():
-        own = messages.channel == channels[0] if len(channels) == 1 else np.isin(messages.channel, channels)
-        which: IntArray = np.flatnonzero(own)
+        shares.setdefault(None if channel is None else channel.topic, []).append(share)
+    for topic, parts in shares.items():
+        which = parts[0] if len(parts) == 1 else np.sort(np.concatenate(parts))
         if topic is None:
             walk.orphans.append(messages.chosen(which))
         else:
-            walk.topics[topic].parts.append(messages.chosen(which, topic in walk.wanted))
+            own_topic = walk.topics[topic]
+            keep = own_topic.content is not None if walk.wanted is None else topic in walk.wanted
+            own_topic.parts.append(messages.chosen(which, keep))
 
 
 def _take_definition(walk: Walk, opcode: int, body: bytes) -> None:
@@ -297,15 +302,25 @@ def _take_definition(walk: Walk, opcode: int, body: bytes) -> None:
         raise ValueError(f"it is {len(body) // 1024} KiB long")
     if opcode == Opcode.CHANNEL:
         named = replace(_parsed(Channel, body), metadata={})
+        new = named.id not in walk.channels
         known = walk.channels.setdefault(named.id, named)
         if known != named:
             raise _contradiction(walk, "channel", named.id, known.topic, named.topic)
-        walk.topics.setdefault(named.topic, Topic())
+        if new:
+            _add_channel(walk, named)
     else:
         schema = _parsed(Schema, body)
         before = walk.schemas.setdefault(schema.id, schema)
         if before != schema:
             raise _contradiction(walk, "schema", schema.id, before.name, schema.name)
+
+
+def _add_channel(walk: Walk, channel: Channel) -> None:
+    topic = walk.topics.setdefault(channel.topic, Topic())
+    topic.channels.append(channel.id)
+    schema = walk.schemas.get(channel.schema_id)
+    if schema is not None:
+        topic.content = topic.content or content_of(channel.message_encoding, schema.name)
 
 
 def _contradiction(walk: Walk, what: str, number: int, first: str, second: str) -> Exception:

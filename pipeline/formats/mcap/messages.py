@@ -47,6 +47,12 @@ class Messages:
         """The bytes of one message."""
         return self.data[self.start[index] : self.start[index] + self.length[index]]
 
+    def payloads(self, which: IntArray) -> list[bytes]:
+        """The bytes of some messages."""
+        begin = self.start[which]
+        end = begin + self.length[which]
+        return [self.data[first:last] for first, last in zip(begin.tolist(), end.tolist(), strict=True)]
+
     def rows(self, which: IntArray) -> npt.NDArray[np.uint8]:
         """The payloads of messages that are equally long, shape (len(which), length)."""
         length = int(self.length[which[0]])
@@ -55,13 +61,21 @@ class Messages:
         every = np.ndarray((len(self.data) - length + 1,), f"V{length}", self.data, strides=(1,))
         return every[self.start[which]].view(np.uint8).reshape(len(which), length)
 
+    def by_channel(self) -> list[tuple[int, IntArray]]:
+        """Each channel's number and the indices of its messages, sorted once however many channels there are."""
+        if not len(self):
+            return []
+        order: IntArray = np.argsort(self.channel, kind="stable")
+        numbers, begins = np.unique(self.channel[order], return_index=True)
+        return list(zip(numbers.tolist(), np.split(order, begins[1:]), strict=True))
+
     def chosen(self, which: IntArray, payloads: bool = True) -> Messages:
         """Some of the messages, holding on to no bytes but their own, or to none."""
         length = self.length[which] if payloads else np.zeros(len(which), np.int64)
         if len(length) and np.all(length == length[0]):
             data = self.rows(which).tobytes() if length[0] else b""
         else:
-            data = b"".join([self.payload(index) for index in which])
+            data = b"".join(self.payloads(which))
         start = np.cumsum(length) - length
         return Messages(self.log_time[which], self.publish_time[which], self.channel[which], start, length, data)
 

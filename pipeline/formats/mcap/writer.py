@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.formats.log import Content, FloatArray
-from pipeline.formats.mcap.payload import SCHEMAS
+from pipeline.formats.mcap.schemas import SCHEMAS
 
 _HEADER = """std_msgs/Header header
 {body}

@@ -1,0 +1,187 @@
+"""Positions and accelerations in protobuf: the stock decoder, and many messages at once by templates.
+
+Fields are found by their names in the log's own descriptor, so a message may be Foxglove's or a ROS type in protobuf.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
+from google.protobuf.message import DecodeError, Message
+from google.protobuf.unknown_fields import UnknownFieldSet
+from mcap.records import Channel, Schema
+from mcap_protobuf.decoder import DecoderFactory
+
+from pipeline.formats.log import IntArray
+from pipeline.formats.mcap.fields import (
+    COVARIANCE,
+    FORCE,
+    NANOSECONDS,
+    PAYLOAD_LIMIT,
+    POINTS,
+    RATE,
+    SECONDS,
+    STAMPS,
+    TURN,
+    UNFIT,
+    Decoder,
+    Fields,
+    Path,
+    Reading,
+    check_size,
+    check_stamp,
+)
+from pipeline.formats.mcap.messages import Messages
+from pipeline.formats.mcap.protobuf_template import Declined, Template
+
+_SCHEMA_LIMIT = 256 * 1024  # bytes; Foxglove's take up to ten thousand
+_TEMPLATES = 16  # tried for messages of one length; what fits none of them is left to the stock decoder
+_WHOLE_NUMBERS = frozenset(
+    getattr(FieldDescriptor, f"TYPE_{name}")
+    for name in ("INT32", "INT64", "UINT32", "UINT64", "SINT32", "SINT64", "FIXED32", "FIXED64", "SFIXED32", "SFIXED64")
+)
+_FIGURES = frozenset({FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT})
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """The paths of a stamp's two fields and of the kept figures, and of the messages that must be there."""
+
+    stamp: tuple[Path, Path]
+    figures: tuple[Path, ...]
+    needed: tuple[Path, ...]
+
+    @property
+    def leaves(self) -> tuple[Path, ...]:
+        """Stamp and figures, in the order of `Template.read`."""
+        return (*self.stamp, *self.figures)
+
+    @property
+    def parents(self) -> tuple[Path, ...]:
+        """Every message on the way to a leaf."""
+        ways = (leaf[:depth] for leaf in self.leaves for depth in range(len(leaf)))
+        return tuple(dict.fromkeys(ways))
+
+
+def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
+    """ValueError or McapError if the schema lacks the content's fields, or cannot be read."""
+    if schema is None:
+        raise ValueError("it has no schema, and protobuf cannot be read without")
+    if schema.encoding != "protobuf":
+        raise ValueError(f'its schema is written as "{schema.encoding}", not protobuf')
+    if len(schema.data) > _SCHEMA_LIMIT:
+        raise ValueError(f"its schema is {len(schema.data) // 1024} KiB long, which no sensor's message takes")
+    try:
+        decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+        assert decode is not None  # noqa: S101
+        descriptor = decode(b"").DESCRIPTOR
+    except (DecodeError, TypeError, KeyError) as error:
+        raise ValueError(f"its schema cannot be read: {error}") from error
+    layout = _layout(descriptor, content)
+
+    def one(payload: bytes) -> Reading:
+        check_size(payload)
+        try:
+            message = decode(payload)
+        except DecodeError as error:
+            raise ValueError(UNFIT) from error
+        _check_whole(message, layout)
+        seconds, nanoseconds = (int(_value(message, path)) for path in layout.stamp)
+        check_stamp(seconds, nanoseconds)
+        return seconds, nanoseconds, [float(_value(message, path)) for path in layout.figures]
+
+    def many(messages: Messages, which: IntArray, found: Fields) -> None:
+        for length in np.unique(messages.length[which]).tolist():
+            if length <= PAYLOAD_LIMIT:
+                _decode_equally_long(messages, which[messages.length[which] == length], found)
+
+    def _decode_equally_long(messages: Messages, which: IntArray, found: Fields) -> None:
+        """The first message not yet read is the next template; one that is none is left."""
+        rows = messages.rows(which)
+        left: IntArray = np.arange(len(which))
+        for _ in range(_TEMPLATES):
+            if not len(left):
+                return
+            try:
+                template = Template.of(rows[left[0]], descriptor, layout.leaves, one)
+            except (Declined, ValueError):
+                left = left[1:]
+                continue
+            part = rows if len(left) == len(rows) else rows[left]
+            read = template.read(part)
+            found.take(which[left[read.fits]], read, np.flatnonzero(read.fits))
+            left = left[~read.fits]
+
+    return Decoder(one, many)
+
+
+def _layout(descriptor: Descriptor, content: str) -> _Layout:
+    """ValueError that names the field which the schema lacks, or holds as another type."""
+    stamp = _first_known(descriptor, STAMPS)
+    seconds = _first_known(descriptor, tuple((*stamp, name) for name in SECONDS))
+    nanoseconds = _first_known(descriptor, tuple((*stamp, name) for name in NANOSECONDS))
+    if content == "position":
+        point = _first_known(descriptor, POINTS)
+        vectors = [(point, "xyz")]
+    else:
+        vectors = [((FORCE,), "xyz"), ((RATE,), "xyz"), ((TURN,), "xyzw")]
+    needed = (stamp, *(path for path, _ in vectors if path != (TURN,)))
+    figures = [(*path, axis) for path, axes in vectors for axis in axes]
+    if content == "acceleration":
+        figures.append((COVARIANCE,))
+    for path in (seconds, nanoseconds, *figures):
+        _check_type(descriptor, path, _FIGURES if path in figures else _WHOLE_NUMBERS)
+    return _Layout((seconds, nanoseconds), tuple(figures), needed)
+
+
+def _first_known(descriptor: Descriptor, paths: Any) -> Path:
+    for path in paths:
+        if _field(descriptor, path) is not None:
+            return tuple(path)
+    raise ValueError(f"its schema, {descriptor.full_name}, has no {' or '.join('.'.join(path) for path in paths)}")
+
+
+def _field(descriptor: Descriptor | None, path: Path) -> FieldDescriptor | None:
+    """The field at the end of the path, through single messages only; None where there is none."""
+    field = None
+    for name in path:
+        if descriptor is None or (field is not None and field.is_repeated):
+            return None
+        field = descriptor.fields_by_name.get(name)
+        if field is None:
+            return None
+        descriptor = field.message_type
+    return field
+
+
+def _check_type(descriptor: Descriptor, path: Path, kinds: frozenset[int]) -> None:
+    field = _field(descriptor, path)
+    if field is None:
+        raise ValueError(f"its schema, {descriptor.full_name}, has no {'.'.join(path)}")
+    if field.type not in kinds or field.is_repeated != (path == (COVARIANCE,)):
+        wanted = "a number" if kinds is _FIGURES else "a whole number"
+        raise ValueError(f"its schema, {descriptor.full_name}, does not hold {wanted} as {'.'.join(path)}")
+
+
+def _check_whole(message: Message, layout: _Layout) -> None:
+    """ValueError where something is missing, or there is what the schema does not know: protobuf would pass over it."""
+    for path in layout.parents:
+        part, there = message, True
+        for depth, name in enumerate(path):
+            there = there and part.HasField(name)
+            if not there and path[: depth + 1] in (needed[: depth + 1] for needed in layout.needed):
+                raise ValueError(f"it has no {'.'.join(path[: depth + 1])}")
+            part = getattr(part, name)
+        if there and len(UnknownFieldSet(part)):
+            raise ValueError(UNFIT)
+
+
+def _value(message: Any, path: Path) -> Any:
+    """A field's value, of a list its first; what is not sent is zero in protobuf."""
+    for name in path:
+        message = getattr(message, name)
+    return next(chain(message, (0.0,))) if path == (COVARIANCE,) else message

@@ -1,0 +1,77 @@
+"""ROS 2 messages: the stock decoder, which follows the log's own definition, and CDR many at once where it can be."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+from mcap.records import Channel, Schema
+from mcap_ros2.decoder import DecoderFactory
+
+from pipeline.formats.log import IntArray
+from pipeline.formats.mcap import cdr
+from pipeline.formats.mcap.definition import check_definition
+from pipeline.formats.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields, Reading, check_stamp
+from pipeline.formats.mcap.messages import Messages
+from pipeline.formats.mcap.schemas import SCHEMAS
+
+
+def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
+    """One of UNDECODABLE if the schema is not the content's, or cannot be followed."""
+    needed = SCHEMAS[content]
+    if schema is None or schema.name != needed:
+        found = "no schema" if schema is None else schema.name
+        raise ValueError(f"it holds {found}, and a stream of kind {content} needs {needed}")
+    if schema.encoding != "ros2msg":
+        raise ValueError(f'its schema is written as "{schema.encoding}", not ros2msg')
+    check_definition(schema)
+    decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+    assert decode is not None  # noqa: S101
+
+    def one(payload: bytes) -> Reading:
+        _check_length(payload, cdr.NUMBERS[content])
+        message = decode(payload)
+        stamp = message.header.stamp
+        seconds, nanoseconds = int(stamp.sec), int(stamp.nanosec)
+        check_stamp(seconds, nanoseconds)
+        return seconds, nanoseconds, [float(value) for value in _kept(message, content)]
+
+    def many(messages: Messages, which: IntArray, found: Fields) -> None:
+        for length in np.unique(messages.length[which]):
+            _decode_equally_long(messages, which[messages.length[which] == length], found)
+
+    def _decode_equally_long(messages: Messages, which: IntArray, found: Fields) -> None:
+        """Fill in those that fit the layout, if it is what the stock decoder makes of the log's schema."""
+        rows = messages.rows(which)
+        fast = cdr.fields(rows, content)
+        for flag in (0, 1):
+            fits = np.flatnonzero(fast.fits & (rows[:, 1:2] == flag).any(axis=1))
+            if not len(fits):
+                continue
+            try:
+                alike = cdr.laid_out_alike(rows[fits[0]], content, one)
+            except UNDECODABLE:
+                continue
+            if alike:
+                found.take(which[fits], fast, fits)
+
+    return Decoder(one, many)
+
+
+def _check_length(payload: bytes, numbers: int) -> None:
+    if len(payload) < 16 or payload[0] != 0 or payload[1] not in (0, 1):
+        raise ValueError(UNFIT)
+    (name_length,) = struct.unpack_from("<I" if payload[1] else ">I", payload, 12)
+    expected = 4 + -(-(12 + name_length) // 8) * 8 + 8 * numbers
+    if not expected <= len(payload) < expected + 8:
+        raise ValueError(UNFIT)
+
+
+def _kept(message: object, content: str) -> list[float]:
+    """The figures of `cdr.COLUMNS`, in that order."""
+    if content == "position":
+        point = message.point  # type: ignore[attr-defined]
+        return [point.x, point.y, point.z]
+    force, rate, turn = message.linear_acceleration, message.angular_velocity, message.orientation  # type: ignore[attr-defined]
+    covariance = message.orientation_covariance[0]  # type: ignore[attr-defined]
+    return [force.x, force.y, force.z, rate.x, rate.y, rate.z, turn.x, turn.y, turn.z, turn.w, covariance]
