@@ -13,7 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-from pipeline.cache import Cache, Entry, code_digest, digest_of, file_digest
+from pipeline.cache import Cache, Entry, code_digest, digest_of
+from pipeline.digests import remembered
 from pipeline.errors import PipelineError, SessionError, WorkerLostError
 from pipeline.stage import Outcome, Stage, Work
 from pipeline.study import Session, Study, find_sessions, load_study
@@ -95,7 +96,7 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
     began = time.monotonic()
-    result, sessions = _before_the_stages(folder)
+    result, sessions = _before_the_stages(folder, means.cache)
     for stage in stages:
         try:
             if stage.scope == "session":
@@ -116,18 +117,18 @@ def over_settings(
 ) -> list[list[Entry]]:
     """A stage's entry for each of several settings of a study, by session: a list a session, in the settings' order."""
     began = time.monotonic()
-    of_settings = [replace(result, study=study) for study in settings]
-    works = [_work(stage, one, [session]) for session in sessions for one in of_settings]
+    of_settings = [(_seen(stage, study), replace(result, study=study)) for study in settings]
+    works = [_work(seen, one, [session]) for session in sessions for seen, one in of_settings]
     entries = _entries(stage, result, works, means)
     result.seconds += time.monotonic() - began
     return [entries[at : at + len(settings)] for at in range(0, len(entries), len(settings))]
 
 
-def _before_the_stages(folder: Path) -> tuple[Result, list[Session]]:
+def _before_the_stages(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
     study = load_study(folder)
     found = find_sessions(folder, study)
     result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
-    result.inputs = _input_digests(result.folder, study, found.sessions)
+    result.inputs = _input_digests(result.folder, study, found.sessions, cache)
     return result, found.sessions
 
 
@@ -137,16 +138,16 @@ def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[
     What follows from something that would have to be computed first cannot be known, and is not among them.
     Raises PipelineError where the study is bad.
     """
-    result, sessions = _before_the_stages(folder)
+    result, sessions = _before_the_stages(folder, cache)
     used: set[Path] = set()
     complete = True
     for stage in stages:
         if stage.scope == "study" and not complete:
             break
         parts = [[session] for session in sessions] if stage.scope == "session" else [sessions]
-        entries = {}
+        entries, seen = {}, _seen(stage, result.study)
         for part in parts:
-            entry = cache.get(stage.name, _work(stage, result, part)[1])
+            entry = cache.get(stage.name, _work(seen, result, part)[1])
             if entry is not None:
                 entries[part[0].id if stage.scope == "session" else ""] = entry
         used |= {entry.folder for entry in entries.values()}
@@ -167,14 +168,15 @@ def _with_context(folder: Path, result: Result, message: str) -> str:
     return "\n".join(lines)
 
 
-def _input_digests(root: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
+def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache: Cache) -> dict[str, str]:
     """SHA-256 of every file of the study that is read, by its path in the study."""
     paths = [root / "study.yaml", *(session.path for session in sessions)]
     for field_name in ("participants", "trials", "questionnaires", "measures", "printed"):
         name = getattr(study, field_name)
         if name is not None:
             paths.append(root / name)
-    return {path.relative_to(root).as_posix(): file_digest(path) for path in paths}
+    files = {path.relative_to(root).as_posix(): path for path in paths}
+    return remembered(files, root, cache.inputs)
 
 
 def _declared(study: Study, stage: Stage) -> Study:
@@ -189,8 +191,23 @@ def _settings(study: Study, stage: Stage) -> Any:
     return json.loads(study.model_dump_json(include=set(stage.settings))), ordered
 
 
-def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
+@dataclass(frozen=True)
+class _Seen:
+    """What a stage sees of a study's settings, and what they and its code add to a key: the same for every session."""
+
+    stage: Stage
+    study: Study
+    settings: Any
+    code: str
+
+
+def _seen(stage: Stage, study: Study) -> _Seen:
+    return _Seen(stage, _declared(study, stage), _settings(study, stage), code_digest(stage.function.split(":")[0]))
+
+
+def _work(seen: _Seen, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
     """A piece of work without its folder, and the key of its result."""
+    stage = seen.stage
     read = {name: _entries_for(result.entries[name], sessions) for name in stage.reads}
     names = [getattr(result.study, field_name) for field_name in stage.files]
     inputs = {name: result.inputs[Path(name).as_posix()] for name in names if name is not None}
@@ -202,7 +219,7 @@ def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Wo
     whole = stage.scope == "study"
     work = Work(
         result.name,
-        _declared(result.study, stage),
+        seen.study,
         result.folder,
         Path(),
         tuple(sessions),
@@ -215,8 +232,8 @@ def _work(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Wo
     key = digest_of(
         [
             stage.name,
-            code_digest(stage.function.split(":")[0]),
-            _settings(result.study, stage),
+            seen.code,
+            seen.settings,
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],
             inputs,
@@ -237,7 +254,8 @@ def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[E
 
 def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> dict[str, Entry]:
     """The stage's entry for each session, computed where the cache has none."""
-    found = _entries(stage, result, [_work(stage, result, [session]) for session in sessions], means)
+    seen = _seen(stage, result.study)
+    found = _entries(stage, result, [_work(seen, result, [session]) for session in sessions], means)
     return {session.id: entry for session, entry in zip(sessions, found, strict=True)}
 
 
@@ -330,7 +348,7 @@ def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache)
 
 
 def _run_study(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> Entry:
-    work, key = _work(stage, result, sessions)
+    work, key = _work(_seen(stage, result.study), result, sessions)
     entry = _look_up(stage, key, "", result, means.cache)
     result.computed[stage.name] = int(entry is None)
     if entry is None:
