@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from fusion_core.samples import Samples
 
 _TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
+_NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
+_PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them
 _POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
 
 
@@ -277,6 +279,8 @@ def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
 
 def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
     """A frame with exactly the table's columns, in its order and types."""
+    if data.columns.tolist() == TABLES[name].names and data.dtypes.tolist() == [_PANDAS[c.type] for c in TABLES[name]]:
+        return data.copy(deep=False)
     converted = {}
     for column in TABLES[name]:
         values = data[column.name] if column.name in data else pd.Series([None] * len(data), index=data.index)
@@ -285,6 +289,8 @@ def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
 
 
 def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
+    if values.dtype == _PANDAS[kind]:
+        return values
     if kind == _TEXT:
         return values.astype("string")
     if kind == _FLOAT:
@@ -319,7 +325,7 @@ def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
                 parts.append(file.read(use_threads=False))
     whole = pa.concat_tables(parts) if parts else TABLES[name].empty_table()
     # Straight to the types of `as_table`; by way of objects it takes three times as long.
-    found: pd.DataFrame = whole.to_pandas(types_mapper={_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}.get)
+    found: pd.DataFrame = whole.to_pandas(types_mapper=_NULLABLE.get)
     return found
 
 
