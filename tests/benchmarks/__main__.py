@@ -1,4 +1,4 @@
-"""`make bench`: estimators beside other libraries and the plain loop, reading a log, and the command's start."""
+"""`make bench`: estimators beside other libraries and the plain loop, reading a log, the start, an archive."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 
 from fusion_core import ESTIMATORS, Estimator, FusionKalman, Samples, Sensor, WindowGP, replay_loop
 from pipeline.formats import read_log
-from pipeline.formats.log import Content, Wanted
-from tests.benchmarks import peers
+from pipeline.formats.log import Wanted
+from tests.benchmarks import archive, peers
+from tests.benchmarks.stock import KINDS, stock_arrays
 from tests.conftest import CLONE, session_messages, write_session
 
 SESSION_S = 60.0
@@ -136,37 +135,15 @@ def streaming() -> None:
 
 def reading() -> None:
     """One session's log to arrays, the container and payloads by the stock packages beside ours."""
-    kinds: dict[str, Content] = {
-        "/tracker/position": "position",
-        "/reference/position": "position",
-        "/phone/imu": "acceleration",
-    }
-    wanted = [Wanted(topic, content) for topic, content in kinds.items()]
+    wanted = [Wanted(topic, content) for topic, content in KINDS.items()]
     with tempfile.TemporaryDirectory() as folder:
         path = write_session(Path(folder) / "a.mcap", session_messages(SESSION_S))
         count = sum(readings.read for readings in read_log(path, wanted).topics.values())
         ours = fastest(lambda: read_log(path, wanted), 5)
-        stock = fastest(lambda: stock_arrays(path, kinds))
+        stock = fastest(lambda: stock_arrays(path))
     print(f"Reading that session's log of {count} CDR messages: milliseconds")
     print(f"  mcap and mcap-ros2-support {1000 * stock:>10.1f}")
     print(f"  steadyhand                 {1000 * ours:>10.1f}{stock / ours:>9.1f} x")
-
-
-def stock_arrays(path: Path, topics: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Arrival, stamp (ns) and figures of each topic, by the stock reader and decoder, message by message."""
-    rows: dict[str, list[list[float]]] = {topic: [] for topic in topics}
-    with path.open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        for _, channel, message, decoded in reader.iter_decoded_messages(topics=list(topics)):
-            stamp = decoded.header.stamp.sec * 1_000_000_000 + decoded.header.stamp.nanosec
-            if topics[channel.topic] == "position":
-                point = decoded.point
-                values = [point.x, point.y, point.z]
-            else:
-                force, rate, turn = decoded.linear_acceleration, decoded.angular_velocity, decoded.orientation
-                values = [force.x, force.y, force.z, rate.x, rate.y, rate.z, turn.x, turn.y, turn.z, turn.w]
-            rows[channel.topic].append([message.log_time, stamp, *values])
-    return {topic: np.array(values) for topic, values in rows.items()}
 
 
 def starting() -> None:
@@ -191,3 +168,4 @@ if __name__ == "__main__":
     streaming()
     reading()
     starting()
+    archive.measure(archive.SMALL)

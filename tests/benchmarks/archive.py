@@ -19,15 +19,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
-
 from pipeline.cache import Cache
 from pipeline.commands.console import PlainLines
 from pipeline.commands.run import executor_of
 from pipeline.executors import Processes
 from pipeline.runner import InThisProcess, Means, Result, bring_up_to_date
 from pipeline.stages import COMPARE, INGEST
+from tests.benchmarks.stock import stock_arrays
 from tests.conftest import CLONE, STREAMS, session_messages, write_session
 
 LOGS = 12
@@ -109,17 +107,16 @@ def _most_held_mb(pid: int) -> float:
 
 
 def reading(study: Path, cache: Path) -> None:
-    """A log to tables in the cache, beside the stock reader and decoder that only go through its messages."""
+    """A log to tables in the cache, beside the stock reader and decoder that make arrays of it."""
     logs = sorted((study / "data").iterdir())[:LOGS]
-    began = time.perf_counter()
+    began = time.process_time()  # one thread each; what others do on the machine does not count
     for path in logs:
-        with path.open("rb") as file:
-            for _ in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
-                pass
-    stock = (time.perf_counter() - began) / len(logs)
-    means = Means(Cache(cache), InThisProcess(), PlainLines())
-    result = bring_up_to_date(study, INGEST, means)
-    ours = result.seconds / len(result.sessions)
+        stock_arrays(path)
+    stock = (time.process_time() - began) / len(logs)
+    for named in ("cold", "warm"):
+        began = time.process_time()
+        result = bring_up_to_date(study, INGEST, Means(Cache(cache / named), InThisProcess(), PlainLines()))
+    ours = (time.process_time() - began) / len(result.sessions)
     print(
         f"  first ingest of a session: {1000 * ours:.0f} ms; stock decoder: {1000 * stock:.0f} ms, {stock / ours:.1f} x"
     )
@@ -241,19 +238,24 @@ def _files(result: Result) -> dict[str, dict[str, bytes]]:
 
 
 def main() -> None:
-    """All of it, over an archive of as many sessions as asked for."""
+    """`python -m tests.benchmarks.archive`."""
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--sessions", type=int, default=SMALL)
     asked.add_argument("--seconds", type=float, default=60.0, help="length of each session")
     asked.add_argument("--light", action="store_true", help="hold the last frame instead of fusing, no variants")
     given = asked.parse_args()
-    print(f"An archive of {given.sessions} sessions of {given.seconds:g} s, two processes")
+    measure(given.sessions, given.seconds, given.light)
+
+
+def measure(sessions: int, seconds: float = 60.0, light: bool = False) -> None:
+    """All of it, over an archive of so many sessions; `light`: without fusion, which leaves what the archive costs."""
+    print(f"An archive of {sessions} sessions of {seconds:g} s, two processes")
     with tempfile.TemporaryDirectory() as made:
         root = Path(made)
-        study = write_archive(root / "archive", given.sessions, given.seconds, HELD if given.light else FUSED)
-        running(study, root, given.sessions, not given.light)
-        if not given.light:
-            small = write_archive(root / "small", min(SMALL, given.sessions), given.seconds)
+        study = write_archive(root / "archive", sessions, seconds, HELD if light else FUSED)
+        running(study, root, sessions, not light)
+        if not light:
+            small = write_archive(root / "small", min(SMALL, sessions), seconds)
             reading(small, root / "read")
             two_processes(small, root)
             cluster(small, root)
