@@ -11,6 +11,7 @@ import re
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ _DATA_FILES = (".css", ".jinja", ".typ")
 _MANIFEST = "entry.json"
 _NEW = "new"
 _KEY_LENGTH = 64
+_CLOCK_S = 2  # the coarsest clock of a file system
 
 
 def digest_of(value: object) -> str:
@@ -130,14 +132,22 @@ class Cache:
     def __init__(self, root: Path) -> None:
         self.root = root
 
+    @property
+    def inputs(self) -> Path:
+        """Where the digests of the studies' own files are remembered."""
+        return self.root / "inputs"
+
     def _folder(self, stage: str, key: str) -> Path:
         return self.root / stage / key[:2] / key
 
     def get(self, stage: str, key: str) -> Entry | None:
-        """The entry, or None if there is none or a file of it is missing or not what was written."""
+        """The entry, or None if there is none or a file of it is missing or not what was written.
+
+        A file whose size and time are those it was kept with is not read; `fault` and `verify` read all of them.
+        """
         folder = self._folder(stage, key)
         try:
-            entry = _read(folder)
+            entry = _read(folder, whole=False)
         except _DamagedError:
             return None
         with suppress(OSError):  # when it was last of use, for `prune`
@@ -191,7 +201,15 @@ class Cache:
             if path.is_file()
         }
         content = digest_of([files, dict(said)])
-        manifest = {"stage": stage, "key": key, "files": files, "said": dict(said), "content": content}
+        sealed_ns = _seal(folder, files)
+        manifest = {
+            "stage": stage,
+            "key": key,
+            "files": files,
+            "said": dict(said),
+            "content": content,
+            "sealed_ns": sealed_ns,
+        }
         (folder / _MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
         final = self._folder(stage, key)
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -202,6 +220,17 @@ class Cache:
             _discard(final, self.root / _NEW)
             folder.rename(final)
         return Entry(final, dict(said), content)
+
+
+def _seal(folder: Path, files: Iterable[str]) -> int:
+    """Set the files' time of modification so far back that whatever writes to one later changes it; that time.
+
+    A whole, even number of seconds, which every file system keeps as it is.
+    """
+    sealed_ns = (int(time.time()) // _CLOCK_S - 1) * _CLOCK_S * 1_000_000_000
+    for name in files:
+        os.utime(folder / name, ns=(sealed_ns, sealed_ns))
+    return sealed_ns
 
 
 class _DamagedError(Exception):
@@ -219,14 +248,17 @@ def fault_of(folder: Path) -> str | None:
     if not folder.is_dir():
         return None
     try:
-        _read(folder)
+        _read(folder, whole=True)
     except _DamagedError as damage:
         return str(damage)
     return None
 
 
-def _read(folder: Path) -> Entry:
-    """The entry in a folder, each file of it compared with the digest of what was written. Raises _DamagedError."""
+def _read(folder: Path, whole: bool) -> Entry:
+    """The entry in a folder, each file of it compared with the digest of what was written. Raises _DamagedError.
+
+    Unless all are to be read, a file that still bears the time it was sealed with counts as what was written.
+    """
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
         files, said, content = manifest["files"], manifest["said"], manifest["content"]
@@ -234,7 +266,9 @@ def _read(folder: Path) -> Entry:
             raise _DamagedError(f"{_MANIFEST} is not what was written")
         for name, stated in files.items():
             path = folder / name
-            if path.stat().st_size != stated["size"] or file_digest(path) != stated["sha256"]:
+            found = path.stat()
+            untouched = not whole and found.st_mtime_ns == manifest.get("sealed_ns")
+            if found.st_size != stated["size"] or not (untouched or file_digest(path) == stated["sha256"]):
                 raise _DamagedError(f"{name} is not what was written")
     except FileNotFoundError as error:
         raise _DamagedError(f"{Path(error.filename).name} is missing") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -72,7 +72,7 @@ def replay(
         if not kept:
             raise PipelineError(f"{study}: has no session to replay")
         entries = over_settings(result, REPLAY, [variant.study for variant in listed], kept, means)
-        _gather(gathered, result, listed, zip(kept, entries, strict=True), decided)
+        _gather(gathered, result, listed, list(zip(kept, entries, strict=True)), decided)
         return result
 
     def then(_folder: Path, result: Result) -> int:
@@ -107,7 +107,7 @@ def _gather(
     gathered: _Gathered,
     result: Result,
     listed: Sequence[Variant],
-    entries: Iterator[tuple[Session, list[Entry]]],
+    entries: Sequence[tuple[Session, list[Entry]]],
     decided: list[Row],
 ) -> None:
     """Take a study's entries together; a variant that failed in a session is set aside there, and said."""
@@ -117,23 +117,20 @@ def _gather(
         *({"session": name, "what": "file not used", "reason": why} for name, why in result.unused),
         *decided,
     ]
-    sessions = 0
+    accuracy = _of_variants("accuracy", listed, entries)
+    trials = _of_variants("trials", listed, entries).assign(study=result.name)
+    gathered.accuracy.append(tables.as_table("accuracy", accuracy))
+    gathered.trials.append(tables.as_table("replay_trials", trials))
+    rated = set(zip(accuracy["session"], accuracy["place"], strict=True))
     for session, found in entries:
-        sessions += 1
-        for variant, entry in zip(listed, found, strict=True):
-            label = variant.label or variant.estimator
-            fault = entry.said["set_aside"]
+        for place, (variant, entry) in enumerate(zip(listed, found, strict=True)):
+            label, fault = variant.label or variant.estimator, entry.said["set_aside"]
             if fault is not None:
                 result.set_aside.append((session, f"{label}: {fault}"))
                 rows.append({**session.ids, "variant": label, "what": "session set aside", "reason": fault})
-                continue
-            accuracy = tables.read("accuracy", entry.folder).assign(variant=variant.label)
-            if accuracy.empty:
+            elif (session.id, place) not in rated:
                 reason = "no instant with both an estimate and a reference"
                 rows.append({**session.ids, "variant": label, "what": "no accuracy", "reason": reason})
-            gathered.accuracy.append(tables.as_table("accuracy", accuracy))
-            trials = tables.read("trials", entry.folder).assign(study=result.name, variant=variant.label)
-            gathered.trials.append(tables.as_table("replay_trials", trials))
     gathered.results.append(result)
     gathered.exclusions += [{"study": result.name, **row} for row in rows]
     gathered.studies.append(
@@ -141,10 +138,20 @@ def _gather(
             "name": result.name,
             "title": result.study.title,
             "data_origin": result.study.data_origin,
-            "sessions": sessions,
+            "sessions": len(entries),
             "variants": [_settings(variant) for variant in listed],
         }
     )
+
+
+def _of_variants(name: str, listed: Sequence[Variant], entries: Sequence[tuple[Session, list[Entry]]]) -> pd.DataFrame:
+    """A table of all sessions and variants, session by session, with each variant's label and `place` in the list."""
+    parts = []
+    for place, variant in enumerate(listed):
+        folders = [found[place].folder for _, found in entries if found[place].said["set_aside"] is None]
+        parts.append(tables.read(name, folders).assign(variant=variant.label, place=place))
+    order = {session.id: number for number, (session, _) in enumerate(entries)}
+    return pd.concat(parts).sort_values("session", key=lambda ids: ids.map(order), kind="stable")
 
 
 def _settings(variant: Variant) -> Row:

@@ -6,30 +6,32 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.cache import Entry, file_digest
+from pipeline.cache import Cache, Entry
+from pipeline.digests import remembered
 from pipeline.errors import PipelineError
 from pipeline.runner.result import Result
 from pipeline.stage import Outcome
 from pipeline.study import Session, Study, find_sessions, load_study
 
 
-def found_in(folder: Path) -> tuple[Result, list[Session]]:
+def found_in(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
     """A study before its first stage, and its sessions as their names say. Raises PipelineError for a bad study."""
     study = load_study(folder)
     found = find_sessions(folder, study)
     result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
-    result.inputs = _input_digests(result.folder, study, found.sessions)
+    result.inputs = _input_digests(result.folder, study, found.sessions, cache)
     return result, found.sessions
 
 
-def _input_digests(root: Path, study: Study, sessions: Sequence[Session]) -> dict[str, str]:
+def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache: Cache) -> dict[str, str]:
     """SHA-256 of every file of the study that is read, by its path in the study."""
     paths = [root / "study.yaml", *(session.path for session in sessions)]
     for field_name in ("participants", "trials", "questionnaires", "measures", "printed"):
         name = getattr(study, field_name)
         if name is not None:
             paths.append(root / name)
-    return {path.relative_to(root).as_posix(): file_digest(path) for path in paths}
+    files = {path.relative_to(root).as_posix(): path for path in paths}
+    return remembered(files, root, cache.inputs)
 
 
 def still_usable(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:

@@ -13,7 +13,7 @@ from pipeline.runner.entries import entries_of, entry_of_study
 from pipeline.runner.means import Means
 from pipeline.runner.result import Result
 from pipeline.runner.sessions import found_in, require_something, still_usable
-from pipeline.runner.work import work_and_key
+from pipeline.runner.work import seen_by, work_and_key
 from pipeline.stage import Stage
 from pipeline.study import Session, Study
 
@@ -24,7 +24,7 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
     began = time.monotonic()
-    result, sessions = found_in(folder)
+    result, sessions = found_in(folder, means.cache)
     for stage in stages:
         try:
             if stage.scope == "session":
@@ -32,9 +32,8 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
                 sessions = still_usable(result, sessions, result.entries[stage.name])
                 require_something(folder, result, sessions)
             else:
-                result.entries[stage.name] = {
-                    "": entry_of_study(stage, result, *work_and_key(stage, result, sessions), means)
-                }
+                work, key = work_and_key(seen_by(stage, result.study), result, sessions)
+                result.entries[stage.name] = {"": entry_of_study(stage, result, work, key, means)}
         except PipelineError as error:
             raise PipelineError(_with_context(folder, result, str(error))) from None
     result.sessions = sessions
@@ -44,7 +43,8 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
 
 def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> dict[str, Entry]:
     """The stage's entry for each session, computed where the cache has none."""
-    found = entries_of(stage, result, [work_and_key(stage, result, [session]) for session in sessions], means)
+    seen = seen_by(stage, result.study)
+    found = entries_of(stage, result, [work_and_key(seen, result, [session]) for session in sessions], means)
     return {session.id: entry for session, entry in zip(sessions, found, strict=True)}
 
 
@@ -53,8 +53,8 @@ def over_settings(
 ) -> list[list[Entry]]:
     """A stage's entry for each of several settings of a study, by session: a list a session, in the settings' order."""
     began = time.monotonic()
-    of_settings = [replace(result, study=study) for study in settings]
-    works = [work_and_key(stage, one, [session]) for session in sessions for one in of_settings]
+    of_settings = [(seen_by(stage, study), replace(result, study=study)) for study in settings]
+    works = [work_and_key(seen, one, [session]) for session in sessions for seen, one in of_settings]
     entries = entries_of(stage, result, works, means)
     result.seconds += time.monotonic() - began
     return [entries[at : at + len(settings)] for at in range(0, len(entries), len(settings))]
@@ -66,16 +66,16 @@ def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[
     What follows from something that would have to be computed first cannot be known, and is not among them.
     Raises PipelineError where the study is bad.
     """
-    result, sessions = found_in(folder)
+    result, sessions = found_in(folder, cache)
     used: set[Path] = set()
     complete = True
     for stage in stages:
         if stage.scope == "study" and not complete:
             break
         parts = [[session] for session in sessions] if stage.scope == "session" else [sessions]
-        entries = {}
+        entries, seen = {}, seen_by(stage, result.study)
         for part in parts:
-            entry = cache.get(stage.name, work_and_key(stage, result, part)[1])
+            entry = cache.get(stage.name, work_and_key(seen, result, part)[1])
             if entry is not None:
                 entries[part[0].id if stage.scope == "session" else ""] = entry
         used |= {entry.folder for entry in entries.values()}

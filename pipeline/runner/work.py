@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,24 @@ from pipeline.stage import Stage, Work
 from pipeline.study import Session, Study
 
 
-def work_and_key(stage: Stage, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
+@dataclass(frozen=True)
+class Seen:
+    """What a stage sees of a study's settings, and what they and its code add to a key: the same for every session."""
+
+    stage: Stage
+    study: Study
+    settings: Any
+    code: str
+
+
+def seen_by(stage: Stage, study: Study) -> Seen:
+    """The study as the stage may see it."""
+    return Seen(stage, _declared(study, stage), _settings(study, stage), code_digest(stage.module))
+
+
+def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
     """A piece of work without its folder, and the key of its result."""
+    stage = seen.stage
     read = {name: _entries_for(result.entries[name], sessions) for name in stage.reads}
     names = [getattr(result.study, field_name) for field_name in stage.files]
     inputs = {name: result.inputs[Path(name).as_posix()] for name in names if name is not None}
@@ -26,7 +43,7 @@ def work_and_key(stage: Stage, result: Result, sessions: Sequence[Session]) -> t
     whole = stage.scope == "study"
     work = Work(
         result.name,
-        _declared(result.study, stage),
+        seen.study,
         result.folder,
         Path(),
         tuple(sessions),
@@ -39,8 +56,8 @@ def work_and_key(stage: Stage, result: Result, sessions: Sequence[Session]) -> t
     key = digest_of(
         [
             stage.name,
-            code_digest(stage.module),
-            _settings(result.study, stage),
+            seen.code,
+            seen.settings,
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],
             inputs,

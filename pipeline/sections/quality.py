@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
+from fusion_core import FloatArray
 from pipeline import figures, tables
 from pipeline.document.model import Block, Column, Paragraph, Section, Table, columns
 from pipeline.sections.material import Material, Row
@@ -134,10 +137,9 @@ def _mounting_table(material: Material) -> Table:
 def _noise(material: Material) -> list[Block]:
     """The sensors' noise in still stretches, against what study.yaml states."""
     rows = pd.DataFrame(material.rows("sensor_noise"))
-    residuals = tables.read("noise_residuals", material.assessed)
     names = [name for name in material.study.streams if name in set(rows["stream"])]
     units = [str(rows.loc[rows["stream"] == name, "unit"].iloc[0]) for name in names]
-    values = [residuals.loc[residuals["stream"] == name, "residual"].to_numpy(np.float64) for name in names]
+    values = _residuals(material, names)
     cells = tuple(
         (
             row["session"],
@@ -179,6 +181,15 @@ def _noise(material: Material) -> list[Block]:
             "Still: the reference moves slower than 20 mm/s; without a reference, the accelerations vary little.",
         ),
     ]
+
+
+def _residuals(material: Material, names: Sequence[str]) -> list[FloatArray]:
+    """Each stream's residuals of all sessions, in mm, mm/s or mm/s²; session by session, for there may be millions."""
+    found: dict[str, list[FloatArray]] = {name: [] for name in names}
+    for folder in material.assessed:
+        for name, rows in tables.read("noise_residuals", folder).groupby("stream"):
+            found[str(name)].append(rows["residual"].to_numpy(np.float64))
+    return [np.concatenate(parts) for parts in found.values()]
 
 
 def _agreement_table(material: Material) -> Table:

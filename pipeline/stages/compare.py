@@ -40,7 +40,10 @@ def run(work: Work) -> Outcome:
     asked = [one for entry in everything_asked(study, measures, observations) for one in entry]
     checked = findings(study, asked, tables.read("orders", measured), found["trials"], work.sessions)
     found["design_check"] = tables.frame("design_check", checked)
-    left_out += _without_accuracy(work)
+    told = {
+        name: tables.read(name, work.entries["ingest" if name == "quality" else "assess"]) for name in _SESSION_TABLES
+    }
+    left_out += _without_accuracy(work, told["quality"], told["accuracy"])
     found["exclusions"] = pd.concat(
         [
             tables.frame("exclusions", _sessions(work)),
@@ -49,9 +52,8 @@ def run(work: Work) -> Outcome:
             tables.frame("exclusions", left_out),
         ]
     )
-    for name in _SESSION_TABLES:
-        entries = work.entries["ingest" if name == "quality" else "assess"]
-        found[name] = _without_excluded(study, work, tables.read(name, entries))
+    for name, table in told.items():
+        found[name] = _without_excluded(study, work, table)
     found["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(found["accuracy"]))
     found["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, found["trials"]))
     if study.printed is not None:
@@ -63,14 +65,13 @@ def run(work: Work) -> Outcome:
     return Outcome()
 
 
-def _without_accuracy(work: Work) -> list[Row]:
+def _without_accuracy(work: Work, quality: pd.DataFrame, accuracy: pd.DataFrame) -> list[Row]:
     """Sessions whose reference could not be held against any estimate."""
     reference = work.study.stream_of_kind("reference")
     if reference is None or not work.study.estimators:
         return []
-    quality = tables.read("quality", work.entries["ingest"])
     there = set(quality.loc[quality["stream"] == reference, "session"])
-    rated = set(tables.read("accuracy", work.entries["assess"])["session"])
+    rated = set(accuracy["session"])
     reason = "its reference has no instant from 1 s after the first frame on"
     lacking = there - rated
     return [

@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from fusion_core import Samples
 from pipeline import recording, tables
+from pipeline.recording import Recording
 from pipeline.stage import Outcome, Work
 from pipeline.stages.assess import accuracy_row, trial_rows
 from pipeline.stages.fuse import tracked
+from pipeline.study import Study
+
+_Held = tuple[Recording, tuple[str, Samples] | None]
+_last: dict[tuple[Path, str], _Held] = {}
 
 
 def run(work: Work) -> Outcome:
     """The session's accuracy and trials of the study's one estimator, as `fuse` and `assess` would give them."""
     study, ingested = work.study, work.entry("ingest")
     (name,) = study.estimators
-    loaded = recording.load(study, ingested)
+    loaded, reference = _recording(study, ingested)
     track = tracked(study, name, loaded, work.session.id) if len(loaded.times) else tables.frame("tracks", [])
-    row = accuracy_row(work, loaded, recording.reference(study, loaded), name, track)
+    row = accuracy_row(work, loaded, reference, name, track)
     tables.write("accuracy", tables.frame("accuracy", [row] if row else []), work.out)
     trials = trial_rows(work, tables.read("events", ingested), {name: track})
     rows = [trial for trial in trials if trial["estimator"] == name]
     tables.write("trials", tables.frame("trials", rows), work.out)
     return Outcome()
+
+
+def _recording(study: Study, ingested: Path) -> _Held:
+    """A session's recording and reference: the last session's are held, for its other variants come next."""
+    key = ingested, study.model_dump_json(include={"streams", "axes"})
+    if key not in _last:
+        loaded = recording.load(study, ingested)
+        _last.clear()
+        _last[key] = loaded, recording.reference(study, loaded)
+    return _last[key]

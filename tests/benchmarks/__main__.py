@@ -1,4 +1,4 @@
-"""`make bench`: estimators beside other libraries and the plain loop, reading logs, and the command's start."""
+"""`make bench`: estimators beside other libraries and the plain loop, reading logs, the start, an archive."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fusion_core import ESTIMATORS, Estimator, FusionKalman, Samples, Sensor, WindowGP, replay_loop
-from tests.benchmarks import peers
+from tests.benchmarks import archive, peers
 from tests.benchmarks.reading import reading
 from tests.benchmarks.timing import fastest
 from tests.conftest import CLONE
@@ -142,3 +142,4 @@ if __name__ == "__main__":
     streaming()
     reading(SESSION_S)
     starting()
+    archive.measure(archive.SMALL)

@@ -1,0 +1,66 @@
+"""Digests of the files a study is made of, remembered as long as the file system says that a file is the same."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from pipeline.cache import digest_of, file_digest
+
+_SETTLED_NS = 2_000_000_000  # coarser than any file system's clock: a later change shows in the times
+_Stamp = list[int]
+_Known = dict[str, tuple[_Stamp, str]]
+
+
+def remembered(files: Mapping[str, Path], whose: Path, folder: Path) -> dict[str, str]:
+    """SHA-256 of each file, under its name. Only what changed since the last time is read.
+
+    A file is the same if its size, its times of modification and of change, and its inode are. One that changed
+    within the last two seconds is read again the next time, for it might change once more at what is the same time to
+    the file system (as git does with its index). What is known of the files of `whose` is kept in `folder`.
+    """
+    kept = folder / f"{digest_of(str(whose))}.json"
+    before = _read(kept)
+    now: _Known = {}
+    found = {}
+    for name, path in files.items():
+        stamp = _stamp(path)
+        known = before.get(name)
+        found[name] = known[1] if known is not None and known[0] == stamp else file_digest(path)
+        if max(stamp[1:3]) < time.time_ns() - _SETTLED_NS:
+            now[name] = (stamp, found[name])
+    if now != before:
+        _write(now, kept)
+    return found
+
+
+def _stamp(path: Path) -> _Stamp:
+    said = path.stat()
+    return [said.st_size, said.st_mtime_ns, said.st_ctime_ns, said.st_ino]
+
+
+def _read(kept: Path) -> _Known:
+    """What was kept; nothing where it is missing or damaged."""
+    try:
+        content = json.loads(kept.read_text(encoding="utf-8"))
+        if digest_of(content["files"]) != content["sha256"]:
+            return {}
+        return {name: (list(stamp), str(digest)) for name, (stamp, digest) in content["files"].items()}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
+def _write(known: _Known, kept: Path) -> None:
+    """Whole or not at all. What cannot be kept is found anew the next time."""
+    partial = kept.with_name(f"{kept.name}.{os.getpid()}")
+    with suppress(OSError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            partial.write_text(json.dumps({"sha256": digest_of(known), "files": known}), encoding="utf-8")
+            partial.replace(kept)
+        finally:
+            partial.unlink(missing_ok=True)
