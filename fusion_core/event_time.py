@@ -161,12 +161,20 @@ class EventTime:
         """Mean and SD at `times`, in any order; `constants` are filled if there is room for them, for rising times."""
         order = np.argsort(times, kind="stable")
         mean, sd = np.full((2, len(times), self.dimension), np.nan)
-        most = _most_within(np.sort(readings.time), self.history_s)
-        room, rising = self._row(2 * most + 8), np.asarray(times, dtype=np.float64)[order]
+        room, rising = self._room(readings), np.asarray(times, dtype=np.float64)[order]
         mean[order], sd[order] = event_replay.replay(
             self.model, readings, arrival, rising, room, self.history_s, lag_s, constants
         )
         return mean, sd
+
+    def _room(self, readings: Readings) -> History:
+        """More rows than of the readings ever stand in the history."""
+        return self._row(2 * _most_within(np.sort(readings.time), self.history_s) + 8)
+
+    def in_order(self, samples: Mapping[str, Samples]) -> tuple[Readings, FloatArray, History]:
+        """The readings as they are taken in one by one, when each is, and room for them to be taken into."""
+        readings, arrival = self._readings(samples)
+        return readings, arrival, self._room(readings)
 
     def filtered(self, samples: Mapping[str, Samples]) -> History | None:
         """All readings from the first position on in order of measurement, with the moments after each."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,16 @@ _MOST_SETS = 64  # of patterns
 _MOST_PATTERNS = 4096  # of regular windows whose weights are remembered
 Pattern = tuple[int, int, int, int]
 """A regular window: how many positions and other readings, and how many ns ago the newest of each was measured."""
+
+
+class Schedule(NamedTuple):
+    """The windows to come: `spans` (4, n) and `which` (n,) of the patterns' `weights` (k, m), −1 where irregular."""
+
+    spans: IntArray
+    which: IntArray
+    weights: FloatArray
+    sensors: tuple[int, int]  # the tracker's and the other's index in `prior`
+    prior: window_gains.Prior
 
 
 @dataclass(frozen=True)
@@ -271,9 +281,7 @@ class WindowGP:
         times = np.asarray(times, dtype=np.float64)
         frames = used[self._tracker]
         others = used[names[0]] if names else Samples(np.empty(0), np.empty(0), np.empty((0, self._dimension)))
-        spans = window_steps.spans(
-            times, frames.time, frames.arrival, others.time, others.arrival, self.window, self.horizon_s
-        )
+        spans = self._spans(frames, others, times)
         mean = np.full((len(times), self._dimension), np.nan)
         sd = np.full((len(times), self._dimension), np.nan)
         left = np.flatnonzero(spans[1] > 0)
@@ -286,6 +294,29 @@ class WindowGP:
             mean[rows] = origin + (weights[:, None, :] @ centred)[:, 0]
             sd[rows] = np.sqrt(variance)[:, None]
         return Track(times, mean, sd)
+
+    def _spans(self, frames: Samples, others: Samples, times: FloatArray) -> IntArray:
+        found: IntArray = window_steps.spans(
+            times, frames.time, frames.arrival, others.time, others.arrival, self.window, self.horizon_s
+        )
+        return found
+
+    def schedule(self, samples: Mapping[str, Samples], times: FloatArray) -> Schedule:
+        """What is known of the windows at rising `times` before any value is: it depends on when readings arrive alone.
+
+        For a tracker and at most one other sensor, the readings of neither overtaking each other.
+        """
+        names = [name for name in self.sensors if name != self._tracker]
+        frames = samples[self._tracker]
+        others = samples[names[0]] if names else Samples(np.empty(0), np.empty(0), np.empty((0, self._dimension)))
+        spans = self._spans(frames, others, times)
+        which, weights = np.full(len(times), -1), np.empty((0, 0))
+        if self._regular_names is not None:
+            rates = [float(self.sensors[name].rate_hz or 1.0) for name in self._regular_names]
+            which, patterns = window_steps.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
+            weights, _ = self._of_patterns(patterns)
+        sensors = (self._index[self._tracker], self._index[names[0]] if names else 0)
+        return Schedule(spans, which, weights, sensors, self._prior)
 
     def _regular_windows(
         self,

@@ -14,6 +14,7 @@ import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.errors import PipelineError, did_you_mean
+from pipeline.simulation_settings import Simulation, Task
 
 SETTINGS_FILE = "study.yaml"
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -148,6 +149,9 @@ KINDS: dict[object, type[Frozen]] = {
 }
 
 
+SIMULATIONS = ("reach", "selection")
+
+
 class Events(Frozen):
     topic: str
 
@@ -267,21 +271,6 @@ class Exclusion(Frozen):
         return all(getattr(self, key) in (None, value) for key, value in ids.items())
 
 
-class ReachSimulation(Frozen):
-    """The paper's Experiment 1: still, a minimum-jerk reach along x, still again; written by `steadyhand simulate`."""
-
-    kind: Literal["reach"]
-    seed: int
-    recordings: Annotated[int, Field(ge=1, le=999)]
-    distance_mm: Positive = 200.0
-    still_before_s: Seconds = 2.1
-    reach_s: Positive = 0.9
-    still_after_s: Seconds = 2.1
-    tracker_rate_hz: Positive = 30.0
-    imu_rate_hz: Positive = 90.0
-    reference_rate_hz: Positive = 90.0
-
-
 class Study(Frozen):
     """A study folder's settings. A contrast is first − second in the order of `conditions`."""
 
@@ -305,7 +294,8 @@ class Study(Frozen):
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()
-    simulation: ReachSimulation | None = None
+    task: Task | None = None
+    simulation: Simulation | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
@@ -480,8 +470,11 @@ def read_yaml(path: Path, as_text: bool = False) -> dict[str, Any]:
     return content
 
 
-def load_study(folder: Path) -> Study:
-    """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy."""
+def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
+    """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy.
+
+    With `to_be_made` its tables need not be there yet.
+    """
     if not folder.is_dir():
         raise PipelineError(f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it")
     path = folder / SETTINGS_FILE
@@ -494,7 +487,10 @@ def load_study(folder: Path) -> Study:
     for field in ("participants", "trials", "questionnaires", "measures", "printed"):
         name = getattr(study, field)
         if name is not None:
-            inside(folder, name, f"{path}: {field}")
+            file = inside(folder, name, f"{path}: {field}", must_exist=False)
+            if not file.is_file() and not to_be_made:
+                made = f"; it is made by: steadyhand simulate {folder}" if study.simulation is not None else ""
+                raise PipelineError(f'{path}: {field}: there is no file "{name}" in the study folder{made}')
     if study.sessions is not None:
         inside(folder, study.sessions, f"{path}: sessions", must_exist=False)
     return study
@@ -522,14 +518,15 @@ def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Mo
 
 def _explained(fault: Any, model: type[BaseModel]) -> str:
     """One fault of pydantic's in the user's words."""
-    location = [part for part in fault["loc"] if part not in (*KINDS, "reach") or part is fault["loc"][0]]
+    location = [part for part in fault["loc"] if part not in (*KINDS, *SIMULATIONS) or part is fault["loc"][0]]
     field = ".".join(str(part) for part in location)
     if fault["type"] == "extra_forbidden":
         return f'unknown key "{field}"{did_you_mean(str(location[-1]), _keys_at(model, fault["loc"][:-1]))}'
     if fault["type"] == "missing":
         return f'"{field}" is missing'
     if fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        return f'"{field}" needs a kind: {", ".join(str(kind) for kind in KINDS)}'
+        kinds = SIMULATIONS if location[:1] == ["simulation"] else KINDS
+        return f'"{field}" needs a kind: {", ".join(str(kind) for kind in kinds)}'
     message = fault["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
     found = fault.get("input")

@@ -13,7 +13,8 @@ from pipeline.errors import PipelineError
 from pipeline.formats.log import Content
 from pipeline.formats.mcap import Message, in_order, write
 from pipeline.recording import seeded
-from pipeline.study import AccelerationStream, PositionStream, ReachSimulation, ReferenceStream, Study, inside
+from pipeline.simulation_settings import ReachSimulation
+from pipeline.study import AccelerationStream, PositionStream, ReferenceStream, Study, inside
 
 _EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
 _MM_PER_M = 1000.0
@@ -48,8 +49,7 @@ def simulate(
     lacks what the simulation needs.
     """
     settings = study.simulation
-    if settings is None:
-        raise PipelineError(f"{folder / 'study.yaml'}: has no `simulation:` block, so there is nothing to simulate")
+    assert isinstance(settings, ReachSimulation)  # noqa: S101 - tells the type checker
     if study.sessions is None or "{participant}" not in study.sessions or len(study.conditions) != 1:
         raise PipelineError(
             f"{folder / 'study.yaml'}: simulation: a reach needs one condition and sessions: with {{participant}} in it"

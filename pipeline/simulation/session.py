@@ -1,0 +1,317 @@
+"""One simulated session: a participant, a task and an estimator in one loop, with all that a log would hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from typing import Any
+
+import numpy as np
+
+from fusion_core import Estimator, FloatArray, Samples, Sensor, accuracy
+from fusion_core.alignment import rotate, rotations
+from pipeline.errors import PipelineError
+from pipeline.estimators import build_estimator, sensors
+from pipeline.recording import seeded
+from pipeline.simulation import layout as layouts
+from pipeline.simulation import loop_steps, people, sensing
+from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, hand_at
+from pipeline.simulation.live import Readings, live
+from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
+from pipeline.simulation.reach import minimum_jerk
+from pipeline.simulation_settings import SelectionSimulation
+from pipeline.study import AccelerationStream, PositionStream, Study
+
+_NS = 1e-9
+_USUAL_S = 80.0  # most sessions are done by then; a longer one is run again from its begin with more room
+_TREMOR_HZ, _TREMOR_DAMPING = 8.0, 0.1
+_DRIFT_HZ, _DRIFT_DAMPING = 0.3, 0.7
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What every session of a study shares. PipelineError, beginning with `where`, for what it lacks."""
+
+    study: Study
+    where: str
+
+    @cached_property
+    def simulation(self) -> SelectionSimulation:
+        """The block of study.yaml."""
+        assert isinstance(self.study.simulation, SelectionSimulation)  # noqa: S101 - tells the type checker
+        return self.study.simulation
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The task as the participant walks it."""
+        if self.study.task is None:
+            raise PipelineError(f"{self.where}: simulation: selection needs a task: with targets")
+        return layouts.layout(self.study.task, self.where)
+
+    @cached_property
+    def streams(self) -> tuple[str, PositionStream, str, AccelerationStream]:
+        """The tracker and the phone, with their names."""
+        study, found = self.study, {}
+        for kind, names in (("position", [study.tracker]), ("acceleration", [study.stream_of_kind("acceleration")])):
+            if names[0] is None:
+                raise PipelineError(f"{self.where}: simulation: streams lacks one of kind {kind}")
+            found[kind] = names[0]
+        tracker, imu = study.streams[found["position"]], study.streams[found["acceleration"]]
+        assert isinstance(tracker, PositionStream)  # noqa: S101
+        assert isinstance(imu, AccelerationStream)  # noqa: S101
+        if len(study.sensor_streams) > 2:
+            raise PipelineError(f"{self.where}: simulation: takes one tracker and one phone, and streams has more")
+        if imu.calibrate_s or any(imu.lever_arm_mm) or any(imu.mounting_xyzw[:3]):
+            raise PipelineError(
+                f"{self.where}: simulation: the phone is what the tracker sees; take out its mounting"
+            )
+        if study.axes not in (("x", "y"), ("x", "y", "z")):
+            raise PipelineError(f"{self.where}: simulation: selection needs axes: [x, y], found {list(study.axes)}")
+        return found["position"], tracker, found["acceleration"], imu
+
+    def shown(self, condition: str) -> Estimator:
+        """The estimator that a condition displays."""
+        name = self.study.shown.get(condition)
+        if name is None:
+            raise PipelineError(f'{self.where}: simulation: shown says nothing of "{condition}"; name its estimator')
+        return build_estimator(self.study, name)
+
+    def lag_s(self, condition: str) -> float:
+        """How late the condition's display is on the participant's own motion."""
+        if self.streams[1].rate_hz is None:  # a filter's lag depends on its readings' rates alone
+            rates = self.simulation.instruments.tracker_rate_hz, self.simulation.instruments.imu_rate_hz
+        else:
+            rates = self.streams[1].rate_hz, self.streams[3].rate_hz or self.simulation.instruments.imu_rate_hz
+        return effective_lag_s(self.study.model_dump_json(include=_LAG_DEPENDS_ON), self.study.shown[condition], rates)
+
+
+_LAG_DEPENDS_ON = {"title", "conditions", "axes", "streams", "estimators", "sessions"}
+
+
+@lru_cache(maxsize=256)
+def effective_lag_s(settings: str, name: str, rates_hz: tuple[float, float]) -> float:
+    """By how much an estimator is late on minimum-jerk reaches without noise; 0 where it is ahead.
+
+    `settings` are those of a study in JSON, as far as its estimators depend on them.
+    """
+    study = Study.model_validate_json(settings)
+    estimator, length_s, reach_s = build_estimator(study, name), 12.0, 0.9
+    known = sensors(study)
+
+    def hand(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        share, bend = np.zeros_like(time), np.zeros_like(time)
+        for number in range(int(length_s / 2 / reach_s)):
+            one, its = minimum_jerk(time, 1.0 + 2 * reach_s * number, reach_s)
+            sign = 1.0 if number % 2 == 0 else -1.0
+            share, bend = share + sign * one, bend + sign * its
+        return 150.0 * share, 150.0 * bend
+
+    def samples(sensor: Sensor, rate_hz: float) -> Samples:
+        time = np.arange(0.0, length_s, 1.0 / rate_hz)
+        value = np.zeros((len(time), sensor.dimension))
+        value[:, 0] = hand(time)[1 if sensor.order else 0]
+        return Samples(time, time + sensor.latency_s, value)
+
+    read = {
+        name: samples(sensor, rates_hz[1 if sensor.order else 0])
+        for name, sensor in known.items()
+        if sensor.order in (0, 2)
+    }
+    times = np.arange(1.0, length_s, 1.0 / rates_hz[1])
+    track = estimator.replay(read, times)
+    fine = np.arange(0.0, length_s, 0.002)
+    truth = np.zeros((len(fine), track.mean.shape[1]))
+    truth[:, 0] = hand(fine)[0]
+    found = accuracy.lag(times, track.mean, Samples(fine, fine, truth), np.random.default_rng(0)).value
+    return float(np.nan_to_num(max(found, 0.0)))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A session as it was. Times are s since its begin; positions in mm, in the tracker's frame.
+
+    `taps` (k, 5) holds per target when it was selected, the displayed and the true position, NaN where it was not;
+    `trace` (steps, 4) the true hand a millisecond apart; `shown` (i, d) what was displayed at `instant_ns`.
+    """
+
+    begins_s: float
+    ends_s: float
+    targets_mm: FloatArray
+    taps: FloatArray
+    plans: int
+    trace: FloatArray
+    shown: FloatArray
+    frames: sensing.Frames
+    frame_mm: FloatArray
+    phone: sensing.Phone
+    force_mm_s2: FloatArray
+
+    @property
+    def errors_mm(self) -> FloatArray:
+        """Displayed less target position of each selection (k, 2)."""
+        found: FloatArray = self.taps[:, [TAP_X, TAP_Y]] - self.targets_mm
+        return found
+
+    @property
+    def completion_time_s(self) -> float:
+        """From the begin to the last selection; NaN without one."""
+        return float(np.nanmax(self.taps[:, TAP_S]) - self.begins_s) if self.selected else np.nan
+
+    @property
+    def selected(self) -> int:
+        """How many targets were selected."""
+        return int(np.isfinite(self.taps[:, TAP_S]).sum())
+
+    @property
+    def selection_mse_mm2(self) -> float:
+        """The mean squared error over the selections."""
+        return float(np.nanmean(np.sum(self.errors_mm**2, axis=1))) if self.selected else np.nan
+
+    @property
+    def corrections_per_target(self) -> float:
+        """How often a movement was planned anew; 0 in a model that does not plan."""
+        return self.plans / max(self.selected, 1)
+
+
+def simulate(setting: Setting, participant: str, condition: str, *, compiled: bool = True) -> Outcome:
+    """A session, the same whoever else takes part and in whatever order. `compiled=False`: by the plain loop."""
+    length_s = min(_USUAL_S, setting.simulation.longest_s)
+    found, done = _attempt(setting, participant, condition, length_s, compiled)
+    if not done and length_s < setting.simulation.longest_s:
+        found, done = _attempt(setting, participant, condition, setting.simulation.longest_s, compiled)
+    return found
+
+
+def _attempt(
+    setting: Setting, participant: str, condition: str, length_s: float, compiled: bool
+) -> tuple[Outcome, bool]:
+    settings, (names, tracker, imu_name, imu) = setting.simulation, setting.streams
+    draws = partial(seeded, str(settings.seed), participant, condition)
+    frames = sensing.frames(tracker, settings.instruments, length_s, draws)
+    phone = sensing.phone(imu, settings.instruments, length_s, draws)
+    origin_ns = int(min([*frames.arrival_ns[:1], *phone.arrival_ns[:1], *reference_ns(setting, length_s)[:1]]))
+    turn, offset, rotation = _in_tracker_frame(phone, np.array(imu.gravity_mm_s2), len(setting.study.axes))
+    dimension = len(setting.study.axes)
+    readings = Readings(
+        frame_time=_since(frames.arrival_ns - round(tracker.latency_s / _NS), origin_ns),
+        frame_arrival=_since(frames.arrival_ns, origin_ns),
+        frame_mm=np.zeros((len(frames.time_ns), dimension)),
+        force_time=_since(phone.arrival_ns - round(imu.latency_s / _NS), origin_ns),
+        force_arrival=_since(phone.arrival_ns, origin_ns),
+        force_mm_s2=np.zeros((len(phone.time_ns), dimension)),
+    )
+    instant_ns = np.unique(phone.arrival_ns)
+    steps = int(instant_ns[-1] // 1_000_000) + 2 if len(instant_ns) else 1
+    session = Session(
+        np.zeros((steps + 1, 4)),
+        np.full((len(instant_ns), dimension), np.nan),
+        np.full((len(setting.layout.targets_mm), 5), np.nan),
+        np.zeros(3, np.int64),
+    )
+    sensed = Sensing(
+        frames.time_ns, np.ascontiguousarray(frames.noise_mm[:, :dimension]), phone.time_ns, turn, offset, instant_ns
+    )
+    person = people.accustomed(people.person(settings, participant), setting.lag_s(condition))
+    begin = layouts.start(setting.layout)
+    session.trace[0, :2] = begin
+    hand = hand_at(begin, settings.still_before_s)
+    walking = (person, setting.layout, *_sways(settings), hand, draws("hand"), sensed, readings, session)
+    estimator, instants = setting.shown(condition), _since(instant_ns, origin_ns)
+    found = live(estimator, (names, imu_name), readings, rotation, instants) if compiled else None
+    if found is not None:
+        loop_steps.run(*walking, found, instants)
+    else:
+        _plain(estimator, (names, imu_name), rotation, instants, walking)
+    step, shown_until = int(hand.progress[STEP]), int(session.next[2])
+    outcome = Outcome(
+        settings.still_before_s,
+        step * STEP_S,
+        setting.layout.targets_mm,
+        session.taps,
+        int(hand.progress[PLANS]),
+        session.trace[: step + 1],
+        session.shown[:shown_until],
+        _first(frames, int(session.next[0])),
+        readings.frame_mm[: session.next[0]],
+        _first(phone, int(session.next[1])),
+        readings.force_mm_s2[: session.next[1]],
+    )
+    return outcome, bool(hand.progress[PHASE] == DONE)
+
+
+def _plain(
+    estimator: Estimator,
+    names: tuple[str, str],
+    rotation: FloatArray,
+    instants: FloatArray,
+    walking: tuple[Any, ...],
+) -> None:
+    """The loop by the estimator's own `update` and `predict`: for any, and what the compiled one is held to."""
+    from fusion_core import Sample
+
+    hand, sensed, readings, session = walking[4], walking[6], walking[7], walking[8]
+    order = np.argsort(np.concatenate([readings.frame_arrival, readings.force_arrival]), kind="stable")
+    state, upcoming, count = estimator.start(), 0, len(readings.frame_arrival)
+    for index, now in enumerate(instants):
+        until = max(-(-int(sensed.instant_ns[index]) // 1_000_000), 1)
+        loop_steps.walk(*walking, until)  # type: ignore[call-arg]
+        if hand.progress[PHASE] == DONE:
+            return
+        while upcoming < len(order):
+            row = int(order[upcoming])
+            is_frame, row = row < count, row if row < count else row - count
+            arrival = (readings.frame_arrival if is_frame else readings.force_arrival)[row]
+            if arrival > now:
+                break
+            if is_frame:
+                sample = Sample(readings.frame_time[row], arrival, readings.frame_mm[row].copy())
+            else:
+                sample = Sample(readings.force_time[row], arrival, readings.force_mm_s2[row].copy(), rotation[row])
+            state = estimator.update(state, names[0 if is_frame else 1], sample)
+            upcoming += 1
+        session.shown[index] = estimator.predict(state, float(now))[0]
+        session.next[2] = index + 1
+
+
+def _first(found: Any, count: int) -> Any:
+    """The first readings of a sensor."""
+    return type(found)(*(getattr(found, name)[:count] for name in found.__dataclass_fields__))
+
+
+def _since(time_ns: IntArray, origin_ns: int) -> FloatArray:
+    """As the pipeline reckons a log's times, to the last bit."""
+    found: FloatArray = (time_ns - origin_ns) * _NS
+    return found
+
+
+def reference_ns(setting: Setting, length_s: float) -> IntArray:
+    """When the true position is written down, in ns."""
+    rate_hz = setting.simulation.instruments.reference_rate_hz
+    return np.rint(np.arange(0.0, length_s, 1.0 / rate_hz) / _NS).astype(np.int64)
+
+
+@lru_cache(maxsize=8)
+def _sways_of(tremor_mm: float, drift_mm: float) -> tuple[Any, Any]:
+    return people.sway(_TREMOR_HZ, _TREMOR_DAMPING, tremor_mm), people.sway(_DRIFT_HZ, _DRIFT_DAMPING, drift_mm)
+
+
+def _sways(settings: SelectionSimulation) -> tuple[Any, Any]:
+    return _sways_of(settings.traits.tremor_mm.mean, settings.traits.drift_mm.mean)
+
+
+def _in_tracker_frame(
+    phone: sensing.Phone, gravity_mm_s2: FloatArray, dimension: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What makes an acceleration of the hand the one that the pipeline finds in the log: its turn and its offset.
+
+    The phone feels `to_body (a − gravity) + error`; the pipeline turns that by the logged orientation and adds
+    gravity. Third, that orientation's rotation (n, d, 3).
+    """
+    believed = rotations(phone.logged_xyzw)
+    turn = believed @ phone.to_body
+    offset = rotate(phone.logged_xyzw, phone.error_mm_s2) - turn @ gravity_mm_s2 + gravity_mm_s2
+    return (
+        np.ascontiguousarray(turn[:, :dimension, :2]),
+        np.ascontiguousarray(offset[:, :dimension]),
+        np.ascontiguousarray(believed[:, :dimension]),
+    )
