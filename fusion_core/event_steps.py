@@ -246,13 +246,14 @@ def _correct(
     precision: float,
     innovation: float,
 ) -> None:
-    """One axis of a reading taken in."""
+    """One axis of a reading taken in. The covariance is kept symmetric: what is not would grow from round-off."""
     size = len(states) * len(axes) + len(constants)
     for state in range(size):
         gain = column[state] * precision
         mean[row, state] += gain * innovation
-        for other in range(size):
-            covariance[row, state, other] -= gain * column[other]
+        for other in range(state + 1):
+            both = (covariance[row, state, other] + covariance[row, other, state]) / 2.0 - gain * column[other]
+            covariance[row, state, other] = covariance[row, other, state] = both
 
 
 @njit(cache=True)
