@@ -147,11 +147,17 @@ def replay(
 
 
 @app.command()
-def simulate(studies: Studies) -> None:
-    """Write the logs of a study's `simulation:` block into the study folder."""
+def simulate(
+    studies: Studies,
+    jobs: Jobs = None,
+    if_needed: Annotated[
+        bool, typer.Option("--if-needed", help="Only what is not there yet, or was made from other settings.")
+    ] = False,
+) -> None:
+    """Write the simulated logs and tables of a study whose study.yaml has a `simulation:` block."""
     from pipeline.commands import simulate as command
 
-    command.simulate(studies)
+    command.simulate(studies, jobs, if_needed=if_needed)
 
 
 @app.command()

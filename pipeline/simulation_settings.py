@@ -150,6 +150,15 @@ class Workload(_Frozen):
         return self
 
 
+class Published(_Frozen):
+    """A reduction that a publication reports, from the first condition to the second, to stand beside the simulated."""
+
+    source: str = Field(min_length=1)
+    measure: str = Field(min_length=1)
+    conditions: tuple[str, str]
+    reduction: Annotated[float, Field(ge=-100, le=1)]
+
+
 class SelectionSimulation(_Frozen):
     """The paper's Experiment 2 with simulated participants, who see the display alone."""
 
@@ -161,6 +170,7 @@ class SelectionSimulation(_Frozen):
     instruments: Instruments = Instruments()
     workload: Workload | None = None
     repeats: Annotated[int, Field(ge=0, le=10_000)] = 0
+    published: tuple[Published, ...] = ()
     still_before_s: Annotated[float, Field(ge=1, le=60)] = 2.0
     longest_s: Annotated[float, Field(ge=10, le=3600)] = 240.0
 

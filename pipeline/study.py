@@ -17,6 +17,7 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.simulation_settings import Simulation, Task
 
 SETTINGS_FILE = "study.yaml"
+TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed", "repeats")  # files of a study
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -291,6 +292,7 @@ class Study(Frozen):
     questionnaires: str | None = None
     measures: str | None = None
     printed: str | None = None
+    repeats: str | None = None
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()
@@ -484,7 +486,7 @@ def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
     content = read_yaml(path)
     content.setdefault("title", folder.resolve().name)
     study = parse(Study, content, path)
-    for field in ("participants", "trials", "questionnaires", "measures", "printed"):
+    for field in TABLE_FIELDS:
         name = getattr(study, field)
         if name is not None:
             file = inside(folder, name, f"{path}: {field}", must_exist=False)

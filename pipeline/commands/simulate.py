@@ -1,21 +1,56 @@
-"""`simulate`: write a study's simulated logs."""
+"""`simulate`: write a study's simulated logs and tables."""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from pipeline.commands import console
-from pipeline.simulate import simulate as write_logs
-from pipeline.study import load_study
+from pipeline.commands.run import PROCESS, executor_of
+from pipeline.errors import PipelineError
+from pipeline.simulation_settings import ReachSimulation
+from pipeline.study import Study, load_study
 
 
-def simulate(studies: Sequence[Path]) -> None:
-    """Write the logs of each study's `simulation:` block into its folder."""
+def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: bool = False) -> None:
+    """Write the files of each study's `simulation:` block into its folder.
+
+    With `if_needed` only where they are not there as these settings and this code make them; a study that simulates
+    nothing is passed over.
+    """
     for folder in studies:
-        study = load_study(folder)
-        with console.progress() as progress:
-            paths = write_logs(folder, study, partial(progress.begin, "simulate"), progress.advance)
-            progress.end()
-        console.say(f"{folder}: wrote {len(paths)} logs, {paths[0].name} to {paths[-1].name}")
+        study = load_study(folder, to_be_made=True)
+        if study.simulation is None:
+            if if_needed:
+                continue
+            raise PipelineError(f"{folder / 'study.yaml'}: has no `simulation:` block, so there is nothing to simulate")
+        if isinstance(study.simulation, ReachSimulation):
+            _reach(folder, study, if_needed)
+        else:
+            _selection(folder, study, jobs, if_needed)
+
+
+def _reach(folder: Path, study: Study, if_needed: bool) -> None:
+    """The paper's Experiment 1, whose logs are small and come with the study."""
+    from pipeline.study import find_sessions
+
+    if if_needed and find_sessions(folder, study).sessions:
+        return
+    reach = importlib.import_module("pipeline.simulation.reach")
+    with console.progress() as progress:
+        paths = reach.simulate(folder, study, partial(progress.begin, "simulate"), progress.advance)
+        progress.end()
+    console.say(f"{folder}: wrote {len(paths)} logs, {paths[0].name} to {paths[-1].name}")
+
+
+def _selection(folder: Path, study: Study, jobs: int | None, if_needed: bool) -> None:
+    from pipeline.simulation.study_files import is_made, simulate_study
+
+    if if_needed and is_made(folder, study):
+        return
+    with executor_of(jobs, PROCESS) as executor, console.progress() as progress:
+        files = simulate_study(folder, study, executor, partial(progress.begin, "simulate"), progress.advance)
+        progress.end()
+    console.say(f"{folder}: wrote {len(files)} logs, {Path(files[0]).name} to {Path(files[-1]).name}, and tables")

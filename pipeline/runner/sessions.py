@@ -11,7 +11,7 @@ from pipeline.digests import remembered
 from pipeline.errors import PipelineError
 from pipeline.runner.result import Result
 from pipeline.stage import Outcome
-from pipeline.study import Session, Study, find_sessions, load_study
+from pipeline.study import TABLE_FIELDS, Session, Study, find_sessions, load_study
 
 
 def found_in(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
@@ -26,7 +26,7 @@ def found_in(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
 def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache: Cache) -> dict[str, str]:
     """SHA-256 of every file of the study that is read, by its path in the study."""
     paths = [root / "study.yaml", *(session.path for session in sessions)]
-    for field_name in ("participants", "trials", "questionnaires", "measures", "printed"):
+    for field_name in TABLE_FIELDS:
         name = getattr(study, field_name)
         if name is not None:
             paths.append(root / name)

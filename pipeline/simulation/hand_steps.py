@@ -2,7 +2,8 @@
 
 The participant sees the display alone, late, and knows its own hand's plan. Two models of the movement: intermittent
 minimum-jerk plans (Flash and Hogan 1985, replanned after a refractory time) and a second-order lag towards the goal.
-Everything is two-dimensional, in the plane of the canvas, in mm and s.
+Everything is two-dimensional, in the plane of the canvas, in mm and s. All is inlined: to hand the structures on
+would cost more than the steps.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from numba import njit
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-STEP_S = 0.001
-_RING = 2048  # steps of memory: more than any delay
-_AVERAGED = 50  # steps over which the seen discrepancy is averaged
+STEP_S = 0.002  # sensors are read in between; a hand hardly bends in it
+_RING = 1024  # steps of memory, a power of two: more than any delay
+_AVERAGED = 25  # steps over which the seen discrepancy is averaged
 _MUSCLE_S = 0.04  # each of the two filters between motor noise and hand
 _LOOKED_FOR = 100  # points of the path to either side, among which it is found again
 _SEEN_S = 0.15  # of the leaky mean of the seen offset, by which a press is judged
@@ -59,6 +60,7 @@ class Layout(NamedTuple):
     targets_mm: FloatArray  # (k, 2)
     target_at: IntArray  # (k,): rows of the path
     half_window_mm: FloatArray  # (2,); infinite without a window
+    radius_mm: FloatArray  # (k,): of the targets
 
 
 class Sway(NamedTuple):
@@ -122,7 +124,7 @@ def hand_at(start_mm: FloatArray, begins_s: float) -> Hand:
     return hand
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
     position, velocity, drive = state[0, axis], state[1, axis], state[2, axis]
     for row in range(3):
@@ -131,7 +133,7 @@ def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
     state[2, axis] += motion.drive_sd * draw
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) -> None:
     """A quintic from the planned motion now to rest at the goal, in T₀ + k·√distance."""
     goal = (to_x, to_y)
@@ -151,7 +153,7 @@ def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) ->
     hand.progress[PLANS] += 1
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _follow_plan(hand: Hand, now: float) -> None:
     """The planned motion at `now`: along the polynomial, at rest beyond its end."""
     lasts = hand.clock[_PLAN_LASTS]
@@ -171,7 +173,7 @@ def _follow_plan(hand: Hand, now: float) -> None:
         hand.planned[2, axis] = acceleration / (lasts * lasts)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _follow_goal(person: Person, hand: Hand, to_x: float, to_y: float) -> None:
     """A step of a second-order lag towards the goal, by the mean of both ends' velocities."""
     goal, stiffness = (to_x, to_y), person.natural_frequency_rad_s**2
@@ -184,21 +186,21 @@ def _follow_goal(person: Person, hand: Hand, to_x: float, to_y: float) -> None:
         hand.planned_to[axis] = goal[axis]
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _perceive(person: Person, hand: Hand) -> None:
     """The correction follows the discrepancy between what was seen and what the hand was to do, with what lag adds."""
     step = hand.progress[STEP]
     delay = round(person.visual_delay_s / STEP_S)
     earlier = round((person.visual_delay_s + person.expected_lag_s) / STEP_S)
     for axis in range(2):
-        apart = hand.seen[(step - delay) % _RING, axis] - hand.own[(step - earlier) % _RING, axis]
-        hand.summed[axis] += apart - hand.apart[(step - _AVERAGED) % _RING, axis]
-        hand.apart[step % _RING, axis] = apart
+        apart = hand.seen[(step - delay) & (_RING - 1), axis] - hand.own[(step - earlier) & (_RING - 1), axis]
+        hand.summed[axis] += apart - hand.apart[(step - _AVERAGED) & (_RING - 1), axis]
+        hand.apart[step & (_RING - 1), axis] = apart
         mean = hand.summed[axis] / _AVERAGED
         hand.correction[axis] += STEP_S / person.correction_s * (mean - hand.correction[axis])
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _in_view(person: Person, layout: Layout, x: float, y: float, seen_x: float, seen_y: float) -> bool:
     return bool(
         abs(x - seen_x) <= layout.half_window_mm[0] - person.margin_mm
@@ -206,19 +208,18 @@ def _in_view(person: Person, layout: Layout, x: float, y: float, seen_x: float, 
     )
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _farthest_in_view(person: Person, layout: Layout, along: int, last: int, seen_x: float, seen_y: float) -> int:
     """The farthest point of the path in view, from the nearest such to where it was; where it was if none is."""
     path, found = layout.path_mm, -1
     for away in range(_LOOKED_FOR):
-        if along - away >= 0 and along - away < len(path):
-            if _in_view(person, layout, path[along - away, 0], path[along - away, 1], seen_x, seen_y):
-                found = along - away
-                break
-        if along + away <= last and along + away < len(path):
-            if _in_view(person, layout, path[along + away, 0], path[along + away, 1], seen_x, seen_y):
-                found = along + away
-                break
+        back, on = max(along - away, 0), min(along + away, last)
+        if _in_view(person, layout, path[back, 0], path[back, 1], seen_x, seen_y):
+            found = back
+        elif _in_view(person, layout, path[on, 0], path[on, 1], seen_x, seen_y):
+            found = on
+        if found >= 0:
+            break
     if found < 0:
         return along
     while found < last and _in_view(person, layout, path[found + 1, 0], path[found + 1, 1], seen_x, seen_y):
@@ -226,12 +227,12 @@ def _farthest_in_view(person: Person, layout: Layout, along: int, last: int, see
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
     """The goal: the target where it is in view, else the farthest point of the path that is."""
     step, target = hand.progress[STEP], hand.progress[TARGET]
     delay = round(person.visual_delay_s / STEP_S)
-    seen_x, seen_y = hand.seen[(step - delay) % _RING, 0], hand.seen[(step - delay) % _RING, 1]
+    seen_x, seen_y = hand.seen[(step - delay) & (_RING - 1), 0], hand.seen[(step - delay) & (_RING - 1), 1]
     target_x, target_y = layout.targets_mm[target, 0], layout.targets_mm[target, 1]
     path, last = layout.path_mm, layout.target_at[target]
     along = _farthest_in_view(person, layout, hand.progress[ALONG], last, seen_x, seen_y)
@@ -243,19 +244,20 @@ def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
     if hand.progress[_AIMING] == 1:
         hand.goal[0], hand.goal[1] = target_x, target_y
         for axis in range(2):
-            offset = hand.goal[axis] - hand.seen[(step - delay) % _RING, axis]
+            offset = hand.goal[axis] - hand.seen[(step - delay) & (_RING - 1), axis]
             hand.offset[axis] += STEP_S / _SEEN_S * (offset - hand.offset[axis])
     elif len(path) > 0:
         hand.goal[0], hand.goal[1] = path[along, 0], path[along, 1]
 
 
-@njit(cache=True)
-def _press(person: Person, hand: Hand, now: float) -> bool:
+@njit(cache=True, forceinline=True)
+def _press(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     """Has the participant decided to press? The own hand is slow and the target long enough near the centre."""
     if hand.progress[_AIMING] == 0:
         return False
     slow = np.hypot(hand.planned[1, 0], hand.planned[1, 1]) < person.slow_mm_s
-    allowed = person.press_radius_mm * (1.0 + (now - hand.clock[_AIMED_SINCE]) / person.patience_s)
+    near = min(person.press_radius_mm, layout.radius_mm[hand.progress[TARGET]])
+    allowed = near * (1.0 + (now - hand.clock[_AIMED_SINCE]) / person.patience_s)
     if slow and np.hypot(hand.offset[0], hand.offset[1]) < allowed:
         hand.clock[_HELD_S] += STEP_S
     else:
@@ -263,7 +265,7 @@ def _press(person: Person, hand: Hand, now: float) -> bool:
     return bool(hand.clock[_HELD_S] >= person.dwell_s)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     """Where the participant stands in the task; True as the tap lands."""
     phase = hand.progress[PHASE]
@@ -271,7 +273,7 @@ def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
         hand.progress[PHASE] = MOVING
     elif phase == MOVING:
         _aim(person, layout, hand, now)
-        if _press(person, hand, now):
+        if _press(person, layout, hand, now):
             hand.progress[PHASE], hand.clock[_NEXT_AT] = TAPPING, now + person.tap_s
     elif phase == TAPPING and now >= hand.clock[_NEXT_AT]:
         hand.progress[PHASE], hand.clock[_NEXT_AT] = RESTING, now + person.resume_s
@@ -283,7 +285,7 @@ def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, draws: np.random.Generator) -> None:
     """The hand a step on: its plan, motor noise in proportion to speed, tremor and drift."""
     to_x, to_y = hand.goal[0] - hand.correction[0], hand.goal[1] - hand.correction[1]
@@ -316,7 +318,7 @@ def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, dra
         _sway(drift, hand.drift, axis, draws.standard_normal())
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def advance(
     person: Person,
     layout: Layout,
@@ -334,8 +336,8 @@ def advance(
     """
     step = hand.progress[STEP]
     now, known = step * STEP_S, not np.isnan(displayed_x)
-    hand.seen[step % _RING, 0], hand.seen[step % _RING, 1] = displayed_x, displayed_y
-    hand.own[step % _RING, 0], hand.own[step % _RING, 1] = hand.planned[0, 0], hand.planned[0, 1]
+    hand.seen[step & (_RING - 1), 0], hand.seen[step & (_RING - 1), 1] = displayed_x, displayed_y
+    hand.own[step & (_RING - 1), 0], hand.own[step & (_RING - 1), 1] = hand.planned[0, 0], hand.planned[0, 1]
     tapped = False
     if not known:  # the eyes have not met the first display yet
         hand.progress[_SEES_FROM] = step + 1 + round(person.visual_delay_s / STEP_S)
@@ -356,7 +358,7 @@ def advance(
     return tapped
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _pull(motion: Sway, state: FloatArray, axis: int) -> float:
     """A sway's acceleration."""
     return float(state[2, axis] - motion.damping * state[1, axis] - motion.stiffness * state[0, axis])

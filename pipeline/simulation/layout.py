@@ -21,6 +21,13 @@ def targets(task: Task) -> FloatArray:
     return np.concatenate([_of_ring(ring) for ring in task.rings])
 
 
+def _diameters(task: Task) -> FloatArray:
+    """The targets' diameters (k,)."""
+    if task.targets_mm:
+        return np.full(len(task.targets_mm), task.target_diameter_mm)
+    return np.concatenate([np.full(ring.targets + 1, ring.target_diameter_mm) for ring in task.rings])
+
+
 def _of_ring(ring: Ring) -> FloatArray:
     """Each target as far across the circle from the last as can be, every one once, and the first again."""
     half = (ring.targets + 1) // 2
@@ -61,7 +68,7 @@ def layout(task: Task, where: str) -> Layout:
     window = (np.inf, np.inf) if task.window_mm is None else task.window_mm
     if task.window_mm is not None and not len(path):
         raise PipelineError(f"{where}: task: with a window_mm there must be a path_mm, or nobody finds the targets")
-    return Layout(path, wanted, at, np.array(window, dtype=np.float64) / 2)
+    return Layout(path, wanted, at, np.array(window, dtype=np.float64) / 2, _diameters(task) / 2)
 
 
 def start(found: Layout) -> FloatArray:

@@ -23,7 +23,7 @@ from pipeline.simulation.hand_steps import (
 )
 from pipeline.simulation.live import Live, Readings, show
 
-_STEP_NS = 1_000_000
+STEP_NS = round(STEP_S * 1e9)
 # Columns of Session.taps.
 TAP_S, TAP_X, TAP_Y, TRUE_X, TRUE_Y = 0, 1, 2, 3, 4
 
@@ -51,10 +51,10 @@ class Session(NamedTuple):
 @njit(cache=True)
 def _sense(sensing: Sensing, readings: Readings, session: Session, step: int) -> None:
     """The readings that were measured in the step before `step`, from the hand's motion at its ends."""
-    now, trace = step * _STEP_NS, session.trace
+    now, trace = step * STEP_NS, session.trace
     frame, force = session.next[0], session.next[1]
     while frame < len(sensing.frame_ns) and sensing.frame_ns[frame] <= now:
-        share = 1.0 - (now - sensing.frame_ns[frame]) / _STEP_NS
+        share = 1.0 - (now - sensing.frame_ns[frame]) / STEP_NS
         for axis in range(readings.frame_mm.shape[1]):
             there = 0.0
             if axis < 2:
@@ -62,7 +62,7 @@ def _sense(sensing: Sensing, readings: Readings, session: Session, step: int) ->
             readings.frame_mm[frame, axis] = there + sensing.frame_noise_mm[frame, axis]
         frame += 1
     while force < len(sensing.force_ns) and sensing.force_ns[force] <= now:
-        share = 1.0 - (now - sensing.force_ns[force]) / _STEP_NS
+        share = 1.0 - (now - sensing.force_ns[force]) / STEP_NS
         x = trace[step - 1, 2] + share * (trace[step, 2] - trace[step - 1, 2])
         y = trace[step - 1, 3] + share * (trace[step, 3] - trace[step - 1, 3])
         for axis in range(readings.force_mm_s2.shape[1]):
@@ -114,7 +114,7 @@ def run(
 ) -> None:
     """A whole session: to the end of the task, or of the instants at which the display changes."""
     for index in range(len(instants)):
-        until = max((sensing.instant_ns[index] + _STEP_NS - 1) // _STEP_NS, 1)
+        until = max((sensing.instant_ns[index] + STEP_NS - 1) // STEP_NS, 1)
         walk(person, layout, tremor, drift, hand, draws, sensing, readings, session, until)
         if hand.progress[PHASE] == DONE:
             return

@@ -13,19 +13,12 @@ from pipeline.errors import PipelineError
 from pipeline.formats.log import Content
 from pipeline.formats.mcap import Message, in_order, write
 from pipeline.recording import seeded
+from pipeline.simulation.motion import minimum_jerk
 from pipeline.simulation_settings import ReachSimulation
 from pipeline.study import AccelerationStream, PositionStream, ReferenceStream, Study, inside
 
 _EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
 _MM_PER_M = 1000.0
-
-
-def minimum_jerk(time: FloatArray, begin_s: float, duration_s: float) -> tuple[FloatArray, FloatArray]:
-    """Share of the way, and its second derivative in 1/s², of a minimum-jerk movement (Flash and Hogan 1985)."""
-    unit = np.clip((time - begin_s) / duration_s, 0.0, 1.0)
-    position = 10 * unit**3 - 15 * unit**4 + 6 * unit**5
-    acceleration = (60 * unit - 180 * unit**2 + 120 * unit**3) / duration_s**2
-    return position, acceleration
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,12 @@ from pipeline.simulation import loop_steps, people, sensing
 from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, hand_at
 from pipeline.simulation.live import Readings, live
 from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
-from pipeline.simulation.reach import minimum_jerk
+from pipeline.simulation.motion import minimum_jerk
 from pipeline.simulation_settings import SelectionSimulation
 from pipeline.study import AccelerationStream, PositionStream, Study
 
 _NS = 1e-9
-_USUAL_S = 80.0  # most sessions are done by then; a longer one is run again from its begin with more room
+_USUAL_S = 100.0  # most sessions are done by then; a longer one is run again from its begin with more room
 _TREMOR_HZ, _TREMOR_DAMPING = 8.0, 0.1
 _DRIFT_HZ, _DRIFT_DAMPING = 0.3, 0.7
 
@@ -62,9 +62,7 @@ class Setting:
         if len(study.sensor_streams) > 2:
             raise PipelineError(f"{self.where}: simulation: takes one tracker and one phone, and streams has more")
         if imu.calibrate_s or any(imu.lever_arm_mm) or any(imu.mounting_xyzw[:3]):
-            raise PipelineError(
-                f"{self.where}: simulation: the phone is what the tracker sees; take out its mounting"
-            )
+            raise PipelineError(f"{self.where}: simulation: the phone is what the tracker sees; take out its mounting")
         if study.axes not in (("x", "y"), ("x", "y", "z")):
             raise PipelineError(f"{self.where}: simulation: selection needs axes: [x, y], found {list(study.axes)}")
         return found["position"], tracker, found["acceleration"], imu
@@ -131,7 +129,7 @@ class Outcome:
     """A session as it was. Times are s since its begin; positions in mm, in the tracker's frame.
 
     `taps` (k, 5) holds per target when it was selected, the displayed and the true position, NaN where it was not;
-    `trace` (steps, 4) the true hand a millisecond apart; `shown` (i, d) what was displayed at `instant_ns`.
+    `trace` (steps, 4) the true hand `STEP_S` apart; `shown` (i, d) what was displayed at `instant_ns`.
     """
 
     begins_s: float
@@ -145,6 +143,7 @@ class Outcome:
     frame_mm: FloatArray
     phone: sensing.Phone
     force_mm_s2: FloatArray
+    instant_ns: IntArray
 
     @property
     def errors_mm(self) -> FloatArray:
@@ -201,7 +200,7 @@ def _attempt(
         force_mm_s2=np.zeros((len(phone.time_ns), dimension)),
     )
     instant_ns = np.unique(phone.arrival_ns)
-    steps = int(instant_ns[-1] // 1_000_000) + 2 if len(instant_ns) else 1
+    steps = int(instant_ns[-1] // loop_steps.STEP_NS) + 2 if len(instant_ns) else 1
     session = Session(
         np.zeros((steps + 1, 4)),
         np.full((len(instant_ns), dimension), np.nan),
@@ -235,6 +234,7 @@ def _attempt(
         readings.frame_mm[: session.next[0]],
         _first(phone, int(session.next[1])),
         readings.force_mm_s2[: session.next[1]],
+        instant_ns[:shown_until],
     )
     return outcome, bool(hand.progress[PHASE] == DONE)
 
@@ -253,7 +253,7 @@ def _plain(
     order = np.argsort(np.concatenate([readings.frame_arrival, readings.force_arrival]), kind="stable")
     state, upcoming, count = estimator.start(), 0, len(readings.frame_arrival)
     for index, now in enumerate(instants):
-        until = max(-(-int(sensed.instant_ns[index]) // 1_000_000), 1)
+        until = max(-(-int(sensed.instant_ns[index]) // loop_steps.STEP_NS), 1)
         loop_steps.walk(*walking, until)  # type: ignore[call-arg]
         if hand.progress[PHASE] == DONE:
             return
@@ -280,7 +280,7 @@ def _first(found: Any, count: int) -> Any:
 
 def _since(time_ns: IntArray, origin_ns: int) -> FloatArray:
     """As the pipeline reckons a log's times, to the last bit."""
-    found: FloatArray = (time_ns - origin_ns) * _NS
+    found: FloatArray = np.asarray((time_ns - origin_ns) * _NS, dtype=np.float64)
     return found
 
 

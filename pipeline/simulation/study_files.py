@@ -1,0 +1,221 @@
+"""A simulated study's files: logs, participants, questionnaires and repeated studies; all of a run or none."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.cache import code_digest, digest_of
+from pipeline.counterbalancing import assigned
+from pipeline.errors import PipelineError
+from pipeline.simulation.log import write_log
+from pipeline.simulation.session import Outcome, Setting, simulate
+from pipeline.simulation.workload import ratings
+from pipeline.simulation_settings import SelectionSimulation
+from pipeline.study import Study, inside
+
+MADE = "simulated.json"
+"""What the last run made, and from what: beside study.yaml."""
+_BEING_MADE = ".being-simulated"
+Begin = Callable[[int], None]
+Done = Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Session:
+    """One session to simulate."""
+
+    participant: str
+    condition: str
+    order: int
+    file: str
+
+
+def is_made(folder: Path, study: Study) -> bool:
+    """Are the files there, and were they made from these settings by this code?"""
+    try:
+        made = json.loads((folder / MADE).read_text(encoding="utf-8"))
+        there = all((folder / name).is_file() for name in made["files"])
+        return bool(there and made["from"] == _made_from(study))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _made_from(study: Study) -> str:
+    settings = {"conditions", "sessions", "axes", "streams", "events", "estimators", "shown", "task", "simulation"}
+    tables = {"participants", "questionnaires", "repeats"}
+    return digest_of([json.loads(study.model_dump_json(include=settings | tables)), code_digest(__name__)])
+
+
+def simulate_study(folder: Path, study: Study, executor: Executor, begin: Begin, done: Done) -> list[str]:
+    """Write the study's files; the names of the logs.
+
+    They appear together once all are done: a run that is stopped leaves those of the run before. PipelineError where
+    study.yaml lacks what a simulation needs.
+    """
+    where = str(folder / "study.yaml")
+    setting = Setting(study, where)
+    sessions, settings = _sessions(setting, folder), setting.simulation
+    _check(setting)
+    begin(len(sessions) + settings.repeats)
+    beside = folder / _BEING_MADE
+    shutil.rmtree(beside, ignore_errors=True)
+    beside.mkdir()
+    try:
+        futures: dict[Any, Any] = {executor.submit(make, setting, one, beside): one for one in sessions}
+        again: dict[Any, int] = {executor.submit(repeat, setting, n): n for n in range(settings.repeats)}
+        measured, repeats = {}, {}
+        for future in as_completed([*futures, *again]):
+            if future in futures:
+                measured[futures[future]] = future.result()
+            else:
+                repeats[again[future]] = future.result()
+            done()
+        files = [one.file for one in sessions] + _tables(setting, beside, measured, repeats)
+        _publish(folder, beside, files, _made_from(study))
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+    return [one.file for one in sessions]
+
+
+def participants(settings: SelectionSimulation) -> list[str]:
+    """Their ids."""
+    return [f"P{number:02d}" for number in range(1, settings.participants + 1)]
+
+
+def _sessions(setting: Setting, folder: Path) -> list[Session]:
+    """Every participant in every condition, in counterbalanced order."""
+    study, found = setting.study, []
+    if study.sessions is None or not {"{participant}", "{condition}"} <= set(_placeholders(study.sessions)):
+        raise PipelineError(f"{setting.where}: sessions: needs {{participant}} and {{condition}} for the logs' names")
+    names, conditions = participants(setting.simulation), study.conditions
+    orders = assigned(len(conditions), len(names)) if len(conditions) > 1 else [(0,)] * len(names)
+    for participant, order in zip(names, orders, strict=True):
+        for place, index in enumerate(order, start=1):
+            condition = conditions[index]
+            file = study.sessions.format(participant=participant, condition=condition, session="")
+            inside(folder, file, f"{setting.where}: sessions", must_exist=False)
+            found.append(Session(participant, condition, place, file))
+    return found
+
+
+def _placeholders(pattern: str) -> list[str]:
+    return [part for part in ("{participant}", "{condition}") if part in pattern]
+
+
+def _check(setting: Setting) -> None:
+    """PipelineError for what would only be found in a worker."""
+    study = setting.study
+    _ = setting.layout, setting.streams
+    for condition in study.conditions:
+        setting.shown(condition)
+    for field, wanted in (
+        ("events", study.events is not None),
+        ("participants", study.participants is not None),
+        ("questionnaires", study.questionnaires is not None or setting.simulation.workload is None),
+        ("repeats", study.repeats is not None or setting.simulation.repeats == 0),
+    ):
+        if not wanted:
+            raise PipelineError(f"{setting.where}: {field}: is missing; the simulation writes to what it names")
+    for published in setting.simulation.published:
+        for condition in published.conditions:
+            if condition not in study.conditions:
+                raise PipelineError(f'{setting.where}: simulation: published: there is no condition "{condition}"')
+
+
+def make(setting: Setting, session: Session, folder: Path) -> dict[str, float]:
+    """Simulate one session, write its log, and say what a rating depends on. Runs in a worker."""
+    outcome = simulate(setting, session.participant, session.condition)
+    path = folder / session.file
+    write_log(path, setting, session.participant, session.condition, session.order, outcome)
+    return drivers(outcome)
+
+
+def drivers(outcome: Outcome) -> dict[str, float]:
+    """What was measured in a session."""
+    return {
+        "completion_time_s": outcome.completion_time_s,
+        "selection_rmse_mm": float(np.sqrt(outcome.selection_mse_mm2)),
+        "corrections_per_target": outcome.corrections_per_target,
+    }
+
+
+def repeat(setting: Setting, number: int) -> dict[str, dict[str, float]]:
+    """One more study with other people: each condition's mean over participants of each measure. Runs in a worker."""
+    settings = setting.simulation
+    seed = int(digest_of([settings.seed, "repeat", number])[:12], 16)
+    again = setting.study.model_copy(update={"simulation": settings.model_copy(update={"seed": seed})})
+    other, found = Setting(again, setting.where), {}
+    for condition in setting.study.conditions:
+        outcomes = [simulate(other, participant, condition) for participant in participants(settings)]
+        found[condition] = {
+            "selection_mse_mm2": float(np.nanmean([outcome.selection_mse_mm2 for outcome in outcomes])),
+            "completion_time_s": float(np.nanmean([outcome.completion_time_s for outcome in outcomes])),
+        }
+    return found
+
+
+def _tables(
+    setting: Setting, folder: Path, measured: dict[Session, dict[str, float]], repeats: dict[int, Any]
+) -> list[str]:
+    """The study's tables; their names."""
+    study, settings, files = setting.study, setting.simulation, []
+    names = participants(settings)
+    order = {(one.participant, one.order): one.condition for one in measured}
+    sequences = [
+        [name, "-".join(order[name, place] for place in range(1, len(study.conditions) + 1))] for name in names
+    ]
+    assert study.participants is not None  # noqa: S101 - checked
+    files.append(_write(folder, study.participants, ("participant", "sequence"), sequences))
+    if settings.workload is not None and study.questionnaires is not None:
+        rated = []
+        for one in sorted(measured, key=lambda one: (one.participant, one.order)):
+            given = ratings(settings.workload, settings.seed, one.participant, one.condition, measured[one])
+            for scale, rating in given.items():
+                rated.append([one.participant, one.condition, settings.workload.questionnaire, scale, f"{rating:g}"])
+        header = ("participant", "condition", "questionnaire", "scale", "rating")
+        files.append(_write(folder, study.questionnaires, header, rated))
+    if settings.repeats and study.repeats is not None:
+        rows = [
+            [str(number + 1), condition, measure, repr(value)]
+            for number in sorted(repeats)
+            for condition, means in repeats[number].items()
+            for measure, value in means.items()
+        ]
+        files.append(_write(folder, study.repeats, ("repeat", "condition", "measure", "value"), rows))
+    return files
+
+
+def _write(folder: Path, name: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+    return name
+
+
+def _publish(folder: Path, beside: Path, files: Sequence[str], made_from: str) -> None:
+    """Bring the finished files to their places; what an earlier run left and this one has not goes."""
+    try:
+        earlier = json.loads((folder / MADE).read_text(encoding="utf-8"))["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        earlier = []
+    (folder / MADE).unlink(missing_ok=True)
+    for name in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (beside / name).replace(folder / name)
+    for name in set(map(str, earlier)) - set(files):
+        inside(folder, name, str(folder / MADE), must_exist=False).unlink(missing_ok=True)
+    whole = {"from": made_from, "files": list(files)}
+    (beside / MADE).write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    (beside / MADE).replace(folder / MADE)
