@@ -2,7 +2,7 @@
 # STUDY=path takes any study folder; ARGS="--jobs 2" hands options through.
 
 .DEFAULT_GOAL := help
-STUDY ?= studies/feng2016
+STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
@@ -14,7 +14,8 @@ help: ## list the targets
 .venv/installed: requirements.lock pyproject.toml tools/make-venv tools/uv.lock
 	@sh tools/make-venv
 
-report: .venv/installed ## write the report of STUDY (default: the bundled study) into reports/
+report: .venv/installed ## write the report of STUDY (default: the simulated study) into reports/
+	@$(steadyhand) simulate --if-needed "$(STUDY)"
 	@$(steadyhand) report "$(STUDY)" $(ARGS)
 
 check: .venv/installed ## do the bundled studies' statistics still come out the same?

@@ -25,6 +25,7 @@ OF_A_STUDY: Mapping[str, tuple[str, ...]] = {
     "accuracy_means": ("estimator",),
     "printed": ("source", "what", "check"),
     "design_check": ("what", "measure", "condition"),
+    "simulated_reductions": ("measure", "contrast"),
 }
 """The tables of a study's results.json, and the columns by which the rows of each are told apart."""
 OF_A_REPLAY: Mapping[str, tuple[str, ...]] = {

@@ -30,6 +30,7 @@ STAGE_OF: Mapping[str, str] = {
             "descriptives",
             "comparisons",
             "design_check",
+            "simulated_reductions",
             "measures",
             "trials",
             "accuracy",

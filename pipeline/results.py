@@ -29,6 +29,7 @@ LISTS = (
     "accuracy_means",
     "printed",
     "design_check",
+    "simulated_reductions",
 )
 
 

@@ -30,6 +30,7 @@ TRIAL_REQUIRED = (
 TRIAL_OPTIONAL = ("session", "target_z_mm", "selected_z_mm", "start_s", "selection_s")
 RATING_REQUIRED = ("participant", "condition", "questionnaire", "scale", "rating")
 MEASURE_REQUIRED = ("participant", "condition", "measure", "value")
+REPEAT_REQUIRED = ("repeat", "condition", "measure", "value")
 MEASURE_RESERVED = ("trial", "period", "sequence", "unit")
 
 
@@ -216,3 +217,14 @@ def participant_facts(table: pd.DataFrame) -> dict[str, Any]:
                 }
             break
     return facts
+
+
+def read_repeats(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
+    """A row a repeated study, condition and measure: its mean over participants, NaN where missing."""
+    table = _read(path, REPEAT_REQUIRED, ())
+    _required_text(path, table, ("condition", "measure"))
+    _check_conditions(path, table, conditions)
+    table["repeat"] = _whole_numbers(path, table, "repeat")
+    _check_unique(path, table, REPEAT_REQUIRED[:3])
+    table["value"] = _numbers(path, table, "value")
+    return table

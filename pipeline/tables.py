@@ -129,6 +129,16 @@ TABLES: Mapping[str, pa.Schema] = {
         ("p", _FLOAT),
         ("remark", _TEXT),
     ),
+    "simulated_reductions": _schema(
+        ("measure", _TEXT),
+        ("contrast", _TEXT),
+        ("n", _COUNT),  # repeated studies
+        ("reduction", _FLOAT),
+        ("low", _FLOAT),
+        ("high", _FLOAT),
+        ("published", _FLOAT),
+        ("source", _TEXT),
+    ),
     "descriptives": _schema(
         ("measure", _TEXT),
         ("condition", _TEXT),

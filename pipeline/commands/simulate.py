@@ -11,6 +11,7 @@ from pipeline.commands import console
 from pipeline.commands.run import PROCESS, executor_of
 from pipeline.errors import PipelineError
 from pipeline.simulation_settings import ReachSimulation
+from pipeline.simulation_state import is_made
 from pipeline.study import Study, load_study
 
 
@@ -46,10 +47,10 @@ def _reach(folder: Path, study: Study, if_needed: bool) -> None:
 
 
 def _selection(folder: Path, study: Study, jobs: int | None, if_needed: bool) -> None:
-    from pipeline.simulation.study_files import is_made, simulate_study
-
     if if_needed and is_made(folder, study):
         return
+    from pipeline.simulation.study_files import simulate_study
+
     with executor_of(jobs, PROCESS) as executor, console.progress() as progress:
         files = simulate_study(folder, study, executor, partial(progress.begin, "simulate"), progress.advance)
         progress.end()

@@ -13,17 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.cache import code_digest, digest_of
+from pipeline.cache import digest_of
 from pipeline.counterbalancing import assigned
 from pipeline.errors import PipelineError
 from pipeline.simulation.log import write_log
 from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.workload import ratings
 from pipeline.simulation_settings import SelectionSimulation
+from pipeline.simulation_state import MADE, files_made, made_from
 from pipeline.study import Study, inside
 
-MADE = "simulated.json"
-"""What the last run made, and from what: beside study.yaml."""
 _BEING_MADE = ".being-simulated"
 Begin = Callable[[int], None]
 Done = Callable[[], None]
@@ -37,22 +36,6 @@ class Session:
     condition: str
     order: int
     file: str
-
-
-def is_made(folder: Path, study: Study) -> bool:
-    """Are the files there, and were they made from these settings by this code?"""
-    try:
-        made = json.loads((folder / MADE).read_text(encoding="utf-8"))
-        there = all((folder / name).is_file() for name in made["files"])
-        return bool(there and made["from"] == _made_from(study))
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
-
-
-def _made_from(study: Study) -> str:
-    settings = {"conditions", "sessions", "axes", "streams", "events", "estimators", "shown", "task", "simulation"}
-    tables = {"participants", "questionnaires", "repeats"}
-    return digest_of([json.loads(study.model_dump_json(include=settings | tables)), code_digest(__name__)])
 
 
 def simulate_study(folder: Path, study: Study, executor: Executor, begin: Begin, done: Done) -> list[str]:
@@ -80,7 +63,7 @@ def simulate_study(folder: Path, study: Study, executor: Executor, begin: Begin,
                 repeats[again[future]] = future.result()
             done()
         files = [one.file for one in sessions] + _tables(setting, beside, measured, repeats)
-        _publish(folder, beside, files, _made_from(study))
+        _publish(folder, beside, files, made_from(study))
     finally:
         shutil.rmtree(beside, ignore_errors=True)
     return [one.file for one in sessions]
@@ -204,18 +187,15 @@ def _write(folder: Path, name: str, header: Sequence[str], rows: Iterable[Sequen
     return name
 
 
-def _publish(folder: Path, beside: Path, files: Sequence[str], made_from: str) -> None:
+def _publish(folder: Path, beside: Path, files: Sequence[str], origin: str) -> None:
     """Bring the finished files to their places; what an earlier run left and this one has not goes."""
-    try:
-        earlier = json.loads((folder / MADE).read_text(encoding="utf-8"))["files"]
-    except (OSError, ValueError, KeyError, TypeError):
-        earlier = []
+    earlier = files_made(folder)
     (folder / MADE).unlink(missing_ok=True)
     for name in files:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (beside / name).replace(folder / name)
-    for name in set(map(str, earlier)) - set(files):
+    for name in set(earlier) - set(files):
         inside(folder, name, str(folder / MADE), must_exist=False).unlink(missing_ok=True)
-    whole = {"from": made_from, "files": list(files)}
+    whole = {"from": origin, "files": list(files)}
     (beside / MADE).write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     (beside / MADE).replace(folder / MADE)

@@ -60,8 +60,10 @@ STAGES: tuple[Stage, ...] = (
             "streams",
             "axes",
             "estimators",
+            "simulation",
+            "repeats",
         ),
-        files=("participants", "printed"),
+        files=("participants", "printed", "repeats"),
     ),
     Stage(
         "report",

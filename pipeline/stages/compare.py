@@ -13,6 +13,8 @@ from pipeline.comparisons import compared, everything_asked
 from pipeline.design_check import findings
 from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
+from pipeline.simulated import reductions
+from pipeline.simulation_settings import SelectionSimulation
 from pipeline.stage import Outcome, Work
 from pipeline.statistics.descriptive import described
 from pipeline.study import Study
@@ -59,6 +61,10 @@ def run(work: Work) -> Outcome:
     if study.printed is not None:
         path = work.folder / study.printed
         found["printed"] = compare_printed(path, found["descriptives"], found["comparisons"])
+    if isinstance(study.simulation, SelectionSimulation) and study.repeats is not None:
+        repeats = study_tables.read_repeats(work.folder / study.repeats, study.conditions)
+        rows = list(reductions(study.simulation, study.conditions, repeats))
+        found["simulated_reductions"] = tables.frame("simulated_reductions", rows)
     for name, table in found.items():
         tables.write(name, table, work.out)
     results.write(work.out / "results.json", work.study_name, study, found, _people(work, measures))

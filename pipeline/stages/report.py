@@ -26,6 +26,7 @@ _FROM_COMPARE = (
     "exclusions",
     "printed",
     "design_check",
+    "simulated_reductions",
 )
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
 

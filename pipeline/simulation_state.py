@@ -1,0 +1,39 @@
+"""Whether a simulated study's files are there and up to date: asked at every run, so nothing heavy is imported."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from pipeline.cache import code_digest, digest_of
+from pipeline.study import Study
+
+MADE = "simulated.json"
+"""What the last run made, and from what: beside study.yaml."""
+
+
+def files_made(folder: Path) -> list[str]:
+    """The files of the last simulation that was finished."""
+    try:
+        return [str(name) for name in json.loads((folder / MADE).read_text(encoding="utf-8"))["files"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def is_made(folder: Path, study: Study) -> bool:
+    """Are the files there, and were they made from these settings by this code?"""
+    try:
+        made = json.loads((folder / MADE).read_text(encoding="utf-8"))
+        there = all((folder / name).is_file() for name in made["files"])
+        return bool(there and made["from"] == made_from(study))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def made_from(study: Study) -> str:
+    """A digest of all that the files depend on: settings and code."""
+    settings = {"conditions", "sessions", "axes", "streams", "events", "estimators", "shown", "task", "simulation"}
+    tables = {"participants", "questionnaires", "repeats"}
+    return digest_of(
+        [json.loads(study.model_dump_json(include=settings | tables)), code_digest("pipeline.simulation.study_files")]
+    )
