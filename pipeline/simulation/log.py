@@ -15,6 +15,7 @@ from pipeline.study import PositionStream, ReferenceStream
 
 EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
 _MM_PER_M = 1000.0
+_NEXT_S = 1e-6  # after a selection, which else would be of the trial that it starts
 
 
 def write_log(path: Path, setting: Setting, participant: str, condition: str, order: int, outcome: Outcome) -> None:
@@ -108,5 +109,5 @@ def _events(setting: Setting, outcome: Outcome) -> Iterator[Message]:
             break
         at = {"x": tap[TAP_X] / _MM_PER_M, "y": tap[TAP_Y] / _MM_PER_M}
         yield message(float(tap[TAP_S]), type="selection", trial=index + 1, **at)
-        begin = float(tap[TAP_S])
+        begin = float(tap[TAP_S]) + _NEXT_S
     yield message(outcome.ends_s, type="session_end")
