@@ -13,6 +13,7 @@ import numpy as np
 
 from fusion_core import ESTIMATORS, Estimator, FusionKalman, Samples, Sensor, WindowGP, replay_loop
 from tests.benchmarks import archive, peers
+from tests.benchmarks.people import people
 from tests.benchmarks.reading import reading
 from tests.benchmarks.timing import fastest
 from tests.conftest import CLONE
@@ -142,4 +143,5 @@ if __name__ == "__main__":
     streaming()
     reading(SESSION_S)
     starting()
+    people()
     archive.measure(archive.SMALL)
