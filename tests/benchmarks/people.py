@@ -67,7 +67,9 @@ def false_positives() -> None:
     print(
         f"Same estimator in both conditions, {STUDIES} studies of {PEOPLE}: false positives {positives / STUDIES:.3f}"
     )
-    print(f"  95 % interval [{low:.3f}, {high:.3f}], {'with' if low <= 0.05 <= high else 'WITHOUT'} .05 in it")
+    print(
+        f"  false positives {positives / STUDIES:.3f}, 95 % interval [{low:.3f}, {high:.3f}], {'with' if low <= 0.05 <= high else 'WITHOUT'} .05 in it"
+    )
 
 
 def pointing_under_lag() -> None:
