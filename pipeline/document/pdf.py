@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.document.model import (
-    Block,
     Document,
     Figure,
     KeyFigures,
     Notice,
+    Pages,
     Paragraph,
+    Strong,
     Table,
     Text,
     numbered,
@@ -61,20 +62,20 @@ def _content(document: Document) -> dict[str, Any]:
         "subtitle": document.subtitle,
         "origin": document.origin,
         "sections": [
-            {"title": section.title, "blocks": [_block(block, names) for block in section.blocks]}
+            {
+                "title": section.title,
+                "blocks": [_block(block, names) for block in section.blocks if not isinstance(block, Pages)],
+            }
             for section in document.sections
         ],
     }
 
 
 def _text(text: Text) -> list[dict[str, Any]]:
-    return [
-        {"text": part, "strong": False} if isinstance(part, str) else {"text": part.text, "strong": True}
-        for part in text
-    ]
+    return [{"text": part if isinstance(part, str) else part.text, "strong": isinstance(part, Strong)} for part in text]
 
 
-def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
+def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[str, str]) -> dict[str, Any]:
     match block:
         case Paragraph():
             return {"kind": "paragraph", "text": _text(block.text)}
