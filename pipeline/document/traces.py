@@ -17,11 +17,11 @@ from pipeline.document.html import write_page
 from pipeline.document.model import Link
 
 BUDGET_BYTES = 4_500_000  # of all sessions' data, as text; a page of less than 5 MB still goes by mail
-STEP_MM = 0.1
 _TENTHS = 10
 _STEPS_S = tuple(0.002 * 2**power for power in range(24))  # how far apart readings are kept, at least
 _SCRIPT_ENDS = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
 
+Kind = Literal["tracker", "estimator", "display", "reference"]
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -30,7 +30,7 @@ class Series:
     """One line of a session: `time_s` (n,) rises, `value_mm` (n, axes)."""
 
     name: str
-    kind: Literal["tracker", "estimator", "display", "reference"]
+    kind: Kind
     axes: tuple[str, ...]
     time_s: FloatArray
     value_mm: FloatArray

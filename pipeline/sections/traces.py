@@ -9,11 +9,12 @@ import numpy as np
 
 from pipeline import recording, tables
 from pipeline.document import traces
-from pipeline.document.traces import Series, Traces
+from pipeline.document.traces import Kind, Series, Traces
 from pipeline.sections.material import ORIGINS, Material
 from pipeline.study import Session
 
 PAGE = "traces.html"
+_KINDS: dict[str, Kind] = {"position": "tracker", "display": "display", "reference": "reference"}
 
 
 def write(material: Material, path: Path) -> None:
@@ -35,15 +36,13 @@ def _of_session(material: Material, session: Session, ingested: Path, fused: Pat
     origin_ns, streams = recording.positions(study, ingested)
     found: list[Series] = []
     for name, samples in streams.items():
-        kind = study.streams[name].kind
-        time = samples.arrival if kind == "position" else samples.time
-        order = np.argsort(time, kind="stable")
-        if len(time):
-            shown = "tracker" if kind == "position" else "display" if kind == "display" else "reference"
-            axes = recording.shown_axes(study, name)
-            found.append(Series(name, shown, axes, time[order], samples.value[order]))
+        kind = _KINDS[study.streams[name].kind]
+        time_s = samples.arrival if kind == "tracker" else samples.time
+        order = np.argsort(time_s, kind="stable")
+        if len(order):
+            found.append(Series(name, kind, recording.shown_axes(study, name), time_s[order], samples.value[order]))
     columns = [f"{axis}_mm" for axis in study.axes]
-    for name, rows in tables.read("tracks", fused).groupby("estimator", sort=False):
-        time = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * tables.NANOSECONDS
-        found.append(Series(str(name), "estimator", study.axes, time, rows[columns].to_numpy(np.float64)))
+    for estimator, rows in tables.read("tracks", fused).groupby("estimator", sort=False):
+        time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * tables.NANOSECONDS
+        found.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
     return Traces(session.id, session.participant, session.condition, tuple(found))
