@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.document.model import Section
-from pipeline.sections import accuracy, comparisons, design, outcomes, overview, printed, provenance, quality
+from pipeline.sections import (
+    accuracy,
+    comparisons,
+    design,
+    outcomes,
+    overview,
+    participants,
+    printed,
+    provenance,
+    quality,
+)
 from pipeline.sections.material import Material
 
 SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
@@ -19,5 +29,6 @@ SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     outcomes.others,
     comparisons.section,
     printed.section,
+    participants.section,
     provenance.section,
 )

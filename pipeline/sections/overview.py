@@ -24,7 +24,9 @@ from pipeline.wording import (
     p_phrase,
     percent,
     reduction_phrase,
+    short_label,
     statistic,
+    unit_of,
     verdict,
 )
 
@@ -69,7 +71,7 @@ def _answer(material: Material) -> Text:
 
 def _sentence(material: Material, row: Row) -> str:
     """What a comparison of the conditions came to, with the means and their intervals."""
-    label = measure_label(row["measure"])
+    label = short_label(row["measure"])
     if row["status"] != "ok":
         return f"{label}: {comparison_sentence(row)}."
     study, p = material.study, decisive_p(row)
@@ -91,9 +93,9 @@ def _sentence(material: Material, row: Row) -> str:
 
 
 def _mean(row: Row) -> str:
-    """`12.3 [10.1, 14.5]`: a mean and its 95 % interval."""
-    bounds = interval(row["ci_low"], row["ci_high"])
-    return number(row["mean"]) + ("" if bounds == NOTHING else f" {bounds}")
+    """`12.3 s [10.1, 14.5]`: a mean and its 95 % interval."""
+    parts = (number(row["mean"]), unit_of(row["measure"]), interval(row["ci_low"], row["ci_high"]))
+    return " ".join(part for part in parts if part not in ("", NOTHING))
 
 
 def _closest(material: Material) -> Text:
@@ -158,7 +160,8 @@ def _data(material: Material) -> Text:
     """Where the data come from."""
     logs = f" {counted(len(material.sessions), 'session')} of raw sensor logs." if material.sessions else ""
     source = material.study.citation.strip()
-    return (Strong("Data: "), ORIGINS[material.study.data_origin], logs, f" Source: {source}" if source else "")
+    kind, _, what = ORIGINS[material.study.data_origin].partition(": ")
+    return (Strong(f"{kind}: "), what, logs, f" Source: {source}" if source else "")
 
 
 def _question(material: Material) -> Text:
