@@ -23,6 +23,7 @@ from pipeline.typeface import font_folder, showable
 
 _HERE = Path(__file__).parent
 _UNBROKEN = 24  # characters: a longer word in a table may be broken behind punctuation
+_HEAD = 70  # characters of the title at the head of a page, beside the section's
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
 
@@ -59,6 +60,7 @@ def _content(document: Document) -> dict[str, Any]:
     names = numbered(document)
     return {
         "title": document.title,
+        "running": document.title if len(document.title) <= _HEAD else f"{document.title[:_HEAD]}…",
         "subtitle": document.subtitle,
         "origin": document.origin,
         "sections": [

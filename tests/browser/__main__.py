@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -10,45 +9,13 @@ from pathlib import Path
 
 from tests.browser import axe
 from tests.browser.chromium import BrowserError, Event, Tab, found, tab
-from tests.conftest import CLONE, STREAMS, session_messages, write_session
-from tests.pipeline.hostile import hostile_study
+from tests.browser.studies import written
 
 WIDTHS = {390: 844, 768: 1024, 1280: 900}
-_PEOPLE = 41  # more than a report shows on one page
 _CHECKS = (Path(__file__).parent / "checks.js").read_text(encoding="utf-8")
 _FAULTY = """<!doctype html><html lang="en"><title>Faulty</title><main><h1>Faulty</h1><img src="http://127.0.0.1:9/a.png">
 <div style="width: 3000px">wide</div></main><script>console.error("faulty"); throw new Error("thrown")</script>"""
 _MUST_BE_FOUND = ("px wide", "a request leaves", "the console", "an exception")
-
-
-def reports(folder: Path) -> Iterator[Path]:
-    """Pages of the bundled studies, of one with hostile text, and of one with many participants."""
-    studies = [CLONE / "studies" / "feng2016", CLONE / "studies" / "reach", hostile_study(folder / "hostile")]
-    studies.append(_many(folder / "many"))
-    words = ["report", *map(str, studies), "--out", str(folder / "out"), "--cache", str(folder / "cache")]
-    command = [sys.executable, "-m", "pipeline", *words, "--format", "html"]
-    ran = subprocess.run(command, cwd=CLONE, capture_output=True, text=True, check=False)
-    if ran.returncode not in (0, 1):
-        raise BrowserError(f"the reports could not be made: {ran.stderr}")
-    for study in studies:
-        pages = sorted((folder / "out" / study.name).glob("*.html"))
-        yield from pages
-        yield from sorted((folder / "out" / study.name / "participants").glob("*.html"))[:1]
-
-
-def _many(root: Path) -> Path:
-    """Forty-one people, two of them with a log."""
-    rows = "".join(f"P{p:02},{c},m_s,{p + (c == 'b') * (p % 3)}\n" for p in range(_PEOPLE) for c in "ab")
-    root.mkdir()
-    (root / "study.yaml").write_text(
-        "title: Many\ndata_origin: simulated\nconditions: [a, b]\nmeasures: m.csv\nsessions: '{participant}_{condition}"
-        ".mcap'\nestimators: {raw: {type: raw}}\ncomparisons: [{measure: m_s, test: t_paired}]\n" + STREAMS,
-        encoding="utf-8",
-    )
-    (root / "m.csv").write_text(f"participant,condition,measure,value\n{rows}", encoding="utf-8")
-    for person in ("P00", "P01"):
-        write_session(root / f"{person}_a.mcap", session_messages(2.5))
-    return root
 
 
 def check(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
@@ -114,10 +81,10 @@ def main() -> int:
         checker = axe.source()
         with tempfile.TemporaryDirectory() as folder, tab() as opened:
             say("faults are found", _finds_faults(Path(folder), opened, checker))
-            for page in reports(Path(folder)):
+            for page in written(Path(folder), "html"):
                 name = page.relative_to(Path(folder) / "out")
                 say(f"{name} ({page.stat().st_size / 1e6:.2f} MB)", list(check(page, opened, checker)))
-    except BrowserError as error:
+    except (BrowserError, RuntimeError) as error:
         print(f"make test-browser: {error}", file=sys.stderr)
         return 2
     print(f"{counts[True]} passed, {counts[False]} failed")
