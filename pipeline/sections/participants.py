@@ -82,6 +82,7 @@ def _people(material: Material) -> dict[str, str]:
     """Participants by the name of their page, which is a number: their ids may hold anything; none where few."""
     known = {str(person) for person in material.measures["participant"].dropna()}
     known |= {session.participant for session in material.sessions if session.participant is not None}
+    known |= {row["participant"] for row in material.rows("exclusions") if row["participant"] is not None}
     if max(len(known), len(material.sessions)) <= _MANY:
         return {}
     return {f"{index:04d}.html": person for index, person in enumerate(sorted(known), 1)}
