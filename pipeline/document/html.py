@@ -12,7 +12,8 @@ import jinja2
 
 from pipeline.document.model import Document, Link, Strong, numbered
 
-_CONTROLS = {code: "□" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
+_DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would turn round the numbers that follow
+_CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
 _HERE = Path(__file__).parent
 
 

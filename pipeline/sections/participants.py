@@ -28,7 +28,7 @@ _SHOWN: dict[str, tuple[str, tuple[tuple[str, str, Cell], ...]]] = {
             ("Lost", "messages_lost", lambda lost: "unknown" if lost is None else str(lost)),
             ("Rate (Hz)", "rate_hz", partial(number, digits=1)),
             ("Longest gap (s)", "gap_max_s", number),
-            ("Jitter (ms)", "jitter_ms", partial(number, digits=1)),
+            ("Jitter (ms)", "jitter_ms", lambda ms: number(ms, 1) if ms is None or ms >= 0.05 else "0.0"),
             ("Note", "note", lambda note: note or ""),
         ),
     ),
