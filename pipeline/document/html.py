@@ -14,6 +14,7 @@ from pipeline.document.model import Document, Link, Strong, numbered
 
 _DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would turn round the numbers that follow
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
+_UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may end there
 _HERE = Path(__file__).parent
 
 
@@ -38,7 +39,7 @@ def write_page(template: str, script: str, path: Path, **values: Any) -> None:
         " base-uri 'none'; form-action 'none'"
     )
     page = _environment().get_template(template).render(style=style, script=code, policy=policy, **values)
-    path.write_text(page.translate(_CONTROLS), encoding="utf-8")
+    path.write_text(page.translate(_CONTROLS | _UNBROKEN), encoding="utf-8")
 
 
 def _hashed(text: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,8 +31,8 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
     import typst
 
-    content = _content(document)
-    shown = _showable(content)
+    content = _over(_content(document), lambda text: text.replace("\u2009", "\u202f"))  # no line ends within a number
+    shown = _over(content, showable)
     shown |= {"lacking": shown != content, "unbroken": _UNBROKEN}
     compiler = typst.Compiler(
         (_HERE / "report.typ").read_bytes(),
@@ -46,13 +46,13 @@ def render(document: Document, figures: Path, path: Path) -> None:
     path.write_bytes(pdf)
 
 
-def _showable(value: Any) -> Any:
-    """Plain data with every text as the fonts can show it."""
+def _over(value: Any, change: Callable[[str], str]) -> Any:
+    """Plain data with every text changed."""
     if isinstance(value, str):
-        return showable(value)
+        return change(value)
     if isinstance(value, list):
-        return [_showable(item) for item in value]
-    return {key: _showable(item) for key, item in value.items()} if isinstance(value, dict) else value
+        return [_over(item, change) for item in value]
+    return {key: _over(item, change) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def _content(document: Document) -> dict[str, Any]:
