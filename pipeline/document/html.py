@@ -25,21 +25,31 @@ def render(document: Document, figures: Path, path: Path) -> None:
         """An SVG as a data address: as an image of its own, its ids cannot clash with another's."""
         return "data:image/svg+xml;base64," + base64.b64encode((figures / name).read_bytes()).decode()
 
-    write_page("report.html.jinja", "report.js", path, document=document, names=numbered(document), picture=picture)
+    values = {"document": document, "names": numbered(document), "picture": picture}
+    write_page("report.html.jinja", "report.js", path, document.origin, **values)
 
 
-def write_page(template: str, script: str, path: Path, **values: Any) -> None:
+def write_page(template: str, script: str, path: Path, origin: str, **values: Any) -> None:
     """A page from a template, with the style and a script in it; controls among its text are shown as □.
 
-    The page's own policy lets no other script or style run and nothing be fetched, whatever text it holds.
+    The page's own policy lets no other script or style run and nothing be fetched, whatever text it holds. `origin`
+    stands at the foot of each page that a browser prints.
     """
     style, code = ((_HERE / name).read_text(encoding="utf-8") for name in ("style.css", script))
+    style += f"@page {{ @bottom-left {{ content: {_quoted(origin)}; }} }}\n"
     policy = (
         f"default-src 'none'; img-src data:; style-src {_hashed(style)}; script-src {_hashed(code)};"
         " base-uri 'none'; form-action 'none'"
     )
-    page = _environment().get_template(template).render(style=style, script=code, policy=policy, **values)
+    page = (
+        _environment().get_template(template).render(style=style, script=code, policy=policy, origin=origin, **values)
+    )
     path.write_text(page.translate(_CONTROLS | _UNBROKEN), encoding="utf-8")
+
+
+def _quoted(text: str) -> str:
+    """A string as CSS takes it: whatever is neither a letter nor a space, by its number."""
+    return '"' + "".join(c if c.isalpha() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
 
 
 def _hashed(text: str) -> str:

@@ -195,7 +195,7 @@ function listLines() {
 }
 
 function said(session) {
-  const thinned = session.step_s ? `Thinned out to fit: of each line one reading in ${1000 * session.step_s} ms is kept; the logs have all. ` : "Every reading is here. ";
+  const thinned = session.step_s ? `Thinned out to fit: of each line one reading in ${Number((1000 * session.step_s).toPrecision(3))} ms is kept; the logs have all. ` : "Every reading is here. ";
   const lost = session.left_out ? `${session.left_out} readings that are no numbers, or too large to draw, are left out. ` : "";
   return `${thinned}${lost}Values are rounded to 0.1 mm and 0.1 ms; between readings the table interpolates.`;
 }

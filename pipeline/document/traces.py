@@ -18,7 +18,9 @@ from pipeline.document.model import Link
 
 BUDGET_BYTES = 4_500_000  # of all sessions' data, as text; a page of less than 5 MB still goes by mail
 _TENTHS = 10
-_STEPS_S = tuple(0.002 * 2**power for power in range(24))  # how far apart readings are kept, at least
+_STEPS_S = tuple(
+    1e-3 * size * 10**power for power in range(8) for size in (1, 1.5, 2, 3, 5, 7)
+)  # how far apart readings are kept, at least
 _SCRIPT_ENDS = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
 
 Kind = Literal["tracker", "estimator", "display", "reference"]
@@ -53,7 +55,7 @@ def render(title: str, origin: str, sessions: Iterable[Traces], count: int, path
     for character, escaped in _SCRIPT_ENDS.items():
         data = data.replace(character, escaped)
     back = Link("Back to the report", "report.html")
-    write_page("traces.html.jinja", "traces.js", path, title=title, origin=origin, data=data, back=back)
+    write_page("traces.html.jinja", "traces.js", path, origin, title=title, data=data, back=back)
 
 
 def _fitting(traces: Traces, budget: int) -> dict[str, Any]:
