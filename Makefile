@@ -6,10 +6,10 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate power plan test lint bench lock clean
+.PHONY: help report check replay simulate power plan test test-browser test-pdf lint bench lock clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 .venv/installed: requirements.lock pyproject.toml tools/make-venv tools/uv.lock
 	@sh tools/make-venv
@@ -35,6 +35,12 @@ plan: .venv/installed ## counterbalanced orders: ARGS="kinect fusion --participa
 
 test: lint ## lint, then every test
 	@$(python) -m pytest -n auto $(ARGS)
+
+test-browser: .venv/installed ## the pages in Chromium at three widths, with axe-core (needs chromium; npm for axe-core)
+	@$(python) -m tests.browser
+
+test-pdf: .venv/installed ## the PDFs against PDF/UA-1 and PDF/A-2a by veraPDF (needs maven and a JDK)
+	@$(python) -m tests.browser.pdf
 
 lint: .venv/installed ## ruff, mypy strict, import-linter
 	@$(python) -m ruff check .

@@ -41,12 +41,25 @@ ExecutorName = Annotated[
 
 @app.command()
 def report(
-    studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFolder = None, executor: ExecutorName = "process"
+    studies: Studies,
+    out: Out = None,
+    jobs: Jobs = None,
+    cache: CacheFolder = None,
+    executor: ExecutorName = "process",
+    formats: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            metavar="FORMAT,...",
+            help="What to write, joined by commas: html, pdf, json (results.json), csv (tables), svg (figures), zip"
+            " (the others in one file). Default: all.",
+        ),
+    ] = None,
 ) -> None:
-    """Write each study's report: HTML, PDF, results.json, tables and figures."""
+    """Write each study's report: HTML, PDF, results.json, tables and figures, and all of it as a ZIP."""
     from pipeline.commands import run
 
-    run.report(studies, out, jobs, cache, executor)
+    run.report(studies, out, jobs, cache, executor, formats)
 
 
 @app.command()

@@ -20,6 +20,7 @@ from pipeline.study import (
     AccelerationStream,
     DisplayStream,
     LinearStream,
+    PositionStream,
     ReferenceStream,
     Stream,
     Study,
@@ -90,6 +91,27 @@ def load(study: Study, entry: Path) -> Recording:
         phones,
         _mounted(study, samples, whole, phones),
     )
+
+
+def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
+    """The origin, and the streams of positions as `load` gives them, each with the axes that are analysed of it.
+
+    Phones are left alone, and with them whatever their mounting would correct; so this is quick.
+    """
+    rows = tables.read("positions", entry)
+    origin_ns = int(rows["arrival_ns"].min()) if len(rows) else 0
+    found = {}
+    for name, stream in study.streams.items():
+        if isinstance(stream, PositionStream | ReferenceStream | DisplayStream):
+            whole = _vectors(rows[rows["stream"] == name], stream, origin_ns)
+            index = [_AXES.index(axis) for axis in shown_axes(study, name)]
+            found[name] = Samples(whole.time, whole.arrival, whole.value[:, index])
+    return origin_ns, found
+
+
+def shown_axes(study: Study, name: str) -> tuple[str, ...]:
+    """The axes a stream of positions gives of those that are analysed."""
+    return tuple(study.axes_of(name)) if name in study.sensor_streams else tuple(study.axes)
 
 
 def _vectors(rows: pd.DataFrame, stream: Stream, origin_ns: int) -> Samples:

@@ -6,7 +6,8 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,32 +21,58 @@ from pipeline.stages import COMPARE, INGEST, REPLAY
 from pipeline.study import SETTINGS_FILE
 
 _RESULTS = "results.json"
+_ARCHIVE = "report.zip"
+FORMATS: Mapping[str, tuple[str, ...]] = {
+    "html": ("report.html", "traces.html", "participants/"),
+    "pdf": ("report.pdf",),
+    "json": (_RESULTS,),
+    "csv": ("tables/",),
+    "svg": ("figures/",),
+    "zip": (_ARCHIVE,),
+}
+"""What can be asked for: the files, and the folders of files, of each format. The ZIP holds the others asked for."""
 
 
-def publish(result: Result, folder: Path, command: Sequence[str]) -> None:
+def publish(result: Result, folder: Path, command: Sequence[str], formats: Iterable[str] = FORMATS) -> None:
     """Bring the report's files into `folder`; what an earlier report left there and this one lacks goes."""
-    entry = result.entry("report")
-    files = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
-    files.pop("entry.json")
-    files[_RESULTS] = result.entry("compare") / _RESULTS
-    refuse_inputs(result, folder, [*files, PROVENANCE])
-    for stale in set(_published(folder)) - set(files):
+    made = {}
+    if "report" in result.entries:
+        entry = result.entry("report")
+        made = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
+    made[_RESULTS] = result.entry("compare") / _RESULTS
+    wanted = [one for name in formats for one in FORMATS[name]]
+    files = {name: path for name, path in made.items() if _is_of(name, wanted)}
+    archive = [_ARCHIVE] if _ARCHIVE in wanted else []
+    refuse_inputs(result, folder, [*files, *archive, PROVENANCE])
+    for stale in set(_published(folder)) - {*files, *archive}:
         (folder / stale).unlink(missing_ok=True)
-    for name, source in files.items():
-        copy(source, folder / name)
-    _publish_provenance(result, folder, command, files)
+    changed = [copy(source, folder / name) for name, source in files.items()]
+    changed.append(_publish_provenance(result, folder, command, [*files, *archive]))
+    if archive and (any(changed) or not (folder / _ARCHIVE).is_file()):
+        _write_archive({**files, PROVENANCE: folder / PROVENANCE}, result.name, folder / _ARCHIVE)
 
 
-def _publish_provenance(result: Result, folder: Path, command: Sequence[str], files: Iterable[str]) -> None:
-    _write_provenance(
-        {"study": result.name, **_program(command, COMPARE), **_read(result), "files": sorted(files)}, folder
-    )
+def _is_of(name: str, wanted: Iterable[str]) -> bool:
+    """Is it one of these files, or in one of these folders?"""
+    return any(name == one or (one.endswith("/") and name.startswith(one)) for one in wanted)
+
+
+def _write_archive(files: Mapping[str, Path], study: str, path: Path) -> None:
+    """One file to mail: everything in a folder of the study's name, the same bytes for the same files."""
+    with _whole(path) as beside, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, source in sorted(files.items()):
+            archive.writestr(zipfile.ZipInfo(f"{study}/{name}"), source.read_bytes(), zipfile.ZIP_DEFLATED)
+
+
+def _publish_provenance(result: Result, folder: Path, command: Sequence[str], files: Iterable[str]) -> bool:
+    content = {"study": result.name, **_program(command, COMPARE), **_read(result), "files": sorted(files)}
+    return _write_provenance(content, result.entry("compare") / _RESULTS, folder)
 
 
 def publish_provenance(results: Iterable[Result], folder: Path, command: Sequence[str]) -> None:
     """provenance.json of a replay of several studies."""
     studies = {result.name: _read(result) for result in results}
-    _write_provenance({**_program(command, (*INGEST, REPLAY)), "studies": studies}, folder)
+    _write_provenance({**_program(command, (*INGEST, REPLAY)), "studies": studies}, folder / _RESULTS, folder)
 
 
 def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
@@ -64,11 +91,16 @@ def _read(result: Result) -> dict[str, Any]:
     return {"settings": settings, "inputs_sha256": result.inputs}
 
 
-def _write_provenance(provenance: dict[str, Any], folder: Path) -> None:
-    provenance["results_sha256"] = file_digest(folder / _RESULTS)
-    text = json.dumps(provenance, indent=1, ensure_ascii=False) + "\n"
-    with _whole(folder / PROVENANCE) as beside:
-        beside.write_text(text, encoding="utf-8")
+def _write_provenance(provenance: dict[str, Any], results: Path, folder: Path) -> bool:
+    """Whether it is another than the one that was there."""
+    provenance["results_sha256"] = file_digest(results)
+    text = (json.dumps(provenance, indent=1, ensure_ascii=False) + "\n").encode()
+    path = folder / PROVENANCE
+    if path.is_file() and path.read_bytes() == text:
+        return False
+    with _whole(path) as beside:
+        beside.write_bytes(text)
+    return True
 
 
 def refuse_study(folder: Path) -> None:
@@ -99,16 +131,18 @@ def _published(folder: Path) -> list[str]:
     except (OSError, ValueError, KeyError, TypeError):
         return []
     root = folder.resolve()
-    ours = [name for name in listed if isinstance(name, str) and Path(name).parent.name in ("tables", "figures")]
+    known = [one for files in FORMATS.values() for one in files]
+    ours = [name for name in listed if isinstance(name, str) and _is_of(name, known)]
     return [name for name in ours if (root / name).resolve().is_relative_to(root)]
 
 
-def copy(source: Path, target: Path) -> None:
-    """Bring a file to its place, whole or not at all; one that is the same already stays."""
+def copy(source: Path, target: Path) -> bool:
+    """Bring a file to its place, whole or not at all; one that is the same already stays. Whether it was brought."""
     if target.is_file() and target.read_bytes() == source.read_bytes():
-        return
+        return False
     with _whole(target) as beside:
         shutil.copyfile(source, beside)
+    return True
 
 
 @contextmanager

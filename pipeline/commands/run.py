@@ -12,7 +12,7 @@ from pathlib import Path
 from pipeline import results
 from pipeline.cache import Cache
 from pipeline.commands import console
-from pipeline.commands.publish import publish, publish_results, refuse_study
+from pipeline.commands.publish import FORMATS, publish, publish_results, refuse_study
 from pipeline.commands.summary import summary
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.executors import InThisProcess, Processes
@@ -116,9 +116,20 @@ def refuse_same_names(studies: Sequence[Path]) -> list[str]:
     return names
 
 
-def report(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None, executor: str) -> None:
-    """Write reports; exit with 1 where some session was set aside or read in part."""
-    _run(studies, STAGES, out, jobs, cache, executor)
+def report(
+    studies: Sequence[Path],
+    out: Path | None,
+    jobs: int | None,
+    cache: Path | None,
+    executor: str,
+    formats: str | None = None,
+) -> None:
+    """Write reports; exit with 1 where some session was set aside or read in part. `formats` are joined by commas."""
+    asked = list(FORMATS) if formats is None else [name.strip() for name in formats.split(",")]
+    for name in asked:
+        if name not in FORMATS:
+            raise PipelineError(f'--format: there is no "{name}"{did_you_mean(name, FORMATS)}')
+    _run(studies, COMPARE if asked == ["json"] else STAGES, out, jobs, cache, executor, asked)
 
 
 def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None, executor: str) -> None:
@@ -133,6 +144,7 @@ def _run(
     jobs: int | None,
     cache: Path | None,
     executor: str,
+    formats: Sequence[str] = (),
 ) -> None:
     folders = dict(zip(studies, _out_folders(studies, out), strict=True))
     for folder in folders.values():
@@ -140,9 +152,9 @@ def _run(
 
     def write(study: Path, result: Result) -> int:
         _show(result)
-        if stages is STAGES:
-            publish(result, folders[study], sys.argv)
-            console.say(f"Report: {short(folders[study] / 'report.html')}  {short(folders[study] / 'report.pdf')}")
+        if formats:
+            publish(result, folders[study], sys.argv, formats)
+            console.say(f"Report: {'  '.join(short(folders[study] / FORMATS[name][0]) for name in formats[:2])}")
         else:
             publish_results(result, folders[study], sys.argv)
             console.say(f"Results: {short(folders[study] / 'results.json')}")

@@ -14,7 +14,15 @@ class Strong:
     text: str
 
 
-Text = tuple[str | Strong, ...]
+@dataclass(frozen=True)
+class Link:
+    """Words that lead to another file of the report, by a name the program gave it; on paper they are words alone."""
+
+    text: str
+    href: str
+
+
+Text = tuple[str | Strong | Link, ...]
 
 
 def plain(text: Text) -> str:
@@ -88,7 +96,15 @@ class Figure:
     alt: str
 
 
-Block = Paragraph | Notice | KeyFigures | Table | Figure
+@dataclass(frozen=True)
+class Pages:
+    """Further pages of the report; paper has none."""
+
+    label: str
+    links: tuple[Link, ...]
+
+
+Block = Paragraph | Notice | KeyFigures | Table | Figure | Pages
 
 
 @dataclass(frozen=True)
@@ -102,12 +118,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report. `origin` says where the data come from; every page carries it."""
+    """A whole report. `origin` says where the data come from; every page carries it. `back` leads to the page above."""
 
     title: str
     subtitle: str
     origin: str
     sections: tuple[Section, ...]
+    back: Link | None = None
 
 
 def numbered(document: Document) -> dict[str, str]:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.document.model import (
-    Block,
     Document,
     Figure,
     KeyFigures,
     Notice,
+    Pages,
     Paragraph,
+    Strong,
     Table,
     Text,
     numbered,
@@ -22,6 +23,7 @@ from pipeline.typeface import font_folder, showable
 
 _HERE = Path(__file__).parent
 _UNBROKEN = 24  # characters: a longer word in a table may be broken behind punctuation
+_HEAD = 70  # characters of the title at the head of a page, beside the section's
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
 
@@ -29,8 +31,8 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
     import typst
 
-    content = _content(document)
-    shown = _showable(content)
+    content = _over(_content(document), lambda text: text.replace("\u2009", "\u202f"))  # no line ends within a number
+    shown = _over(content, showable)
     shown |= {"lacking": shown != content, "unbroken": _UNBROKEN}
     compiler = typst.Compiler(
         (_HERE / "report.typ").read_bytes(),
@@ -44,13 +46,13 @@ def render(document: Document, figures: Path, path: Path) -> None:
     path.write_bytes(pdf)
 
 
-def _showable(value: Any) -> Any:
-    """Plain data with every text as the fonts can show it."""
+def _over(value: Any, change: Callable[[str], str]) -> Any:
+    """Plain data with every text changed."""
     if isinstance(value, str):
-        return showable(value)
+        return change(value)
     if isinstance(value, list):
-        return [_showable(item) for item in value]
-    return {key: _showable(item) for key, item in value.items()} if isinstance(value, dict) else value
+        return [_over(item, change) for item in value]
+    return {key: _over(item, change) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def _content(document: Document) -> dict[str, Any]:
@@ -58,23 +60,24 @@ def _content(document: Document) -> dict[str, Any]:
     names = numbered(document)
     return {
         "title": document.title,
+        "running": document.title if len(document.title) <= _HEAD else f"{document.title[:_HEAD]}…",
         "subtitle": document.subtitle,
         "origin": document.origin,
         "sections": [
-            {"title": section.title, "blocks": [_block(block, names) for block in section.blocks]}
+            {
+                "title": section.title,
+                "blocks": [_block(block, names) for block in section.blocks if not isinstance(block, Pages)],
+            }
             for section in document.sections
         ],
     }
 
 
 def _text(text: Text) -> list[dict[str, Any]]:
-    return [
-        {"text": part, "strong": False} if isinstance(part, str) else {"text": part.text, "strong": True}
-        for part in text
-    ]
+    return [{"text": part if isinstance(part, str) else part.text, "strong": isinstance(part, Strong)} for part in text]
 
 
-def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
+def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[str, str]) -> dict[str, Any]:
     match block:
         case Paragraph():
             return {"kind": "paragraph", "text": _text(block.text)}

@@ -11,6 +11,7 @@ from pipeline.sections import (
     design,
     outcomes,
     overview,
+    participants,
     printed,
     provenance,
     quality,
@@ -30,5 +31,6 @@ SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     comparisons.section,
     simulation.section,
     printed.section,
+    participants.section,
     provenance.section,
 )

@@ -1,42 +1,167 @@
-"""The first page: the question, the answer in numbers, and what to be careful about."""
+"""The first page: the question, the answer in two sentences and a figure, and what to be careful about."""
 
 from __future__ import annotations
 
-from pipeline.document.model import Block, KeyFigure, KeyFigures, Notice, Paragraph, Section, Strong, Text
-from pipeline.sections.material import Material, Row
+import pandas as pd
+
+from pipeline import figures
+from pipeline.document.model import Block, Figure, KeyFigure, KeyFigures, Link, Notice, Paragraph, Section, Strong, Text
+from pipeline.sections import traces
+from pipeline.sections.cautions import cautions
+from pipeline.sections.material import ORIGINS, Material, Row
 from pipeline.wording import (
     EFFECTS_OF_CONDITION,
     MINUS,
+    NOTHING,
     adjustment,
     comparison_sentence,
     counted,
     decisive_p,
+    interval,
     listing,
     measure_label,
     number,
     p_phrase,
     percent,
     reduction_phrase,
+    short_label,
     statistic,
+    unit_of,
     verdict,
 )
 
 _HEADLINES = ("selection_mse_px2", "selection_mse_mm2", "completion_time_s", "trial_time_s")
 _KEY_FIGURES_MAX = 3
+_SENTENCES = 2
 _NOT_OF_CHANCE = ("tost", "bayes_t")  # they answer another question than whether there is a difference
 
 
 def section(material: Material) -> Section:
     """Summary."""
     blocks: list[Block] = [Paragraph(_question(material))]
+    answer = _answer(material)
+    if answer:
+        blocks.append(Paragraph(answer))
     keys = _key_figures(material)
     if keys:
         blocks.append(KeyFigures(tuple(keys)))
-    blocks += [Paragraph(text) for text in _answers(material)]
-    cautions = _cautions(material)
-    if cautions:
-        blocks.append(Notice("To be careful about", tuple(cautions)))
+    blocks += _figure(material)
+    blocks.append(Paragraph(_data(material)))
+    found = cautions(material)
+    if found:
+        blocks.append(Notice("To be careful about", tuple(found)))
+    blocks += [Paragraph(text) for text in _evidence(material)]
+    if material.sessions:
+        told = "Every session can be looked at closely, as the tracker gave it and as each estimator made of it: "
+        blocks.append(Paragraph((told, Link(traces.PAGE, traces.PAGE), ".")))
     return Section("summary", "Summary", tuple(blocks))
+
+
+def _answer(material: Material) -> Text:
+    """Two sentences: of the two measures people look for first, else of the ratings, else of the estimators."""
+    rows = _headline_rows(material)[:_SENTENCES]
+    if rows:
+        lead, *others = [_sentence(material, row) for row in rows]
+        return (Strong(lead), *(f" {other}" for other in others))
+    ratings = _ratings(material)[:_SENTENCES]
+    if ratings:
+        return tuple(part for text in ratings for part in (*text, " "))
+    return _closest(material)
+
+
+def _sentence(material: Material, row: Row) -> str:
+    """What a comparison of the conditions came to, with the means and their intervals."""
+    label = short_label(row["measure"])
+    if row["status"] != "ok":
+        return f"{label}: {comparison_sentence(row)}."
+    study, p = material.study, decisive_p(row)
+    significant = p is not None and p < study.alpha
+    found = f"{p_phrase(p)}, n = {row['n']}"
+    told = {one["condition"]: one for one in material.rows("descriptives") if one["measure"] == row["measure"]}
+    if row["reduction"] is not None and set(study.conditions) <= set(told):
+        first, second = study.conditions
+        change = f"{percent(abs(row['reduction']))} {'lower' if row['reduction'] >= 0 else 'higher'}"
+        means = f"{_mean(told[second])} with {second} against {_mean(told[first])} with {first}"
+        sure = "" if significant else ", a difference that is not statistically significant"
+        return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({found})."
+    ranked = sorted((one for one in told.values() if one["mean"] is not None), key=lambda one: one["mean"])
+    verb = "differs" if significant else "does not differ statistically significantly"
+    if len(ranked) < 2:
+        return f"{label} {verb} between the conditions ({found})."
+    ends = f"{_mean(ranked[0])} with {ranked[0]['condition']} to {_mean(ranked[-1])} with {ranked[-1]['condition']}"
+    return f"{label} {verb} between the conditions: means run from {ends} ({found})."
+
+
+def _mean(row: Row) -> str:
+    """`12.3 s [10.1, 14.5]`: a mean and its 95 % interval."""
+    parts = (number(row["mean"]), unit_of(row["measure"]), interval(row["ci_low"], row["ci_high"]))
+    return " ".join(part for part in parts if part not in ("", NOTHING))
+
+
+def _closest(material: Material) -> Text:
+    """The estimator with the smallest mean error and the one after it, with their range over sessions."""
+    means = list(_means(material).items())[:_SENTENCES]
+    errors = {
+        name: [row["rmse_mm"] for row in material.rows("accuracy") if row["estimator"] == name] for name, _ in means
+    }
+    told = [
+        f"{number(mean, 1)} mm on average over {counted(n, 'session')}"
+        + (f" ({number(min(errors[name]), 1)} to {number(max(errors[name]), 1)} mm in single ones)" if n > 1 else "")
+        for name, (mean, n) in means
+    ]
+    if not told:
+        return ()
+    lead = f"{means[0][0]} comes closest to the reference: its root mean square error (RMSE) is {told[0]}."
+    after = (f" Next is {name} with {text}." for (name, _), text in zip(means[1:], told[1:], strict=True))
+    return (Strong(lead), *after)
+
+
+def _figure(material: Material) -> list[Figure]:
+    """The one figure that shows the answer."""
+    for row in _headline_rows(material):
+        wide = material.participant_means(row["measure"])
+        if row["status"] == "ok" and wide.notna().any().any():
+            return [_of_people(material, row["measure"], wide)]
+    rows = pd.DataFrame(material.rows("accuracy"))
+    if rows.empty or material.rows("comparisons"):
+        return []
+    n = rows["session"].nunique()
+    return [
+        material.figure(
+            "answer",
+            figures.errors,
+            f"Error (left) and lag (right) of each estimator, a small mark a session (n = {n}), the large one their"
+            " mean. An estimator that helps sits to the left in both.",
+            f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
+            rows,
+        )
+    ]
+
+
+def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
+    label, two = measure_label(measure), len(material.study.conditions) == 2
+    differences = " Right: each participant's difference and their mean with its interval; zero is no difference."
+    told = [
+        f"{row['condition']} {_mean(row)}"
+        for row in material.rows("descriptives")
+        if row["measure"] == measure and row["mean"] is not None
+    ]
+    return material.figure(
+        "answer",
+        figures.paired,
+        f"{label}: a line is a participant, large marks are means with 95 % intervals.{differences if two else ''}",
+        f"{label} of each participant by condition. Means with 95 % intervals: {'; '.join(told)}.",
+        wide,
+        measure,
+    )
+
+
+def _data(material: Material) -> Text:
+    """Where the data come from."""
+    logs = f" {counted(len(material.sessions), 'session')} of raw sensor logs." if material.sessions else ""
+    source = material.study.citation.strip()
+    kind, _, what = ORIGINS[material.study.data_origin].partition(": ")
+    return (Strong(f"{kind}: "), what, logs, f" Source: {source}" if source else "")
 
 
 def _question(material: Material) -> Text:
@@ -100,8 +225,8 @@ def _accuracy_keys(material: Material) -> list[KeyFigure]:
     ]
 
 
-def _answers(material: Material) -> list[Text]:
-    """A sentence a headline, one for the questionnaires, one for the estimators."""
+def _evidence(material: Material) -> list[Text]:
+    """What the answer rests on: a sentence a headline, one for the questionnaires, one for the estimators."""
     answers: list[Text] = []
     for row in _headline_rows(material):
         label = measure_label(row["measure"])
@@ -155,98 +280,3 @@ def _ratings(material: Material) -> list[Text]:
             )
         answers.append((Strong(f"{label}: "), f"{text}."))
     return answers
-
-
-def _is_singular(row: Row) -> bool:
-    return bool((row["details"] or {}).get("singular"))
-
-
-def _of_design(material: Material) -> list[Text]:
-    """How many things in the check of the design are not as they should be."""
-    remarked = [row for row in material.rows("design_check") if row["remark"]]
-    if not remarked:
-        return []
-    return [(f"{counted(len(remarked), 'remark')} on the design; see design and participants.",)]
-
-
-def _cautions(material: Material) -> list[Text]:
-    study = material.study
-    cautions: list[Text] = []
-    if study.data_origin == "reconstructed":
-        cautions.append(
-            (
-                Strong("The data are reconstructed: "),
-                "they fit printed figures and are nobody's measurements.",
-            )
-        )
-    if study.data_origin == "simulated":
-        cautions.append((Strong("The data are simulated: "), "they show what a model does, not what people do."))
-    n = material.results["study"]["participants"]["n"]
-    if material.rows("comparisons") and n < 8:
-        cautions.append(
-            (
-                Strong("Few participants: "),
-                f"with n = {n} intervals are wide and a normal distribution cannot be checked.",
-            )
-        )
-    violated = [
-        measure_label(row["measure"])
-        for row in material.rows("comparisons")
-        if row["test"] == "rm_anova" and ((row["details"] or {}).get("mauchly_p") or 1) < study.alpha
-    ]
-    if violated:
-        names = listing(list(dict.fromkeys(violated)))
-        cautions.append(
-            (
-                Strong("Sphericity is violated "),
-                f"(the differences between conditions vary unequally) for {names}: judge by the Greenhouse-Geisser p.",
-            )
-        )
-    singular = [measure_label(row["measure"]) for row in material.rows("comparisons") if _is_singular(row)]
-    if singular:
-        names = listing(list(dict.fromkeys(singular)))
-        cautions.append(
-            (
-                Strong("Singular fit "),
-                f"of the mixed model for {names}: it finds no variance between participants, so that it treats their"
-                " rows as if of different people.",
-            )
-        )
-    cautions += _of_design(material)
-    undefined = sum(row["status"] != "ok" for row in material.rows("comparisons"))
-    if undefined:
-        cautions.append((f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",))
-    contradictions = [row for row in material.rows("printed") if row["verdict"] == "contradiction"]
-    if contradictions:
-        verb = "contradicts" if len(contradictions) == 1 else "contradict"
-        cautions.append(
-            (f"{counted(len(contradictions), 'printed figure')} {verb} others in the same publication; see there.",)
-        )
-    lost = [row for row in material.rows("exclusions") if row["what"] in ("session set aside", "session read in part")]
-    if lost:
-        cautions.append((f"{counted(len(lost), 'session')} could not be used, or only in part; see data quality.",))
-    others = len(material.rows("exclusions")) - len(lost)
-    if others:
-        cautions.append(
-            (
-                (
-                    f"{counted(others, 'further exclusion or gap', 'further exclusions or gaps')} in the data; see data"
-                    " quality."
-                ),
-            )
-        )
-    honest = [
-        row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
-    ]
-    if honest:
-        names = listing(list(dict.fromkeys(honest)))
-        cautions.append(
-            (
-                Strong("Stated uncertainty too small "),
-                (
-                    f"in at least one session for {names}: the 95 % intervals hold the reference in less than 90 % of"
-                    " instants."
-                ),
-            )
-        )
-    return cautions

@@ -7,7 +7,7 @@ import pandas as pd
 from pipeline import results, tables
 from pipeline.document import html, pdf
 from pipeline.document.model import Document
-from pipeline.sections import SECTIONS
+from pipeline.sections import SECTIONS, participants, traces
 from pipeline.sections.material import ORIGINS, Material
 from pipeline.stage import Outcome, Work
 
@@ -32,7 +32,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell t
 
 
 def run(work: Work) -> Outcome:
-    """report.html, report.pdf, tables/*.csv and figures/*.svg."""
+    """report.html, traces.html, participants/*.html, report.pdf, tables/*.csv and figures/*.svg."""
     compared = work.entry("compare")
     for folder in ("tables", "figures"):
         (work.out / folder).mkdir()
@@ -55,6 +55,8 @@ def run(work: Work) -> Outcome:
     document = Document(work.study.title, subtitle, ORIGINS[work.study.data_origin], sections)
     html.render(document, work.out / "figures", work.out / "report.html")
     pdf.render(document, work.out / "figures", work.out / "report.pdf")
+    traces.write(material, work.out / traces.PAGE)
+    participants.write(material, work.out / participants.FOLDER)
     return Outcome()
 
 

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import csv
+import hashlib
+import io
+import json
+import math
 import re
+import zipfile
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -24,54 +31,58 @@ from pipeline.document.model import (
     Strong,
     Table,
 )
-from pipeline.wording import TESTS
+from pipeline.wording import TESTS, interval, number, p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study
 from tests.pipeline.reference import study_of
 
 Folder = Callable[..., Path]
 
-HOSTILE = [
-    "<script>alert(1)</script>",
-    "<img src=x onerror=alert(1)>",
-    '"><b>bold</b>',
-    "#panic()",
-    '#image("/etc/passwd")',
-    "$x^2$ *strong* _emph_ `code` @label \\ // comment",
-    "{{ 7 * 7 }}",
-    "{% include 'x' %}",
-    '=HYPERLINK("x")',
-    "مرحبا \u202eabc",
-    "\u0007bell",
-    "x" * 500,
-]
-
 
 class Checker(HTMLParser):
-    """What a page refers to and whether its headings and pictures are named."""
+    """What a page refers to, runs and says, and whether its pictures are named."""
 
     def __init__(self) -> None:
         super().__init__()
         self.tags: list[str] = []
         self.references: list[str] = []
+        self.handlers: list[str] = []
         self.pictures_without_alt = 0
         self.text: list[str] = []
+        self.scripts: list[str] = []
+        self._inside = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
+        self._inside = tag
         named = dict(attrs)
         self.references += [value or "" for key, value in attrs if key in ("src", "href")]
+        self.handlers += [key for key, _ in attrs if key.startswith("on")]
         if tag == "img" and not named.get("alt"):
             self.pictures_without_alt += 1
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = ""
 
     def handle_data(self, data: str) -> None:
-        self.text.append(data)
+        if self._inside == "script":
+            self.scripts[-1] += data
+        elif self._inside != "style":
+            self.text.append(data)
 
 
 def checked(page: str) -> Checker:
     checker = Checker()
     checker.feed(page)
     return checker
+
+
+def script(name: str) -> str:
+    """A script of the program's own."""
+    return (Path(html.__file__).parent / name).read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -104,12 +115,14 @@ def test_hostile_text_stays_text_in_html(hostile_document: Document, tmp_path: P
     html.render(hostile_document, tmp_path, tmp_path / "r.html")
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
     found = checked(page)
-    assert "script" not in found.tags
+    assert found.scripts == [script("report.js")]
+    assert not found.handlers
     assert found.tags.count("img") == 1
     assert "b" not in {tag for tag in found.tags if tag == "bold"}
     seen = "".join(found.text)
     for text in HOSTILE:
-        assert text.replace("\a", "□") in seen
+        assert text.replace("\a", "□").replace("\u202e", "□") in seen, text
+    assert "\u202e" not in page
     assert "49" not in re.sub(r"\s", "", seen.split("{{ 7 * 7 }}")[0][-10:])
 
 
@@ -136,32 +149,52 @@ def test_a_long_name_in_a_pdf_table_is_broken_behind_punctuation_and_stays_in_it
     assert name in "".join(pieces).replace("\u200b", "")
 
 
-def test_hostile_names_of_a_whole_study(folder: Folder, steadyhand: Steadyhand) -> None:
-    """Ids, measures, titles and a log's facts with markup, formulas and paths reach every output as text."""
-    evil = '=cmd()<b>&"x'
-    settings = (
-        f"title: '<script>alert(1)</script> #panic()'\nnotes: '{evil}'\nconditions: ['<i>a</i>', '=b']\nmeasures:"
-        " measures.csv\nsessions: '{session}.mcap'\nestimators: {'<u>e': {type: raw}}\ncomparisons: [{measure:"
-        " '../m<x>_s', test: wilcoxon}, {measure: 'q<y>/*', test: wilcoxon}]\n" + STREAMS
-    )
-    rows = "participant,condition,measure,value\n"
-    for number, person in enumerate(["@P1", "-P2", "<b>P3", "P4"]):
-        for shift, condition in enumerate(["<i>a</i>", "=b"]):
-            for measure in ("../m<x>_s", "q<y>/one", "q<y>/two"):
-                rows += f"{person},{condition},{measure},{number * 2 + shift * (number + 1)}\n"
-    root = folder(settings, **{"measures.csv": rows})
-    write_session(root / "x.mcap", session_messages(2.5), participant="@P1", condition="<i>a</i>")
-    ran = steadyhand("report", root)
+def test_hostile_text_of_a_whole_study_reaches_every_output_as_text(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Titles, notes, ids, measures, reasons and a log's facts, with markup, formulas and paths."""
+    ran = steadyhand("report", hostile_study(tmp_path / "study"))
     assert ran.code == 0, ran.err
-    found = checked((steadyhand.out / "report.html").read_text(encoding="utf-8"))
-    assert not {"script", "i", "u"} & set(found.tags)
-    assert PdfReader(steadyhand.out / "report.pdf").pages[0].extract_text()
-    for path in (steadyhand.out / "tables").iterdir():
-        for line in path.read_text(encoding="utf-8").splitlines():
-            for cell in line.split(","):
-                assert not cell.startswith(("=", "@")), f"{path.name}: {line}"
-    outside = [p for p in steadyhand.out.parent.rglob("*.svg") if not p.is_relative_to(steadyhand.out / "figures")]
-    assert not [p for p in outside if "cache" not in p.parts]
+    out = steadyhand.out
+    _is_text_in_the_page(out / "report.html")
+    _is_text_in_the_traces(out / "traces.html")
+    reader = PdfReader(out / "report.pdf")
+    printed = "".join("".join(page.extract_text() for page in reader.pages).split())
+    for text in ("<script>alert(1)</script>", "#panic()", "{{7*7}}", '#image("/etc/passwd")'):
+        assert text in printed
+    for path in (out / "tables").iterdir():
+        for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8"))):
+            for cell in row:
+                assert not cell.startswith(("=", "+", "-", "@", "\t", "\r")) or math.isfinite(float(cell)), path.name
+    for path in (out / "figures").iterdir():
+        tags = {element.tag.rpartition("}")[2] for element in ElementTree.parse(path).iter()}  # noqa: S314 - ours
+        assert not tags & {"script", "foreignObject", "a", "b", "i", "u", "img"}, path.name
+    with zipfile.ZipFile(out / "report.zip") as archive:
+        assert all(re.fullmatch(r"study/([\w-]+/)?[\w.-]+", name) for name in archive.namelist())
+    outside = [path for path in out.parent.rglob("*.svg") if not path.is_relative_to(out / "figures")]
+    assert not [path for path in outside if "cache" not in path.parts]
+
+
+def _is_text_in_the_page(path: Path) -> None:
+    page = checked(path.read_text(encoding="utf-8"))
+    assert page.scripts == [script("report.js")]
+    assert not page.handlers
+    assert not {"i", "u", "object", "iframe"} & set(page.tags)
+    seen = "".join(page.text)
+    for text in (*HOSTILE[:13], HOSTILE[-1], *CONDITIONS, PEOPLE[1], ESTIMATOR, SESSION):
+        assert text.replace("\u202e", "□") in seen, text
+
+
+def _is_text_in_the_traces(path: Path) -> None:
+    page = checked(path.read_text(encoding="utf-8"))
+    data, code = page.scripts
+    assert code == script("traces.js")
+    assert not page.handlers
+    assert not {"img", "i", "b", "u"} & set(page.tags)
+    packed = json.loads(data)
+    assert [one["session"] for one in packed] == [f"{SESSION}0", f"{SESSION}1"]
+    assert packed[0]["participant"] == PEOPLE[0]
+    assert {series["name"] for series in packed[0]["series"]} == {"tracker", "reference", ESTIMATOR, "fusion"}
+    for banned in ("innerHTML", "outerHTML", "insertAdjacent", "document.write", "eval(", "fetch(", "XMLHttp"):
+        assert banned not in code
 
 
 @pytest.fixture
@@ -191,12 +224,17 @@ def report(folder: Folder, steadyhand: Steadyhand) -> Path:
     return steadyhand.out
 
 
-def test_the_page_is_whole_without_network_or_script(report: Path) -> None:
+def test_the_page_is_whole_without_network_and_runs_nothing_but_its_own_script(report: Path) -> None:
+    """The script sorts tables and marks the section; whatever else there were to run, the page's policy forbids."""
     page = (report / "report.html").read_text(encoding="utf-8")
     found = checked(page)
-    assert "script" not in found.tags
+    assert found.scripts == [script("report.js")]
+    digest = base64.b64encode(hashlib.sha256(found.scripts[0].encode()).digest()).decode()
+    assert "default-src 'none'; img-src data:; style-src 'sha256-" in page
+    assert f"script-src 'sha256-{digest}'" in page
     assert found.pictures_without_alt == 0
-    assert all(reference.startswith(("#", "data:image/svg+xml;base64,")) for reference in found.references)
+    ours = ("#", "data:image/svg+xml;base64,", "traces.html")
+    assert all(reference.startswith(ours) for reference in found.references)
     assert "url(" not in page.split("</style>")[0]
     assert found.tags.count("h1") == 1
     assert "Simulated data" in page
@@ -246,6 +284,28 @@ def test_the_same_input_gives_the_same_bytes(report: Path, folder: Folder, stead
     assert steadyhand("report", report.parent / "study").code == 0
     for name, content in before.items():
         assert (report / name).read_bytes() == content, name
+
+
+def test_the_first_page_answers_with_means_intervals_and_a_figure(report: Path, steadyhand: Steadyhand) -> None:
+    page = (report / "report.html").read_text(encoding="utf-8")
+    text = " ".join("".join(checked(page.partition("Back to the contents")[0]).text).split())
+    results = steadyhand.results()
+    row = next(row for row in results["comparisons"] if row["measure"] == "selection_mse_px2")
+    means = {
+        one["condition"]: f"{number(one['mean'])} px² {interval(one['ci_low'], one['ci_high'])}"
+        for one in results["descriptives"]
+        if one["measure"] == "selection_mse_px2"
+    }
+    assert row["reduction"] < 0
+    expected = (
+        f"Selection error, MSE was {percent(-row['reduction'])} higher with b than with a"
+        f"{'' if row['p'] < 0.05 else ', a difference that is not statistically significant'}: on average"
+        f" {means['b']} with b against {means['a']} with a ({p_phrase(row['p'])}, n = 3)."
+    )
+    assert " ".join(expected.split()) in text
+    assert 'id="figure-answer"' in page
+    for caution in ("The data are simulated:", "Few participants:"):
+        assert caution in text
 
 
 def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report: Path, steadyhand: Steadyhand) -> None:

@@ -1,0 +1,59 @@
+"use strict";
+// Convenience only: without this script the page holds the same, in the order in which it was written.
+
+function amount(text) {
+  const told = text.includes("= ") ? text.split("= ")[1] : text;
+  const plain = told.replace(/[\u2009\u202f]/g, "").replace(/\u2212/g, "-").replace(/^[<>+\[\s]+/, "");
+  const found = plain.match(/^-?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?/);
+  return found ? parseFloat(found[0]) : NaN;
+}
+
+function compared(first, second, numeric) {
+  if (!numeric) return first.localeCompare(second, "en", { numeric: true });
+  const [a, b] = [amount(first), amount(second)];
+  if (isNaN(a) || isNaN(b)) return isNaN(a) - isNaN(b);
+  return a - b;
+}
+
+function sorted(rows, column, numeric, sign) {
+  const text = (row) => row.cells[column].textContent.trim();
+  const known = (row) => text(row) !== "" && text(row) !== "\u2013" && !(numeric && isNaN(amount(text(row))));
+  const order = (a, b) => (known(b) - known(a)) || (known(a) ? sign * compared(text(a), text(b), numeric) : 0);
+  return sign ? [...rows].sort(order) : rows;
+}
+
+function makeSortable(table) {
+  const headings = [...table.tHead.rows[0].cells];
+  const rows = [...table.tBodies[0].rows];
+  if (rows.length < 2) return;
+  headings.forEach((heading, column) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.title = "Sort by this column: rising, falling, as it was";
+    button.append(...heading.childNodes);
+    heading.append(button);
+    button.addEventListener("click", () => {
+      const next = { ascending: "descending", descending: null }[heading.getAttribute("aria-sort")];
+      const way = next === undefined ? "ascending" : next;
+      headings.forEach((other) => other.removeAttribute("aria-sort"));
+      if (way) heading.setAttribute("aria-sort", way);
+      const sign = { ascending: 1, descending: -1 }[way] || 0;
+      table.tBodies[0].append(...sorted(rows, column, heading.classList.contains("number"), sign));
+    });
+  });
+}
+
+function followSections(links) {
+  const byId = new Map(links.map((link) => [link.hash.slice(1), link]));
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) continue;
+      links.forEach((link) => link.removeAttribute("aria-current"));
+      byId.get(entry.target.getAttribute("aria-labelledby"))?.setAttribute("aria-current", "true");
+    }
+  }, { rootMargin: "-5% 0px -85% 0px" });
+  document.querySelectorAll("main > section").forEach((section) => seen.observe(section));
+}
+
+document.querySelectorAll("main table").forEach(makeSortable);
+followSections([...document.querySelectorAll("#contents a")]);

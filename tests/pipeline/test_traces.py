@@ -1,0 +1,116 @@
+"""The page of traces: what it holds is what was measured, to 0.1 mm, and it stays small."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from pipeline import recording
+from pipeline.document import traces
+from pipeline.document.traces import Series, Traces
+from pipeline.stage import Work
+from pipeline.stages import ingest
+from pipeline.study import Session, load_study
+from tests.conftest import STREAMS, session_messages, write_session
+from tests.pipeline.helpers import Steadyhand
+
+Folder = Callable[..., Path]
+
+
+def unpacked(session: dict[str, Any]) -> list[np.ndarray]:
+    """Times and axes one after the other, number by number as traces.js has it: the slow reference."""
+    content, begin, found = zlib.decompress(base64.b64decode(session["data"])), 0, []
+    for series in session["series"]:
+        for _ in range(1 + len(series["axes"])):
+            n, total, values = series["n"], 0, []
+            for index in range(n):
+                zigzag = sum(content[begin + plane * n + index] << (8 * plane) for plane in range(4))
+                total += (zigzag >> 1) ^ -(zigzag & 1)
+                total = (total + 2**31) % 2**32 - 2**31
+                values.append(total / 10)
+            begin += 4 * n
+            found.append(np.array(values))
+    assert begin == len(content)
+    return found
+
+
+def page_of(sessions: list[Traces], folder: Path) -> list[dict[str, Any]]:
+    traces.render("title", "origin", sessions, len(sessions), folder / "traces.html")
+    page = (folder / "traces.html").read_text(encoding="utf-8")
+    (data,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page)
+    content: list[dict[str, Any]] = json.loads(data)
+    return content
+
+
+@settings(max_examples=40, deadline=None)
+@given(arrays(np.float64, (12, 3), elements=st.floats(-2e8, 2e8)))
+def test_what_is_packed_comes_out_to_a_tenth(value_mm: np.ndarray) -> None:
+    time_s = np.arange(12) / 90
+    session = traces._packed(Traces("s", None, None, (Series("a", "estimator", ("x", "y", "z"), time_s, value_mm),)), 0)
+    times, *axes = unpacked(session)
+    assert session["left_out"] == 0
+    np.testing.assert_allclose(times / 1e3, time_s, atol=0.00005 + 1e-12)
+    np.testing.assert_allclose(np.column_stack(axes), value_mm, atol=0.05 + 1e-6)
+
+
+def test_readings_that_cannot_be_drawn_are_left_out_and_counted() -> None:
+    value_mm = np.array([[1.0], [np.nan], [np.inf], [1e12], [2.0]])
+    session = traces._packed(Traces("s", None, None, (Series("a", "tracker", ("x",), np.arange(5.0), value_mm),)), 0)
+    assert session["left_out"] == 3
+    times, values = unpacked(session)
+    assert times.tolist() == [0, 4000]
+    assert values.tolist() == [1, 2]
+
+
+def test_many_long_sessions_are_thinned_out_to_fit_and_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(traces, "BUDGET_BYTES", 60_000)
+    random, time_s = np.random.default_rng(0), np.arange(20_000) / 90
+    walk = [
+        Traces(name, None, None, (Series("a", "estimator", ("x",), time_s, random.normal(0, 9, (20_000, 1))),))
+        for name in ("long", "too")
+    ]
+    short = Traces("short", None, None, (Series("a", "estimator", ("x",), time_s[:50], np.zeros((50, 1))),))
+    packed = page_of([*walk, short], tmp_path)
+    assert (tmp_path / "traces.html").stat().st_size < 60_000 + 40_000
+    assert packed[0]["step_s"] > 0
+    assert packed[2]["step_s"] == 0
+    times = unpacked(packed[0])[0] / 1e3
+    assert 100 < len(times) < 20_000
+    assert np.all(np.diff(np.floor((times + 1e-6) / packed[0]["step_s"])) > 0)
+
+
+def test_positions_are_those_of_the_whole_recording(folder: Folder, tmp_path: Path) -> None:
+    """The quick way to the streams of positions agrees with the one by which the estimators get them."""
+    turned = STREAMS.replace("kind: reference}", "kind: reference, translation_mm: [1, 2, 3], latency_s: 0.01}")
+    root = folder("conditions: [a]\naxes: [x, z]\nsessions: '{participant}_{condition}.mcap'\n" + turned)
+    write_session(root / "P_a.mcap", session_messages(2.0))
+    study, out = load_study(root), tmp_path / "ingested"
+    out.mkdir()
+    session = Session("P_a", "P", "a", root / "P_a.mcap")
+    ingest.run(Work("study", study, root, out, (session,)))
+    whole, (origin_ns, quick) = recording.load(study, out), recording.positions(study, out)
+    late_s = (origin_ns - whole.origin_ns) * 1e-9
+    assert set(quick) == {"tracker", "reference"}
+    assert whole.reference is not None
+    for name, samples in (("tracker", whole.samples["tracker"]), ("reference", whole.reference)):
+        np.testing.assert_array_equal(quick[name].value, samples.value)
+        np.testing.assert_allclose(quick[name].time + late_s, samples.time, atol=2e-9)
+        np.testing.assert_allclose(quick[name].arrival + late_s, samples.arrival, atol=2e-9)
+
+
+def test_a_study_of_tables_alone_has_no_page_of_traces(folder: Folder, steadyhand: Steadyhand) -> None:
+    rows = "participant,condition,measure,value\n" + "".join(f"P{p},{c},m,{p}\n" for p in range(3) for c in "ab")
+    assert steadyhand("report", folder("conditions: [a, b]\nmeasures: m.csv\n", **{"m.csv": rows})).code == 0
+    assert not (steadyhand.out / "traces.html").exists()
+    assert "traces.html" not in (steadyhand.out / "report.html").read_text(encoding="utf-8")
