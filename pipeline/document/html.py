@@ -7,7 +7,7 @@ from pathlib import Path
 
 import jinja2
 
-from pipeline.document.model import Document, numbered
+from pipeline.document.model import Document, Link, Strong, numbered
 
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
 _HERE = Path(__file__).parent
@@ -22,7 +22,8 @@ def render(document: Document, figures: Path, path: Path) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.tests["strong"] = lambda part: not isinstance(part, str)
+    environment.tests["strong"] = lambda part: isinstance(part, Strong)
+    environment.tests["link"] = lambda part: isinstance(part, Link)
     environment.filters["kind"] = lambda block: type(block).__name__
 
     def picture(name: str) -> str:

@@ -12,8 +12,10 @@ from pipeline.document.model import (
     Document,
     Figure,
     KeyFigures,
+    Link,
     Notice,
     Paragraph,
+    Strong,
     Table,
     Text,
     numbered,
@@ -69,7 +71,11 @@ def _content(document: Document) -> dict[str, Any]:
 
 def _text(text: Text) -> list[dict[str, Any]]:
     return [
-        {"text": part, "strong": False} if isinstance(part, str) else {"text": part.text, "strong": True}
+        {
+            "text": part if isinstance(part, str) else part.text,
+            "strong": isinstance(part, Strong),
+            "anchor": part.anchor if isinstance(part, Link) else "",
+        }
         for part in text
     ]
 
@@ -95,6 +101,7 @@ def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
                 "columns": [vars(column) for column in block.columns],
                 "rows": [list(row) for row in block.rows],
                 "note": block.note,
+                "anchors": list(block.anchors),
                 "shares": _shares(block),
             }
         case Figure():

@@ -18,6 +18,7 @@ from pipeline.document.model import (
     Figure,
     KeyFigure,
     KeyFigures,
+    Link,
     Notice,
     Paragraph,
     Section,
@@ -134,6 +135,21 @@ def test_a_long_name_in_a_pdf_table_is_broken_behind_punctuation_and_stays_in_it
     assert end > begin
     assert all(line[-1] in "[,_=/" for line in pieces[begin:end])
     assert name in "".join(pieces).replace("\u200b", "")
+
+
+def test_words_lead_to_the_row_of_a_table(tmp_path: Path) -> None:
+    rows = (("first", "1"), ("second", "2"))
+    table = Table("t", "Rows", (Column("a", False), Column("b")), rows, anchors=("row-1", "row-2"))
+    section = Section("s", "S", (Paragraph(("see ", Link("<b>there</b>", "row-2"))), table))
+    document = Document("d", "", "", (section,))
+    html.render(document, tmp_path, tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert '<a href="#row-2">&lt;b&gt;there&lt;/b&gt;</a>' in page
+    assert re.findall(r'<tr id="([^"]*)">\s*<th scope="row">(\w+)', page) == [("row-1", "first"), ("row-2", "second")]
+    pdf.render(document, tmp_path, tmp_path / "r.pdf")
+    (sheet,) = PdfReader(tmp_path / "r.pdf").pages
+    assert [link.get_object()["/Subtype"] for link in sheet["/Annots"]] == ["/Link"]  # type: ignore[attr-defined]
+    assert "see <b>there</b>" in sheet.extract_text()
 
 
 def test_hostile_names_of_a_whole_study(folder: Folder, steadyhand: Steadyhand) -> None:
