@@ -16,6 +16,7 @@ _FROM_COMPARE = (
     "measures",
     "descriptives",
     "comparisons",
+    "comparisons_all_data",
     "accuracy",
     "replay_agreement",
     "sensor_noise",
