@@ -63,7 +63,7 @@ def _content(document: Document) -> dict[str, Any]:
         "subtitle": document.subtitle,
         "origin": document.origin,
         "sections": [
-            {"title": section.title, "blocks": [_block(block, names) for block in section.blocks]}
+            {"id": section.id, "title": section.title, "blocks": [_block(block, names) for block in section.blocks]}
             for section in document.sections
         ],
     }

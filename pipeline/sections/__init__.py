@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.document.model import Section
-from pipeline.sections import accuracy, comparisons, design, outcomes, overview, printed, provenance, quality
+from pipeline.sections import accuracy, comparisons, design, outcomes, overview, paste, printed, provenance, quality
 from pipeline.sections.material import Material
 
 SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
@@ -18,6 +18,7 @@ SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     outcomes.workload,
     outcomes.others,
     comparisons.section,
+    paste.section,
     printed.section,
     provenance.section,
 )
