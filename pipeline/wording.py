@@ -204,10 +204,13 @@ def statistic_name(row: Row) -> str:
 
 
 def statistic_value(row: Row) -> str:
-    """A statistic's value; a sum of ranks is whole or a half, and is printed as that."""
-    if row["statistic_name"] == "W+" and row["statistic"] is not None:
-        return f"{row['statistic']:.0f}" if float(row["statistic"]).is_integer() else f"{row['statistic']:.1f}"
-    return number(row["statistic"])
+    """A statistic's value, two decimals; a sum of ranks is whole or a half, and of a Bayes factor the small counts."""
+    value = row["statistic"]
+    if value is None or row["statistic_name"] == "BF10":
+        return number(value)
+    if row["statistic_name"] == "W+":
+        return f"{value:.0f}" if float(value).is_integer() else f"{value:.1f}"
+    return _fixed(value, 2)
 
 
 def degrees_of_freedom(row: Row) -> str:

@@ -50,10 +50,10 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     facts, conditions = results["study"]["participants"], list(study.conditions)
     people = counted(facts["n"], "participant") + _who(facts)
     if len(conditions) == 1:
-        yield f"{people} took part under one condition, {conditions[0]}."
+        yield f"There were {people} and one condition, {conditions[0]}."
         return
     yield (
-        f"{people} took part. {counted(len(conditions), 'condition')} were compared within participants:"
+        f"There were {people} and {counted(len(conditions), 'condition')}, compared within participants:"
         f" {listing(conditions)}; {conditions[0]} was the baseline."
     )
 
@@ -119,7 +119,11 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
         yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
         yield "Of more than two conditions p was corrected for sphericity after Greenhouse and Geisser."
-    yield f"The level of significance was {study.alpha:g}; intervals are of 95 %."
+    yield f"The level of significance was {_level(study.alpha)}; intervals are of 95 %."
+
+
+def _level(alpha: float) -> str:
+    return f"{alpha:g}".removeprefix("0")
 
 
 def _asked(entry: Comparison) -> str:
@@ -156,11 +160,10 @@ def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:
         yield f"Excluded: {', '.join(named)} ({one.reason.strip().rstrip('.')})."
     aside = sum(row["what"] == "session set aside" for row in rows)
     if aside:
-        yield f"{counted(aside, 'session')} could not be read and {'was' if aside == 1 else 'were'} set aside."
+        yield f"Of the sessions {aside} could not be used and {'was' if aside == 1 else 'were'} set aside."
     incomplete = {row["participant"] for row in rows if row["what"] == "left out of comparisons"}
     if incomplete:
-        who = counted(len(incomplete), "participant")
-        yield f"{who} lacked a value and did not count in the comparisons concerned."
+        yield f"Of the participants {len(incomplete)} lacked a value and did not count in the comparisons concerned."
 
 
 def _software(versions: Mapping[str, str]) -> Iterator[str]:

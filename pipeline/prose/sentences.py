@@ -25,6 +25,7 @@ from pipeline.wording import (
 Row = Mapping[str, Any]
 
 _BEFORE_INTERVAL = ", 95 % CI "
+_ROUND_OFF = 1e-12  # of the mean: what is left where two means are the same
 _DIGITS = 3  # of p, as APA prints it
 _NAMED = {
     "art_anova": "aligned rank transform",
@@ -90,12 +91,10 @@ def _test(row: Row) -> str:
 
 def _directed(row: Row, told: Told, what: str, pair: _Pair, difference: float) -> str:
     """Which of two is lower, by how much, and whether that is significant."""
-    lower = "lower" if difference > 0 else "higher" if difference < 0 else "the same"
     amount = _amount(row, difference)
-    side = f"{lower} {pair.among} {pair.second}"
-    if _significant(row, told.alpha):
-        than = f" than {pair.among} {pair.first}" if difference else f" as {pair.among} {pair.first}"
-        head = f"{what} was significantly {side}{than}{pair.where}"
+    side = f"{'lower' if difference > 0 else 'higher'} {pair.among} {pair.second}" if difference else "the same in both"
+    if _significant(row, told.alpha) and difference:
+        head = f"{what} was significantly {side} than {pair.among} {pair.first}{pair.where}"
         inside = [amount, *_means(row, told)]
     else:
         head = f"{what} did not differ significantly between {pair.first} and {pair.second}{pair.where}"
@@ -185,9 +184,12 @@ def _significant(row: Row, alpha: float) -> bool:
 
 def _difference(row: Row) -> float | None:
     """First minus second, as far as the test says it: by ranks, estimated, or of the means."""
-    by_test = row["test"] == "wilcoxon" or row["effect_size_name"] == "estimate"
-    value = row["effect_size"] if by_test else row["mean_difference"]
-    return None if value is None else float(value)
+    if row["test"] == "wilcoxon" or row["effect_size_name"] == "estimate":
+        return None if row["effect_size"] is None else float(row["effect_size"])
+    if row["mean_difference"] is None:
+        return None
+    same = row["reduction"] is not None and abs(row["reduction"]) < _ROUND_OFF
+    return 0.0 if same else float(row["mean_difference"])
 
 
 def _pair(row: Row, conditions: Sequence[str]) -> _Pair | None:

@@ -71,8 +71,17 @@ def _lights(material: Material) -> list[Block]:
 def _session_lights(figures: Sequence[Judged], facts: Sequence[str]) -> tuple[str, ...]:
     """A session's light, and the worst figure of each fact."""
     light = light_of(figures)
-    of_fact = [session_quality.worst([one for one in figures if one.fact == fact]) for fact in facts]
-    return f"{SYMBOLS[light]} {light}", *(NOTHING if one is None else one.text for one in of_fact)
+    of_fact = [_fact_light([one for one in figures if one.fact == fact]) for fact in facts]
+    return f"{SYMBOLS[light]} {light}", *of_fact
+
+
+def _fact_light(figures: Sequence[Judged]) -> str:
+    """The worst of a fact's figures, and how many others are as bad."""
+    worst = session_quality.worst(figures)
+    if worst is None:
+        return NOTHING
+    others = sum(one.light == worst.light for one in figures) - 1
+    return worst.text + (f" and {others} more" if others and worst.light in ("amber", "red") else "")
 
 
 def _not_whole(material: Material) -> str:

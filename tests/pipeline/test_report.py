@@ -267,7 +267,8 @@ def test_the_same_input_gives_the_same_bytes(report: Path, folder: Folder, stead
 def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report: Path, steadyhand: Steadyhand) -> None:
     page = (report / "report.html").read_text(encoding="utf-8")
     for row in steadyhand.results()["comparisons"]:
-        assert f"{row['statistic']:.2f}" in page
+        ranks = row["statistic_name"] == "W+"  # a sum of ranks is whole or a half
+        assert (f"= {row['statistic']:g}" if ranks else f"{row['statistic']:.2f}") in page
 
 
 def test_files_of_an_earlier_report_that_are_no_more_are_removed(
@@ -315,8 +316,8 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
     page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
     text = " ".join("".join(checked(page).text).split())
     for sentence in (
-        "M: F(1, 11) = 5.81, p = .0346, Holm-adjusted p = .0346, η²G = 0.10 [0.00, 0.29], n = 12, reduced by 13.3 %.",
-        "M: ART ANOVA: F(1, 11) = 5.77, p = .0351, η²p = 0.34 [0.00, 0.65], n = 12.",
+        "M: F(1, 11) = 5.81, p = .0346, Holm-adjusted p = .0346, η²G = .10 [.00, .29], n = 12, reduced by 13.3 %.",
+        "M: ART ANOVA: F(1, 11) = 5.77, p = .0351, η²p = .34 [.00, .65], n = 12.",
         "M: mixed model: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
         "M: mixed model: period, t(10) = −4.01, p = .0025, estimate = −6.16 [−9.58, −2.73], n = 12.",
         "M: crossover: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
@@ -330,7 +331,8 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         assert sentence in text, sentence
     for row in steadyhand.results()["comparisons"]:
         assert TESTS[row["test"]] in text
-        assert f"{abs(row['statistic']):.2f}" in text
+        ranks = row["statistic_name"] == "W+"
+        assert (f"W₊ = {row['statistic']:g}" if ranks else f"{abs(row['statistic']):.2f}") in text
         assert row["method"] in text
     for row in steadyhand.results()["design_check"]:
         assert row["found"] in text
