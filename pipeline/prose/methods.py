@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from pipeline.estimators import build_estimator
-from pipeline.study import Comparison, Study
+from pipeline.study import Comparison, Sensing, Study
 from pipeline.wording import adjustment, counted, listing, number, subject, unit_of
 
 Row = Mapping[str, Any]
@@ -15,7 +15,7 @@ Row = Mapping[str, Any]
 _TESTS = {
     "rm_anova": "repeated-measures ANOVA (generalized η²)",
     "t_paired": "paired t tests (two-sided; d_z with its noncentral-t interval)",
-    "wilcoxon": "exact Wilcoxon signed-rank tests (two-sided, ties at their mean rank; rank-biserial correlation)",
+    "wilcoxon": "Wilcoxon signed-rank tests (two-sided; rank-biserial correlation)",
     "friedman": "Friedman's test (Kendall's W)",
     "art_anova": "ANOVA on aligned ranks (ART; partial η²)",
     "mixed_model": (
@@ -87,6 +87,8 @@ def _estimators(study: Study) -> Iterator[str]:
     """Each estimator with all its settings, stated or not."""
     if not study.estimators or study.sessions is None:
         return
+    sensors = [f"{name} ({', '.join(_stated(stream))})" for name, stream in study.sensor_streams.items()]
+    yield f"Sensors, as stated to the estimators: {'; '.join(sensors)}."
     told = []
     for name, settings in study.estimators.items():
         built = build_estimator(study, name)
@@ -96,15 +98,23 @@ def _estimators(study: Study) -> Iterator[str]:
             if field.name != "sensors"
         ]
         kind = settings.type if settings.type == name else f"{name} is {settings.type}"
-        sensors = [f"streams {listing(list(settings.use))}"] if settings.use else []
-        told.append(f"{kind} ({', '.join([*sensors, *values])})" if sensors or values else kind)
+        streams = [f"streams {listing(list(settings.use))}"] if settings.use else []
+        told.append(f"{kind} ({', '.join([*streams, *values])})" if streams or values else kind)
     yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(told)}."
     for condition, name in study.shown.items():
         yield f"Condition {condition} displayed {name}."
 
 
+def _stated(stream: Sensing) -> Iterator[str]:
+    """A sensor's kind, noise and latency."""
+    yield stream.kind
+    for name, value in stream:
+        if name.startswith("noise_sd") or name == "latency_s":
+            yield f"{name} = {_value(value)}"
+
+
 def _value(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}".replace("e+0", "e") if isinstance(value, float) else str(value)
 
 
 def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
@@ -114,7 +124,8 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     said: dict[str, list[str]] = {}
     for entry in study.comparisons:
         of = subject(entry.measure).replace(" *", " scales") if "*" in entry.measure else subject(entry.measure)
-        said.setdefault(_asked(entry) + _followed_up(entry, rows), []).append(of)
+        mine = [row for row in rows if row["test"] == entry.test]
+        said.setdefault(_asked(entry, mine) + _followed_up(entry, mine), []).append(of)
     for test, measures in said.items():
         yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
@@ -126,8 +137,8 @@ def _level(alpha: float) -> str:
     return f"{alpha:g}".removeprefix("0")
 
 
-def _asked(entry: Comparison) -> str:
-    """`repeated-measures ANOVA (generalized η²), follow-up t tests Holm-adjusted`."""
+def _asked(entry: Comparison, rows: Sequence[Row]) -> str:
+    """`Wilcoxon signed-rank tests (…), exact, midranks, zeros dropped, p Holm-adjusted`; rows are of its test."""
     parts = [_TESTS[entry.test]]
     if entry.test in ("rm_anova", "art_anova") and len(entry.within) > 1:
         parts.append(f"of the factors {listing(list(entry.within))}")
@@ -138,15 +149,16 @@ def _asked(entry: Comparison) -> str:
     if entry.test == "bayes_t":
         parts.append(f"Cauchy prior of scale {entry.prior_scale:g} on d_z")
     if entry.test == "wilcoxon":
-        parts.append("zero differences dropped" if entry.zeros == "dropped" else "zero differences ranked after Pratt")
+        zeros = "Pratt" if entry.zeros == "pratt" else "dropped"
+        parts += dict.fromkeys(row["method"] for row in rows if zeros in row["method"])
     if entry.adjust != "none":
         parts.append(f"p {adjustment(entry.adjust)}-adjusted")
     return ", ".join(parts)
 
 
 def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
-    """How the pairs after an entry's test were adjusted, if there are any."""
-    pairs = [row for row in rows if row["test"] == entry.test and row["contrast"] is not None]
+    """How the pairs after an entry's test were adjusted, if there are any; rows are of its test."""
+    pairs = [row for row in rows if row["contrast"] is not None]
     followed = entry.test in ("rm_anova", "mixed_model") and any(row["adjust"] == entry.follow_up for row in pairs)
     if not followed or entry.follow_up == "none":
         return ""

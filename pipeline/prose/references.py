@@ -85,11 +85,11 @@ class Reference:
         issue = f"({told['number']})" if "number" in told else ""
         where = " ".join(filter(None, (told.get("journal", told.get("booktitle")), told.get("volume", "") + issue)))
         edition = f"{told['edition']} ed." if "edition" in told else ""
-        version = f"version {told['version']}" if "version" in told else ""
-        source = ", ".join(filter(None, (where, told.get("pages"), edition, told.get("publisher"), version)))
+        source = ", ".join(filter(None, (where, told.get("pages"), edition, told.get("publisher"))))
         head = " ".join(filter(None, (authors, f"({told['year']})." if "year" in told else "")))
         doi = f"doi {told['doi']}" if "doi" in told else ""
-        sentences = (f"{part.rstrip('.')}." for part in (told.get("title"), source, told.get("note")) if part)
+        title = ", version ".join(filter(None, (told.get("title"), told.get("version"))))
+        sentences = (f"{part.rstrip('.')}." for part in (title, source, told.get("note")) if part)
         return " ".join(filter(None, (head, *sentences, doi)))
 
 
