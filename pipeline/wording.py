@@ -111,11 +111,13 @@ def _spaced(name: str) -> str:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """With `digits` decimals up to 1000, grouped whole numbers above, more digits for the small."""
+    """With `digits` decimals up to 1000, grouped whole above, more digits for the small, powers for the huge."""
     if value is None or not math.isfinite(value):
         return NOTHING
     size = abs(value)
-    if size >= 1000:
+    if size >= 1e15:
+        text = f"{value:.{digits}e}"  # beyond what a float holds to the unit
+    elif size >= 1000:
         text = f"{value:,.0f}".replace(",", THIN)
     elif size == 0 or size >= 0.1:
         text = f"{value:.{digits}f}"

@@ -71,7 +71,7 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     (
         "Wilcoxon signed-rank test",
         r"\bWilcoxon\b",
-        "Compares two conditions by the ranks of the participants' differences, here exactly, ties at their mean rank.",
+        "Compares two conditions by the ranks of the participants' differences, ties at their mean rank.",
     ),
     ("W₊", r"W₊", "The sum of the ranks of the differences in which the first condition's value is larger."),
     ("Friedman test", r"\bFriedman\b", "Compares conditions by how each participant's values rank them."),

@@ -146,12 +146,15 @@ def _bayes(row: Row, told: Told, what: str) -> str:
     """How many times as likely the data are under a difference as under none, or the reverse."""
     pair, factor = _pair(row, told.conditions), row["statistic"]
     between = f"between {pair.first} and {pair.second}" if pair else f"of {contrast(row)}"
-    times = number(factor if factor >= 1 else 1 / factor)
-    likelier, other = ("a difference", "none") if factor >= 1 else ("no difference", "one")
+    likelier, other = ("no difference", "one") if factor is not None and factor < 1 else ("a difference", "none")
+    if factor is None:  # larger than any number a computer holds
+        times, bayes = "more than 10³⁰⁸", f"ln BF₁₀ = {number(row['details']['log_bf10'])}"
+    else:
+        times, bayes = number(factor if factor >= 1 else 1 / factor), f"BF₁₀ = {statistic_value(row)}"
     prior = f"Cauchy prior of scale {row['details']['prior_scale']:g}"
     return (
-        f"{what}: the data are {times} times as likely under {likelier} {between} as under {other}, BF₁₀ ="
-        f" {statistic_value(row)} ({prior}), {effect_size(row, _BEFORE_INTERVAL)}, n = {row['n']}."
+        f"{what}: the data are {times} times as likely under {likelier} {between} as under {other}, {bayes}"
+        f" ({prior}), {effect_size(row, _BEFORE_INTERVAL)}, n = {row['n']}."
     )
 
 

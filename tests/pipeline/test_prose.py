@@ -199,6 +199,16 @@ def test_ranks_and_means_that_disagree_are_said_to() -> None:
     assert "higher with b by ranks, while its mean was lower by 16.00 s" in said
 
 
+def test_a_bayes_factor_beyond_all_numbers_is_said_by_its_logarithm() -> None:
+    values = [(1000.0 + person % 2 / 1000, 1.0) for person in range(120)]
+    rows, told = a_study(["a", "b"], values, [{"test": "bayes_t"}])
+    assert rows[0]["statistic"] is None
+    said = sentence(rows[0], told)
+    assert (
+        "more than 10³⁰⁸ times as likely under a difference between a and b as under none, ln BF₁₀ = 1\u2009709" in said
+    )
+
+
 def test_what_is_undefined_is_said_in_words() -> None:
     rows, told = a_study(["a", "b"], [(1, 1), (2, 2)], TESTS)
     said = {row["test"]: sentence(row, told) for row in rows}
