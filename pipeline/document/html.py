@@ -7,7 +7,7 @@ from pathlib import Path
 
 import jinja2
 
-from pipeline.document.model import Document, Link, Strong, numbered
+from pipeline.document.model import CrossReference, Document, Strong, numbered
 
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
 _HERE = Path(__file__).parent
@@ -23,7 +23,7 @@ def render(document: Document, figures: Path, path: Path) -> None:
         lstrip_blocks=True,
     )
     environment.tests["strong"] = lambda part: isinstance(part, Strong)
-    environment.tests["link"] = lambda part: isinstance(part, Link)
+    environment.tests["cross_reference"] = lambda part: isinstance(part, CrossReference)
     environment.filters["kind"] = lambda block: type(block).__name__
 
     def picture(name: str) -> str:

@@ -15,14 +15,14 @@ class Strong:
 
 
 @dataclass(frozen=True)
-class Link:
+class CrossReference:
     """Words that lead to an anchor of the same document."""
 
     text: str
     anchor: str
 
 
-Text = tuple[str | Strong | Link, ...]
+Text = tuple[str | Strong | CrossReference, ...]
 
 
 def plain(text: Text) -> str:

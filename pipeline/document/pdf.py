@@ -9,10 +9,10 @@ from typing import Any, Literal
 
 from pipeline.document.model import (
     Block,
+    CrossReference,
     Document,
     Figure,
     KeyFigures,
-    Link,
     Notice,
     Paragraph,
     Strong,
@@ -74,7 +74,7 @@ def _text(text: Text) -> list[dict[str, Any]]:
         {
             "text": part if isinstance(part, str) else part.text,
             "strong": isinstance(part, Strong),
-            "anchor": part.anchor if isinstance(part, Link) else "",
+            "anchor": part.anchor if isinstance(part, CrossReference) else "",
         }
         for part in text
     ]

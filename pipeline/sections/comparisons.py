@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from pipeline.document.model import Block, Link, Paragraph, Section, Strong, Table, columns
+from pipeline.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
 from pipeline.sections.material import Material, Row
 from pipeline.statistics.diagnostics import OUTLIER_RULE
 from pipeline.wording import (
@@ -49,7 +49,7 @@ def section(material: Material) -> Section | None:
         tuple(anchor(at) for at in range(len(rows))),
     )
     where = "Every test of the study, a row each. What the words and letters mean stands in the "
-    explained = Paragraph((where, Link("glossary", "glossary"), "."))
+    explained = Paragraph((where, CrossReference("glossary", "glossary"), "."))
     blocks: list[Block] = [explained, table, Paragraph((Strong("Methods: "), _methods(rows)))]
     return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
 

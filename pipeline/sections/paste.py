@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from pipeline.document.model import Block, Link, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.prose.methods import methods
 from pipeline.prose.references import Reference, bibliography, used
 from pipeline.prose.sentences import Told, means_sentence, sentence, tells_means, told_of
@@ -49,13 +49,13 @@ def _results(material: Material) -> Iterator[Text]:
     for (measure, _), group in groupby(rows, key=lambda item: (item[1]["measure"], item[1]["test"])):
         means = means_sentence(measure, told) if measure in lacking else ""
         lacking.discard(measure)
-        text: list[str | Strong | Link] = [f"{means} "] if means else []
+        text: list[str | Strong | CrossReference] = [f"{means} "] if means else []
         text += [part for at, row in group for part in _linked(at, row, told)]
         yield tuple(text)
 
 
-def _linked(at: int, row: Row, told: Told) -> tuple[str | Strong | Link, ...]:
-    return f"{sentence(row, told)} ", Link("[row]", anchor(at)), " "
+def _linked(at: int, row: Row, told: Told) -> tuple[str | Strong | CrossReference, ...]:
+    return f"{sentence(row, told)} ", CrossReference("[row]", anchor(at)), " "
 
 
 def _references(material: Material) -> Table:

@@ -14,11 +14,11 @@ from pypdf import PdfReader
 from pipeline.document import html, pdf
 from pipeline.document.model import (
     Column,
+    CrossReference,
     Document,
     Figure,
     KeyFigure,
     KeyFigures,
-    Link,
     Notice,
     Paragraph,
     Section,
@@ -140,7 +140,7 @@ def test_a_long_name_in_a_pdf_table_is_broken_behind_punctuation_and_stays_in_it
 def test_words_lead_to_the_row_of_a_table(tmp_path: Path) -> None:
     rows = (("first", "1"), ("second", "2"))
     table = Table("t", "Rows", (Column("a", False), Column("b")), rows, anchors=("row-1", "row-2"))
-    section = Section("s", "S", (Paragraph(("see ", Link("<b>there</b>", "row-2"))), table))
+    section = Section("s", "S", (Paragraph(("see ", CrossReference("<b>there</b>", "row-2"))), table))
     document = Document("d", "", "", (section,))
     html.render(document, tmp_path, tmp_path / "r.html")
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
