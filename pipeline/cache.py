@@ -29,7 +29,7 @@ _DISTRIBUTIONS = {
     "mcap_protobuf": "mcap-protobuf-support",
     "google": "protobuf",
 }
-_DATA_FILES = (".css", ".jinja", ".typ")
+_DATA_FILES = (".bib", ".css", ".jinja", ".typ")
 _MANIFEST = "entry.json"
 _NEW = "new"
 _KEY_LENGTH = 64

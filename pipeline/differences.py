@@ -15,6 +15,7 @@ Figures = Mapping[str, Any]
 OF_A_STUDY: Mapping[str, tuple[str, ...]] = {
     "descriptives": ("measure", "condition"),
     "comparisons": ("measure", "test", "effect", "contrast"),
+    "comparisons_all_data": ("measure", "test", "effect", "contrast"),
     "accuracy": ("session", "estimator", "variant"),
     "replay_agreement": ("session", "estimator"),
     "quality": ("session", "stream"),

@@ -29,6 +29,7 @@ STAGE_OF: Mapping[str, str] = {
         (
             "descriptives",
             "comparisons",
+            "comparisons_all_data",
             "design_check",
             "simulated_reductions",
             "measures",

@@ -19,6 +19,7 @@ SCHEMA_VERSION = 1
 LISTS = (
     "descriptives",
     "comparisons",
+    "comparisons_all_data",
     "accuracy",
     "replay_agreement",
     "quality",
@@ -48,7 +49,7 @@ def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame]
     }
     for table in LISTS:
         content[table] = tables.records(table, found[table]) if table in found else []
-    for row in content["comparisons"]:
+    for row in (*content["comparisons"], *content["comparisons_all_data"]):
         row["details"] = None if row["details"] is None else json.loads(row["details"])
     _dump(content, path)
 

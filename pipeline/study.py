@@ -272,6 +272,35 @@ class Exclusion(Frozen):
         return all(getattr(self, key) in (None, value) for key, value in ids.items())
 
 
+_Bound = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
+_Share = Annotated[float, Field(ge=0, le=1)]
+Limits = tuple[_Bound, _Bound]
+Shares = tuple[_Share, _Share]
+
+
+class QualityLimits(Frozen):
+    """From where a figure of a session's quality is amber, and from where red; the report's traffic lights.
+
+    Beyond is more, except for `rate_share`, where it is less.
+    """
+
+    rate_share: Shares = (0.8, 0.5)
+    gap_s: Limits = (0.2, 1.0)
+    latency_s: Limits = (0.25, 0.5)
+    jitter_ms: Limits = (20.0, 100.0)
+    out_of_order_share: Shares = (0.001, 0.01)
+    lost_share: Shares = (0.01, 0.05)
+    agreement_mm: Limits = (1e-6, 1.0)
+
+    @model_validator(mode="after")
+    def _amber_before_red(self) -> QualityLimits:
+        for name in type(self).model_fields:
+            amber, red = getattr(self, name)
+            if (amber < red) if name == "rate_share" else (amber > red):
+                raise ValueError(f"{name} needs the limit of amber first, then that of red; found {[amber, red]}")
+        return self
+
+
 class Study(Frozen):
     """A study folder's settings. A contrast is first − second in the order of `conditions`."""
 
@@ -296,6 +325,7 @@ class Study(Frozen):
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()
+    quality_limits: QualityLimits = QualityLimits()
     task: Task | None = None
     simulation: Simulation | None = None
 

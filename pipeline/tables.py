@@ -19,6 +19,30 @@ _NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them
 _POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
 
+_COMPARISON = [
+    ("measure", _TEXT),
+    ("test", _TEXT),
+    ("effect", _TEXT),
+    ("contrast", _TEXT),
+    ("n", _COUNT),
+    ("statistic_name", _TEXT),
+    ("statistic", _FLOAT),
+    ("df1", _FLOAT),
+    ("df2", _FLOAT),
+    ("p", _FLOAT),
+    ("p_adjusted", _FLOAT),
+    ("adjust", _TEXT),
+    ("method", _TEXT),
+    ("effect_size_name", _TEXT),
+    ("effect_size", _FLOAT),
+    ("ci_low", _FLOAT),
+    ("ci_high", _FLOAT),
+    ("mean_difference", _FLOAT),
+    ("reduction", _FLOAT),
+    ("status", _TEXT),
+    ("details", _TEXT),  # JSON
+]
+
 
 def _schema(*columns: tuple[str, pa.DataType]) -> pa.Schema:
     return pa.schema(list(columns))
@@ -149,29 +173,8 @@ TABLES: Mapping[str, pa.Schema] = {
         ("ci_low", _FLOAT),
         ("ci_high", _FLOAT),
     ),
-    "comparisons": _schema(
-        ("measure", _TEXT),
-        ("test", _TEXT),
-        ("effect", _TEXT),
-        ("contrast", _TEXT),
-        ("n", _COUNT),
-        ("statistic_name", _TEXT),
-        ("statistic", _FLOAT),
-        ("df1", _FLOAT),
-        ("df2", _FLOAT),
-        ("p", _FLOAT),
-        ("p_adjusted", _FLOAT),
-        ("adjust", _TEXT),
-        ("method", _TEXT),
-        ("effect_size_name", _TEXT),
-        ("effect_size", _FLOAT),
-        ("ci_low", _FLOAT),
-        ("ci_high", _FLOAT),
-        ("mean_difference", _FLOAT),
-        ("reduction", _FLOAT),
-        ("status", _TEXT),
-        ("details", _TEXT),  # JSON
-    ),
+    "comparisons": _schema(*_COMPARISON),
+    "comparisons_all_data": _schema(*_COMPARISON),  # without the exclusions of study.yaml; empty where there are none
     "accuracy": _schema(
         ("study", _TEXT),
         ("session", _TEXT),

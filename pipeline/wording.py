@@ -39,6 +39,7 @@ _EFFECT_SIZES = {
     "matched-pairs rank-biserial": "r_rb",
     "Kendall's W": "W",
 }
+_NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W")  # printed without a leading zero, as APA has it
 _SCALES = {
     "nasa_tlx": ("mental", "physical", "temporal", "performance", "effort", "frustration"),
 }
@@ -57,7 +58,7 @@ EFFECTS_OF_CONDITION = ("condition", "treatment")
 """What a test calls the effect of the conditions."""
 _KNOWN_BY_STATISTIC = ("rm_anova", "t_paired", "wilcoxon", "friedman")
 _SEVERAL = "the differences between conditions are"
-_STATISTICS = {"chi2": "χ²", "BF10": "BF₁₀"}
+_STATISTICS = {"chi2": "χ²", "BF10": "BF₁₀", "W+": "W₊"}
 
 
 def measure_label(measure: str) -> str:
@@ -88,6 +89,16 @@ def short_label(measure: str) -> str:
     return label.partition(": ")[2].capitalize() if "/" in measure else label.partition(" (")[0]
 
 
+def subject(measure: str) -> str:
+    """A measure as the subject of a sentence: without its unit, a scale behind its questionnaire."""
+    unit = unit_of(measure)
+    label = measure_label(measure).removesuffix(f" ({unit})")
+    if measure in _LABELS:
+        name, comma, kind = label.partition(", ")
+        return f"{name} ({kind})" if comma else label
+    return label.replace(": ", " ", 1) if "/" in measure else label
+
+
 def unit_of(measure: str) -> str:
     """The unit in a measure's label, or nothing."""
     label = measure_label(measure)
@@ -100,11 +111,13 @@ def _spaced(name: str) -> str:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """With `digits` decimals up to 1000, grouped whole numbers above, more digits for the small."""
+    """With `digits` decimals up to 1000, grouped whole above, more digits for the small, powers for the huge."""
     if value is None or not math.isfinite(value):
         return NOTHING
     size = abs(value)
-    if size >= 1000:
+    if size >= 1e15:
+        text = f"{value:.{digits}e}"  # beyond what a float holds to the unit
+    elif size >= 1000:
         text = f"{value:,.0f}".replace(",", THIN)
     elif size == 0 or size >= 0.1:
         text = f"{value:.{digits}f}"
@@ -131,20 +144,29 @@ def share(value: float | None, digits: int = 3) -> str:
     if value is None or not math.isfinite(value):
         return NOTHING
     text = f"{value:.{digits}f}"
-    return text.replace("0.", ".", 1).replace("-", MINUS) if abs(value) < 1 else text.replace("-", MINUS)
+    text = text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
+    return text.removeprefix("-") if not float(text) else text.replace("-", MINUS)
 
 
-def p_value(p: float | None) -> str:
-    """A p value with four digits."""
+def p_value(p: float | None, digits: int = 4) -> str:
+    """A p value with so many digits; what would read as none or as one is said to be below or above."""
     if p is None:
         return NOTHING
-    return "< .0001" if p < 0.0001 else share(p, 4)
+    least = 10.0**-digits
+    if p < least:
+        return f"< {share(least, digits)}"
+    return f"> {share(1 - least, digits)}" if p > 1 - least / 2 else share(p, digits)
 
 
-def p_phrase(p: float | None, symbol: str = "p") -> str:
+def p_phrase(p: float | None, symbol: str = "p", digits: int = 4) -> str:
     """`p = .0071`, `p < .0001`."""
-    text = p_value(p)
-    return f"{symbol} {text}" if text.startswith("<") else f"{symbol} = {text}"
+    text = p_value(p, digits)
+    return f"{symbol} {text}" if text.startswith(("<", ">")) else f"{symbol} = {text}"
+
+
+def share_interval(low: float | None, high: float | None, digits: int = 2) -> str:
+    """The same for figures that cannot exceed 1: `[.01, .35]`."""
+    return NOTHING if low is None or high is None else f"[{share(low, digits)}, {share(high, digits)}]"
 
 
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:
@@ -173,20 +195,59 @@ def statistic(row: Row) -> str:
     """`F(1, 11) = 10.86`, as the test prints it."""
     if row["statistic"] is None:
         return NOTHING
-    value = number(row["statistic"])
-    freedom = ", ".join(text for text in (degrees(row["df1"]), degrees(row["df2"])) if text)
-    name = _STATISTICS.get(row["statistic_name"], row["statistic_name"])
-    return f"{name}({freedom}) = {value}" if freedom else f"{name} = {value}"
+    freedom = degrees_of_freedom(row)
+    name = statistic_name(row)
+    return f"{name}({freedom}) = {statistic_value(row)}" if freedom else f"{name} = {statistic_value(row)}"
 
 
-def effect_size(row: Row) -> str:
-    """`d_z = 0.65 [0.01, 1.27]`."""
+def statistic_name(row: Row) -> str:
+    """`F`, `W₊`, `χ²`."""
+    return _STATISTICS.get(row["statistic_name"], str(row["statistic_name"]))
+
+
+def statistic_value(row: Row) -> str:
+    """A statistic's value, two decimals; a sum of ranks is whole or a half, and of a Bayes factor the small counts."""
+    value = row["statistic"]
+    if value is None or row["statistic_name"] == "BF10":
+        return number(value)
+    if row["statistic_name"] == "W+":
+        return f"{value:.0f}" if float(value).is_integer() else f"{value:.1f}"
+    return _fixed(value, 2)
+
+
+def degrees_of_freedom(row: Row) -> str:
+    """`1, 11`, or nothing."""
+    return ", ".join(text for text in (degrees(row["df1"]), degrees(row["df2"])) if text)
+
+
+def effect_size(row: Row, before_interval: str = " ") -> str:
+    """`d_z = 0.65 [0.01, 1.27]`, `η²G = .10 [.00, .29]`."""
     if row["effect_size"] is None:
         return NOTHING
-    name = _EFFECT_SIZES.get(row["effect_size_name"], row["effect_size_name"])
-    bounds = interval(row["ci_low"], row["ci_high"])
-    value = number(row["effect_size"]) if name == "estimate" else _fixed(row["effect_size"], 2)
-    return f"{name} = {value}" + ("" if bounds == NOTHING else f" {bounds}")
+    bounds = effect_interval(row)
+    value = f"{effect_name(row)} = {effect_value(row)}"
+    return value if bounds == NOTHING else f"{value}{before_interval}{bounds}"
+
+
+def effect_name(row: Row) -> str:
+    """`η²G`, `d_z`."""
+    return _EFFECT_SIZES.get(row["effect_size_name"], str(row["effect_size_name"]))
+
+
+def effect_value(row: Row) -> str:
+    """An effect size without its interval."""
+    if row["effect_size"] is None:
+        return NOTHING
+    name = effect_name(row)
+    if name in _NEVER_OVER_1:
+        return share(row["effect_size"], 2)
+    return number(row["effect_size"]) if name == "estimate" else _fixed(row["effect_size"], 2)
+
+
+def effect_interval(row: Row) -> str:
+    """An effect size's 95 % interval, or nothing."""
+    bounded = effect_name(row) in _NEVER_OVER_1
+    return (share_interval if bounded else interval)(row["ci_low"], row["ci_high"])
 
 
 def contrast(row: Row) -> str:
@@ -203,12 +264,12 @@ def contrast(row: Row) -> str:
     return compared if row["effect"] in EFFECTS_OF_CONDITION else f"{effect}: {compared}"
 
 
-def corrected(row: Row) -> str | None:
+def corrected(row: Row, digits: int = 4) -> str | None:
     """The sphericity-corrected p of an ANOVA of more than two conditions."""
     details = row["details"] or {}
     if details.get("p_gg") is None:
         return None
-    return f"Greenhouse-Geisser ε = {share(details['epsilon_gg'])}, {p_phrase(details['p_gg'])}"
+    return f"Greenhouse-Geisser ε = {share(details['epsilon_gg'])}, {p_phrase(details['p_gg'], digits=digits)}"
 
 
 def decisive_p(row: Row) -> float | None:
@@ -235,17 +296,17 @@ def comparison_sentence(row: Row, with_reduction: bool = True) -> str:
     return ", ".join(parts)
 
 
-def evidence(row: Row) -> str:
-    """Statistic, p values and effect size of a row that is defined."""
+def evidence(row: Row, digits: int = 4, before_interval: str = " ") -> str:
+    """Statistic, p values with so many digits, and effect size of a row that is defined."""
     parts = [statistic(row)]
     if row["p"] is not None:
-        parts.append(p_phrase(row["p"]))
+        parts.append(p_phrase(row["p"], digits=digits))
     if corrected(row):
-        parts.append(corrected(row) or "")
+        parts.append(corrected(row, digits) or "")
     if row["p_adjusted"] is not None:
-        parts.append(p_phrase(row["p_adjusted"], f"{adjustment(row['adjust'])}-adjusted p"))
+        parts.append(p_phrase(row["p_adjusted"], f"{adjustment(row['adjust'])}-adjusted p", digits))
     if row["effect_size"] is not None:
-        parts.append(effect_size(row))
+        parts.append(effect_size(row, before_interval))
     return ", ".join(parts)
 
 

@@ -11,7 +11,7 @@ import yaml
 
 from fusion_core import ESTIMATORS
 from pipeline import tables
-from pipeline.study import KINDS, Comparison, Display, Frozen, OperatorTerm, Study, load_study, parse
+from pipeline.study import KINDS, Comparison, Display, Frozen, OperatorTerm, QualityLimits, Study, load_study, parse
 from pipeline.study_tables import MEASURE_REQUIRED, MEASURE_RESERVED, RATING_REQUIRED, TRIAL_OPTIONAL, TRIAL_REQUIRED
 from tests.conftest import CLONE
 
@@ -34,7 +34,7 @@ def test_every_key_of_a_study_is_in_the_reference() -> None:
     assert {re.findall(r"`(\w+)`", line)[0] for line in table.splitlines() if line.startswith("| `")} == set(
         Study.model_fields
     )
-    models: list[type[Frozen]] = [*KINDS.values(), OperatorTerm, Display, Comparison]
+    models: list[type[Frozen]] = [*KINDS.values(), OperatorTerm, Display, Comparison, QualityLimits]
     for model in models:
         for key in model.model_fields:
             assert f"`{key}`" in REFERENCE, key
@@ -47,6 +47,13 @@ def test_every_estimator_and_parameter_is_in_the_reference() -> None:
         for field in fields(kind):
             if field.name != "sensors":
                 assert f"`{field.name}`" in line, (name, field.name)
+
+
+def test_the_reference_states_the_default_limits_of_quality() -> None:
+    part = REFERENCE.split("| limit | what is judged | default |", 1)[1].split("\n\n", 1)[0]
+    stated = re.findall(r"^\| `(\w+)` .*`(\[.*?\])` \|$", part, flags=re.MULTILINE)
+    assert QualityLimits.model_validate({name: yaml.safe_load(limits) for name, limits in stated}) == QualityLimits()
+    assert [name for name, _ in stated] == list(QualityLimits.model_fields)
 
 
 def test_every_column_of_the_tables_is_in_the_reference() -> None:

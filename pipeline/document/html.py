@@ -10,7 +10,7 @@ from typing import Any
 
 import jinja2
 
-from pipeline.document.model import Document, Link, Strong, numbered
+from pipeline.document.model import CrossReference, Document, Link, Strong, numbered
 
 _DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would turn round the numbers that follow
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
@@ -68,5 +68,6 @@ def _environment() -> jinja2.Environment:
     )
     environment.tests["strong"] = lambda part: isinstance(part, Strong)
     environment.tests["link"] = lambda part: isinstance(part, Link)
+    environment.tests["cross_reference"] = lambda part: isinstance(part, CrossReference)
     environment.filters["kind"] = lambda block: type(block).__name__
     return environment

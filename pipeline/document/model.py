@@ -22,7 +22,15 @@ class Link:
     href: str
 
 
-Text = tuple[str | Strong | Link, ...]
+@dataclass(frozen=True)
+class CrossReference:
+    """Words that lead to an anchor of the same document."""
+
+    text: str
+    anchor: str
+
+
+Text = tuple[str | Strong | Link | CrossReference, ...]
 
 
 def plain(text: Text) -> str:
@@ -77,13 +85,17 @@ def columns(titles: Sequence[str], texts: int) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Table:
-    """A caption that says what to see, columns, and rows of text; the first cell of a row is its heading."""
+    """A caption that says what to see, columns, and rows of text; the first cell of a row is its heading.
+
+    `anchors`: an id for each row, unlike any other of the document, where words link to rows.
+    """
 
     id: str
     caption: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    anchors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

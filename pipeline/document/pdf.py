@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.document.model import (
+    CrossReference,
     Document,
     Figure,
     KeyFigures,
@@ -65,6 +66,7 @@ def _content(document: Document) -> dict[str, Any]:
         "origin": document.origin,
         "sections": [
             {
+                "id": section.id,
                 "title": section.title,
                 "blocks": [_block(block, names) for block in section.blocks if not isinstance(block, Pages)],
             }
@@ -74,7 +76,14 @@ def _content(document: Document) -> dict[str, Any]:
 
 
 def _text(text: Text) -> list[dict[str, Any]]:
-    return [{"text": part if isinstance(part, str) else part.text, "strong": isinstance(part, Strong)} for part in text]
+    return [
+        {
+            "text": part if isinstance(part, str) else part.text,
+            "strong": isinstance(part, Strong),
+            "anchor": part.anchor if isinstance(part, CrossReference) else "",
+        }
+        for part in text
+    ]
 
 
 def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[str, str]) -> dict[str, Any]:
@@ -98,6 +107,7 @@ def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[
                 "columns": [vars(column) for column in block.columns],
                 "rows": [list(row) for row in block.rows],
                 "note": block.note,
+                "anchors": list(block.anchors),
                 "shares": _shares(block),
             }
         case Figure():

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from pipeline.document.model import Block, Paragraph, Section, Strong, Table, columns
+from pipeline.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
 from pipeline.sections.material import Material, Row
 from pipeline.statistics.diagnostics import OUTLIER_RULE
 from pipeline.wording import (
     NOTHING,
     TESTS,
+    adjustment,
     contrast,
     counted,
+    degrees_of_freedom,
     effect_size,
     listing,
     measure_label,
@@ -20,48 +22,14 @@ from pipeline.wording import (
     p_value,
     percent,
     share,
-    statistic,
+    statistic_name,
+    statistic_value,
 )
 
-_EXPLAINED = {
-    "rm_anova": (
-        "Repeated-measures ANOVA (rm ANOVA) asks whether the means of the conditions differ more than chance would have"
-        " it; p corrected is Greenhouse and Geisser's, for conditions that vary unequally; η²G is the share of variance"
-        " that goes with the condition."
-    ),
-    "t_paired": (
-        "The paired t test asks the same of two conditions; d_z is the mean difference in units of the differences' SD."
-    ),
-    "wilcoxon": (
-        "Wilcoxon's signed-rank test compares two conditions by the ranks of the differences, exactly, with ties "
-        "at their mean rank; W+ is the sum of the ranks in favour of the first condition, and r_rb (rank-biserial "
-        "correlation) runs from −1 to 1."
-    ),
-    "friedman": (
-        "Friedman's test compares conditions by each participant's ranking; W runs from 0 (no agreement among "
-        "participants) to 1."
-    ),
-    "art_anova": (
-        "The aligned rank transform (ART) does the same as ANOVA on ranks, effect by effect, each after the others are "
-        "taken out; η²p is the share of variance of the effect and its error together."
-    ),
-    "mixed_model": (
-        "The mixed model takes every value there is, also of people who lack others, with a constant of their own for "
-        "each participant; its estimates are in the unit of the measure."
-    ),
-    "crossover": (
-        "The crossover test of two conditions takes the effect of the period out of their difference, and asks whether "
-        "what came first carries over."
-    ),
-    "tost": (
-        "TOST asks the reverse: whether the mean difference lies within the stated bounds; its p is the larger of two "
-        "one-sided t tests."
-    ),
-    "bayes_t": (
-        "The Bayes factor BF₁₀ says how many times as likely the data are under a difference (of the stated prior) as "
-        "under none."
-    ),
-}
+
+def anchor(at: int) -> str:
+    """The id of a comparison's row, by its place in the table `comparisons`."""
+    return f"comparison-{at + 1}"
 
 
 def section(material: Material) -> Section | None:
@@ -77,10 +45,11 @@ def section(material: Material) -> Section | None:
         f" if there were none; the study's level is {100 * material.study.alpha:g} %.",
         columns([title for title, _ in filled], 3),
         tuple(tuple(cell(row) for _, cell in filled) for row in rows),
-        f"{_who_counts(tests)} Difference: first minus second condition, of the "
-        "means; reduction: relative to the first.",
+        f"{_who_counts(tests)} Mean difference: first minus second condition; reduction: relative to the first.",
+        tuple(anchor(at) for at in range(len(rows))),
     )
-    explained = Paragraph((" ".join(_EXPLAINED[test] for test in tests),))
+    where = "Every test of the study, a row each. What the words and letters mean stands in the "
+    explained = Paragraph((where, CrossReference("glossary", "glossary"), "."))
     blocks: list[Block] = [explained, table, Paragraph((Strong("Methods: "), _methods(rows)))]
     return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
 
@@ -145,6 +114,15 @@ def _outliers(details: Mapping[str, Any]) -> str:
     return listing(details["outliers"]) if details["outliers"] else "nobody"
 
 
+def _statistic(row: Row) -> str:
+    return f"{statistic_name(row)} = {statistic_value(row)}" if row["status"] == "ok" else str(row["status"])
+
+
+def _adjusted_p(row: Row) -> str:
+    adjusted = row["p_adjusted"]
+    return NOTHING if adjusted is None else f"{p_value(adjusted)} ({adjustment(row['adjust'])})"
+
+
 def _corrected_p(row: Row) -> str:
     return p_value((row["details"] or {}).get("p_gg"))
 
@@ -154,12 +132,13 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Test", lambda row: TESTS[row["test"]]),
     ("Compared", contrast),
     ("n", lambda row: f"{row['n']}"),
-    ("Statistic", lambda row: statistic(row) if row["status"] == "ok" else row["status"]),
+    ("Statistic", _statistic),
+    ("df", degrees_of_freedom),
     ("p", lambda row: p_value(row["p"])),
     ("p corrected", _corrected_p),
-    ("p adjusted", lambda row: p_value(row["p_adjusted"])),
-    ("Effect size [95 %]", effect_size),
-    ("Difference", lambda row: number(row["mean_difference"])),
+    ("p adjusted", _adjusted_p),
+    ("Effect size [95 % interval]", effect_size),
+    ("Mean difference", lambda row: number(row["mean_difference"])),
     ("Reduction", lambda row: percent(row["reduction"])),
 )
 """The table's columns; one that no row fills is left out."""

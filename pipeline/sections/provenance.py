@@ -13,11 +13,15 @@ from pipeline.wording import counted
 _FILES_MAX = 60
 
 
+def used_versions() -> dict[str, str]:
+    """What makes reports, and in which version."""
+    return {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
+
+
 def libraries() -> Table:
     """What made the report, in which version."""
-    used = {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
     titles = (Column("Name", False), Column("Version", False))
-    return Table("table-versions", "Program and libraries.", titles, tuple(used.items()))
+    return Table("table-versions", "Program and libraries.", titles, tuple(used_versions().items()))
 
 
 def section(material: Material) -> Section:

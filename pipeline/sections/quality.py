@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 
 from fusion_core import FloatArray
-from pipeline import figures, tables
-from pipeline.document.model import Block, Column, Paragraph, Section, Table, columns
+from pipeline import figures, session_quality, tables
+from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.sections.material import Material, Row
-from pipeline.wording import NOTHING, counted, measure_label, number
+from pipeline.sections.without_exclusions import without_exclusions
+from pipeline.session_quality import FACTS, LIGHTS, SYMBOLS, Judged, light_of
+from pipeline.wording import NOTHING, counted, listing, measure_label, number
 
 _ROWS_MAX = 120  # a page stays readable; tables/quality.csv has them all
 
@@ -20,6 +22,7 @@ def section(material: Material) -> Section:
     """Data quality and exclusions."""
     blocks: list[Block] = []
     if material.rows("quality"):
+        blocks += _lights(material)
         blocks.append(_quality_table(material))
         if material.rows("sensor_noise"):
             blocks += _noise(material)
@@ -36,8 +39,57 @@ def section(material: Material) -> Section:
     agreement = material.rows("replay_agreement")
     if agreement:
         blocks.append(_agreement_table(material))
-    blocks += _exclusions(material)
+    blocks += [*_exclusions(material), *without_exclusions(material)]
     return Section("quality", "Data quality and exclusions", tuple(blocks))
+
+
+def _lights(material: Material) -> list[Block]:
+    """How many sessions are green, amber and red, and what it is in each."""
+    found: dict[str, list[Judged]] = {}
+    judged = session_quality.judged(material.study, material.rows("quality"), material.rows("replay_agreement"))
+    for one in judged:
+        found.setdefault(one.session, []).append(one)
+    lights = [light_of(figures) for figures in found.values()]
+    shares = [f"{lights.count(light)} {SYMBOLS[light]} {light}" for light in LIGHTS[1:]]
+    facts = [fact for fact in FACTS if any(one.fact == fact for one in judged)]
+    ordered = sorted(found.items(), key=lambda item: -LIGHTS.index(light_of(item[1])))
+    cells = tuple((session, *_session_lights(figures, facts)) for session, figures in ordered[:_ROWS_MAX])
+    more = f" The worst {_ROWS_MAX} of {len(ordered)}." if len(ordered) > _ROWS_MAX else ""
+    limits = session_quality.limits_text(material.study.quality_limits)
+    table = Table(
+        "table-lights",
+        f"Each session's quality at a glance, the worst first: a light, what it is of, and how far it is off.{more}",
+        columns(("Session", "Light", *facts), len(facts) + 2),
+        cells,
+        f"Amber from here on (red): {limits}. A rate is held against the one that study.yaml states, or the median of "
+        "three sessions and more; quality_limits in study.yaml moves the limits. Nobody is left out for a light.",
+    )
+    text = f"{counted(len(found), 'session')}: {listing(shares)}.{_not_whole(material)}"
+    return [Paragraph((Strong("Quality: "), text)), table]
+
+
+def _session_lights(figures: Sequence[Judged], facts: Sequence[str]) -> tuple[str, ...]:
+    """A session's light, and the worst figure of each fact."""
+    light = light_of(figures)
+    of_fact = [_fact_light([one for one in figures if one.fact == fact]) for fact in facts]
+    return f"{SYMBOLS[light]} {light}", *of_fact
+
+
+def _fact_light(figures: Sequence[Judged]) -> str:
+    """The worst of a fact's figures, and how many others are as bad."""
+    worst = session_quality.worst(figures)
+    if worst is None:
+        return NOTHING
+    others = sum(one.light == worst.light for one in figures) - 1
+    return worst.text + (f" and {others} more" if others and worst.light in ("amber", "red") else "")
+
+
+def _not_whole(material: Material) -> str:
+    """How many sessions are not in this report, or not as a whole."""
+    what = [row["what"] for row in material.rows("exclusions")]
+    told = (("session set aside", "set aside"), ("session read in part", "read in part"))
+    parts = [f"{counted(what.count(name), 'session')} {said}" for name, said in told if name in what]
+    return f" Beside these lights: {listing(parts)}; the table of exclusions says why." if parts else ""
 
 
 def _quality_table(material: Material) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,13 @@ import pandas as pd
 from pipeline import results, study_tables, tables
 from pipeline.comparisons import compared, everything_asked
 from pipeline.design_check import findings
+from pipeline.errors import PipelineError
 from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
 from pipeline.simulated import reductions
 from pipeline.simulation_settings import SelectionSimulation
 from pipeline.stage import Outcome, Work
+from pipeline.stages.measure import ALL_DATA
 from pipeline.statistics.descriptive import described
 from pipeline.study import Study
 from pipeline.wording import measure_order
@@ -39,6 +42,9 @@ def run(work: Work) -> Outcome:
     observations = tables.read("observations", measured)
     rows, left_out = compared(study, measures, observations)
     found["comparisons"] = tables.frame("comparisons", rows)
+    rows, uncomparable = _of_all_data(study, measured / ALL_DATA)
+    found["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
+    left_out += uncomparable
     asked = [one for entry in everything_asked(study, measures, observations) for one in entry]
     checked = findings(study, asked, tables.read("orders", measured), found["trials"], work.sessions)
     found["design_check"] = tables.frame("design_check", checked)
@@ -69,6 +75,19 @@ def run(work: Work) -> Outcome:
         tables.write(name, table, work.out)
     results.write(work.out / "results.json", work.study_name, study, found, _people(work, measures))
     return Outcome()
+
+
+def _of_all_data(study: Study, folder: Path) -> tuple[list[Row], list[Row]]:
+    """The comparisons as they would be without the exclusions of study.yaml, and what cannot be said of them.
+
+    None where nothing is excluded. Values that somebody decided to leave out may be such that no test takes them.
+    """
+    if not study.exclusions:
+        return [], []
+    try:
+        return compared(study, tables.read("measures", folder), tables.read("observations", folder))[0], []
+    except PipelineError as error:
+        return [], [{"what": "no comparison without the exclusions", "reason": str(error)}]
 
 
 def _without_accuracy(work: Work, quality: pd.DataFrame, accuracy: pd.DataFrame) -> list[Row]:

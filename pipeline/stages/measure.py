@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from pipeline.trials import selections_by_trial
 
 Row = dict[str, Any]
 CELL = ["participant", "condition"]
+ALL_DATA = "all_data"
+"""The folder of `measures` and `observations` as they would be if study.yaml excluded nothing; where it does."""
 
 
 def run(work: Work) -> Outcome:
@@ -34,7 +37,7 @@ def run(work: Work) -> Outcome:
         ]
     ).reset_index(drop=True)
     _check_sources(values)
-    known = _known(work, values, trials)
+    known, everything = _known(work, values, trials), values
     for excluded in study.exclusions:
         _check_exclusion(excluded, known)
         values = values[~_matches(excluded, values)]
@@ -46,14 +49,23 @@ def run(work: Work) -> Outcome:
     measures = _with_totals(study, _cells(values, CELL), CELL)
     exclusions += _gaps(work, measures)
     run, sequences = _orders(work, tabled)
-    observed = [*CELL, "session", "period", "sequence"]
-    placed = orders.placed(values, run, sequences)
-    tables.write("observations", _with_totals(study, _cells(placed, observed), observed), work.out)
+    _write_values(study, measures, orders.placed(values, run, sequences), work.out)
+    if study.exclusions:
+        whole, unfiltered = study.model_copy(update={"exclusions": ()}), _finite(everything, [])
+        (work.out / ALL_DATA).mkdir()
+        counted = _with_totals(whole, _cells(unfiltered, CELL), CELL)
+        _write_values(whole, counted, orders.placed(unfiltered, run, sequences), work.out / ALL_DATA)
     tables.write("orders", run, work.out)
     tables.write("trials", trials, work.out)
-    tables.write("measures", measures, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
+
+
+def _write_values(study: Study, measures: pd.DataFrame, placed: pd.DataFrame, folder: Path) -> None:
+    """A study's values: a mean a cell, and the same with their session, period and sequence."""
+    observed = [*CELL, "session", "period", "sequence"]
+    tables.write("measures", measures, folder)
+    tables.write("observations", _with_totals(study, _cells(placed, observed), observed), folder)
 
 
 def _path(work: Work, field: str) -> Any:

@@ -1,4 +1,4 @@
-"""The report: sections from tables, one document, two renderings, tables as CSV and figures as SVG."""
+"""The report: sections from tables, one document, two renderings, tables as CSV, figures as SVG, references."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pandas as pd
 from pipeline import results, tables
 from pipeline.document import html, pdf
 from pipeline.document.model import Document
-from pipeline.sections import SECTIONS, participants, traces
+from pipeline.sections import SECTIONS, glossary, participants, paste, traces
 from pipeline.sections.material import ORIGINS, Material
 from pipeline.stage import Outcome, Work
 
@@ -16,6 +16,7 @@ _FROM_COMPARE = (
     "measures",
     "descriptives",
     "comparisons",
+    "comparisons_all_data",
     "accuracy",
     "replay_agreement",
     "sensor_noise",
@@ -32,7 +33,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell t
 
 
 def run(work: Work) -> Outcome:
-    """report.html, traces.html, participants/*.html, report.pdf, tables/*.csv and figures/*.svg."""
+    """report.html, traces.html, participants/*.html, report.pdf, references.bib, tables/*.csv and figures/*.svg."""
     compared = work.entry("compare")
     for folder in ("tables", "figures"):
         (work.out / folder).mkdir()
@@ -51,8 +52,10 @@ def run(work: Work) -> Outcome:
         work.inputs,
     )
     sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
+    sections += glossary.of(sections)
     subtitle = f"Study “{work.study_name}”"
     document = Document(work.study.title, subtitle, ORIGINS[work.study.data_origin], sections)
+    (work.out / paste.BIBLIOGRAPHY).write_text(paste.bibtex(material), encoding="utf-8")
     html.render(document, work.out / "figures", work.out / "report.html")
     pdf.render(document, work.out / "figures", work.out / "report.pdf")
     traces.write(material, work.out / traces.PAGE)

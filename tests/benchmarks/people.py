@@ -64,12 +64,11 @@ def false_positives() -> None:
         ]
         positives += bool(ttest_rel(times[0], times[1]).pvalue < 0.05)
     low, high = binomtest(positives, STUDIES).proportion_ci(0.95)
+    verdict = "with" if low <= 0.05 <= high else "WITHOUT"
     print(
-        f"Same estimator in both conditions, {STUDIES} studies of {PEOPLE}: false positives {positives / STUDIES:.3f}"
+        f"Same estimator in both conditions, {STUDIES} studies of {PEOPLE}: false positives {positives / STUDIES:.3f},"
     )
-    print(
-        f"  false positives {positives / STUDIES:.3f}, 95 % interval [{low:.3f}, {high:.3f}], {'with' if low <= 0.05 <= high else 'WITHOUT'} .05 in it"
-    )
+    print(f"  95 % interval [{low:.3f}, {high:.3f}], {verdict} .05 in it")
 
 
 def pointing_under_lag() -> None:

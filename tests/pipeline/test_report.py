@@ -21,6 +21,7 @@ from pypdf import PdfReader
 from pipeline.document import html, pdf
 from pipeline.document.model import (
     Column,
+    CrossReference,
     Document,
     Figure,
     KeyFigure,
@@ -147,6 +148,21 @@ def test_a_long_name_in_a_pdf_table_is_broken_behind_punctuation_and_stays_in_it
     assert end > begin
     assert all(line[-1] in "[,_=/" for line in pieces[begin:end])
     assert name in "".join(pieces).replace("\u200b", "")
+
+
+def test_words_lead_to_the_row_of_a_table(tmp_path: Path) -> None:
+    rows = (("first", "1"), ("second", "2"))
+    table = Table("t", "Rows", (Column("a", False), Column("b")), rows, anchors=("row-1", "row-2"))
+    section = Section("s", "S", (Paragraph(("see ", CrossReference("<b>there</b>", "row-2"))), table))
+    document = Document("d", "", "", (section,))
+    html.render(document, tmp_path, tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert '<a href="#row-2">&lt;b&gt;there&lt;/b&gt;</a>' in page
+    assert re.findall(r'<tr id="([^"]*)">\s*<th scope="row">(\w+)', page) == [("row-1", "first"), ("row-2", "second")]
+    pdf.render(document, tmp_path, tmp_path / "r.pdf")
+    (sheet,) = PdfReader(tmp_path / "r.pdf").pages
+    assert [link.get_object()["/Subtype"] for link in sheet["/Annots"]] == ["/Link"]  # type: ignore[attr-defined]
+    assert "see <b>there</b>" in sheet.extract_text()
 
 
 def test_hostile_text_of_a_whole_study_reaches_every_output_as_text(tmp_path: Path, steadyhand: Steadyhand) -> None:
@@ -311,7 +327,8 @@ def test_the_first_page_answers_with_means_intervals_and_a_figure(report: Path, 
 def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report: Path, steadyhand: Steadyhand) -> None:
     page = (report / "report.html").read_text(encoding="utf-8")
     for row in steadyhand.results()["comparisons"]:
-        assert f"{row['statistic']:.2f}" in page
+        ranks = row["statistic_name"] == "W+"  # a sum of ranks is whole or a half
+        assert (f"= {row['statistic']:g}" if ranks else f"{row['statistic']:.2f}") in page
 
 
 def test_files_of_an_earlier_report_that_are_no_more_are_removed(
@@ -359,8 +376,8 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
     page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
     text = " ".join("".join(checked(page).text).split())
     for sentence in (
-        "M: F(1, 11) = 5.81, p = .0346, Holm-adjusted p = .0346, η²G = 0.10 [0.00, 0.29], n = 12, reduced by 13.3 %.",
-        "M: ART ANOVA: F(1, 11) = 5.77, p = .0351, η²p = 0.34 [0.00, 0.65], n = 12.",
+        "M: F(1, 11) = 5.81, p = .0346, Holm-adjusted p = .0346, η²G = .10 [.00, .29], n = 12, reduced by 13.3 %.",
+        "M: ART ANOVA: F(1, 11) = 5.77, p = .0351, η²p = .34 [.00, .65], n = 12.",
         "M: mixed model: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
         "M: mixed model: period, t(10) = −4.01, p = .0025, estimate = −6.16 [−9.58, −2.73], n = 12.",
         "M: crossover: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
@@ -374,7 +391,8 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         assert sentence in text, sentence
     for row in steadyhand.results()["comparisons"]:
         assert TESTS[row["test"]] in text
-        assert f"{abs(row['statistic']):.2f}" in text
+        ranks = row["statistic_name"] == "W+"
+        assert (f"W₊ = {row['statistic']:g}" if ranks else f"{abs(row['statistic']):.2f}") in text
         assert row["method"] in text
     for row in steadyhand.results()["design_check"]:
         assert row["found"] in text

@@ -4,12 +4,34 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.wording import interval, measure_label, measure_order, number, p_phrase, percent, seconds, short_label
+from pipeline.wording import (
+    effect_size,
+    interval,
+    measure_label,
+    measure_order,
+    number,
+    p_phrase,
+    percent,
+    seconds,
+    share,
+    share_interval,
+    short_label,
+    statistic,
+    subject,
+)
 
 
 @pytest.mark.parametrize(
     ("value", "shown"),
-    [(44.208, "44.21"), (-0.5, "−0.50"), (372633.4, "372\u2009633"), (0.01234, "0.0123"), (0.0, "0.00"), (None, "–")],
+    [
+        (44.208, "44.21"),
+        (-0.5, "−0.50"),
+        (372633.4, "372\u2009633"),
+        (0.01234, "0.0123"),
+        (0.0, "0.00"),
+        (3.25e20, "3.25e+20"),
+        (None, "–"),
+    ],
 )
 def test_numbers(value: float | None, shown: str) -> None:
     assert number(value) == shown
@@ -20,6 +42,51 @@ def test_p_values_lags_and_shares() -> None:
     assert p_phrase(3e-9) == "p < .0001"
     assert (seconds(0.1166), seconds(-0.0004), seconds(-0.0123), seconds(None)) == ("+117", "0", "−12", "–")
     assert percent(0.3834) == "38.3 %"
+
+
+def test_what_cannot_exceed_one_has_no_leading_zero_and_p_is_never_nought_or_one() -> None:
+    assert [share(value, 2) for value in (0.157, -0.034, -0.001, 1.0, None)] == [".16", "−.03", ".00", "1.00", "–"]
+    assert share_interval(-0.034, 0.851) == "[−.03, .85]"
+    assert [p_phrase(p, digits=3) for p in (0.00049, 0.0071, 0.9994, 0.9996, 1.0)] == [
+        "p < .001",
+        "p = .007",
+        "p = .999",
+        "p > .999",
+        "p > .999",
+    ]
+    assert p_phrase(1.0) == "p > .9999"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "df", "shown"),
+    [
+        ("F", 10.857, (1.0, 11.0), "F(1, 11) = 10.86"),
+        ("F", 5.6e-32, (1.0, 11.0), "F(1, 11) = 0.00"),
+        ("W+", 67.5, (None, None), "W₊ = 67.5"),
+        ("W+", 60.0, (None, None), "W₊ = 60"),
+        ("chi2", 5.2, (2.0, None), "χ²(2) = 5.20"),
+        ("t", -0.0123, (None, 14.5), "t(14.50) = −0.01"),
+        ("BF10", 0.0421, (None, None), "BF₁₀ = 0.0421"),
+    ],
+)
+def test_statistics(name: str, value: float, df: tuple[float | None, float | None], shown: str) -> None:
+    assert statistic({"statistic_name": name, "statistic": value, "df1": df[0], "df2": df[1]}) == shown
+
+
+def test_effect_sizes() -> None:
+    row = {"effect_size_name": "generalized eta squared", "effect_size": 0.157, "ci_low": 0.01, "ci_high": 0.354}
+    assert effect_size(row) == "η²G = .16 [.01, .35]"
+    assert effect_size({**row, "effect_size_name": "Cohen's d_z"}, ", 95 % CI ") == "d_z = 0.16, 95 % CI [0.01, 0.35]"
+
+
+def test_measures_as_subjects() -> None:
+    names = ("selection_mse_px2", "completion_time_s", "nasa_tlx/mental", "grip_force, left_s")
+    assert [subject(name) for name in names] == [
+        "Selection error (MSE)",
+        "Completion time",
+        "NASA-TLX mental",
+        "Grip force, left",
+    ]
 
 
 def test_both_bounds_of_an_interval_have_as_many_decimals() -> None:

@@ -1,0 +1,1 @@
+"""What the report says in words: sentences, methods, references and a glossary, all written from a study's tables."""

@@ -1,0 +1,135 @@
+"""What the statistical words of a report mean, a sentence each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+_WORDS: Sequence[tuple[str, str, str]] = (
+    ("n", r"\bn = \d|^n$", "How many participants count."),
+    ("M", r"\bM = ", "Mean: the sum of the values over their number."),
+    ("SD", r"\bSDs?\b", "Standard deviation: how far values typically lie from their mean."),
+    ("Median", r"\b[Mm]edian\b", "The value that half of the values lie below."),
+    (
+        "95 % interval, CI",
+        r"95 % (CI|interval)|\[95 %",
+        "Confidence interval: made so that in 95 of 100 such studies it holds the true value.",
+    ),
+    ("MSE", r"\bMSE\b", "Mean squared error: the mean of the squared distances from the target."),
+    ("RMSE", r"\bRMSE\b", "Root mean square error: the root of the mean squared error, in the unit of the distances."),
+    ("Baseline", r"\bbaseline\b", "The condition that the others are held against: the first in study.yaml."),
+    (
+        "p",
+        r"\bp [=<>] |^p$",
+        "The probability of a result at least as far from “no difference” as this one if there were no difference.",
+    ),
+    (
+        "Level of significance",
+        r"significan",
+        "The p below which a difference is called significant; it is chosen before the study.",
+    ),
+    (
+        "p adjusted",
+        r"-adjusted|^p adjusted$",
+        "p made larger for the number of tests in a family, since of many tests some fall below any level by chance.",
+    ),
+    (
+        "Holm",
+        r"\bHolm\b",
+        "A way of adjusting p: the smallest is multiplied by the number of tests, the next by one less.",
+    ),
+    ("Bonferroni", r"\bBonferroni\b", "A way of adjusting p: each is multiplied by the number of tests."),
+    (
+        "Benjamini-Hochberg",
+        r"\bBenjamini-Hochberg\b",
+        "A way of adjusting p that bounds the share of false findings among the findings.",
+    ),
+    (
+        "Sphericity",
+        r"[Ss]phericity|^p corrected$|Greenhouse",
+        "That the differences between any two conditions vary equally, which the ANOVA of more than two supposes.",
+    ),
+    (
+        "Greenhouse-Geisser ε, p corrected",
+        r"Greenhouse|^p corrected$",
+        "ε is 1 where sphericity holds and less where it does not; the corrected p takes it into account.",
+    ),
+    (
+        "Repeated-measures ANOVA (rm ANOVA)",
+        r"\brm ANOVA|[Rr]epeated-measures ANOVA",
+        "Analysis of variance: asks whether the means of the conditions differ more than chance would have it.",
+    ),
+    ("F", r"\bF\(|\bF = ", "What an ANOVA is judged by: variation between conditions over variation by chance."),
+    ("Follow-up", r"[Ff]ollow-up", "A test of two conditions after one of all of them."),
+    (
+        "Paired t test",
+        r"[Pp]aired t\b",
+        "Asks whether the mean of the participants' differences between two conditions differs from zero.",
+    ),
+    ("t", r"\bt\(|\bt = ", "A difference or an estimate over its standard error."),
+    ("df", r"^df$", "Degrees of freedom: how many independent pieces of data a statistic rests on."),
+    (
+        "Wilcoxon signed-rank test",
+        r"\bWilcoxon\b",
+        "Compares two conditions by the ranks of the participants' differences, ties at their mean rank.",
+    ),
+    ("W₊", r"W₊", "The sum of the ranks of the differences in which the first condition's value is larger."),
+    ("Friedman test", r"\bFriedman\b", "Compares conditions by how each participant's values rank them."),
+    ("χ²", r"χ²", "What Friedman's test is judged by: how far the conditions' mean ranks lie apart."),
+    (
+        "Aligned rank transform (ART)",
+        r"\bART\b|[Aa]ligned rank",
+        "Does what ANOVA does on ranks, effect by effect, each after the others are taken out.",
+    ),
+    (
+        "Mixed model",
+        r"[Mm]ixed model",
+        "Takes every value there is, also of people who lack others, with a constant for each participant.",
+    ),
+    (
+        "Singular fit",
+        r"[Ss]ingular fit",
+        "A mixed model that finds no variance between participants, so that it says no more than one without them.",
+    ),
+    (
+        "Crossover analysis",
+        r"[Cc]rossover",
+        "Takes the period's effect out of the difference of two conditions, and asks whether what came first matters.",
+    ),
+    ("Carry-over", r"[Cc]arry-over", "What an earlier condition still does in a later one."),
+    (
+        "Test of equivalence (TOST)",
+        r"\bTOST\b",
+        "Asks the reverse: whether the mean difference lies within stated bounds; p is the larger of two.",
+    ),
+    (
+        "Bayes factor, BF₁₀",
+        r"BF₁₀|Bayes factor",
+        "How many times as likely the data are under a difference (of the stated prior) as under none.",
+    ),
+    ("Effect size", r"[Ee]ffect size", "How large a difference is, whatever the number of participants."),
+    ("η²G", r"η²G", "Generalized eta squared: the share of all variance that goes with the condition, from 0 to 1."),
+    (
+        "η²p",
+        r"η²p",
+        "Partial eta squared: the share of the variance of the effect and its error together, from 0 to 1.",
+    ),
+    ("d_z", r"\bd_z\b", "The mean difference in units of the differences' standard deviation."),
+    ("r_rb", r"\br_rb\b", "Rank-biserial correlation: from −1 (second always larger) to 1 (first always larger)."),
+    ("W", r"\bW = [.\d]", "Kendall's W: from 0 (participants rank the conditions differently) to 1 (all alike)."),
+    ("Estimate", r"\bestimate = ", "A difference or slope as the model has it, in the unit of the measure."),
+    ("Mean difference", r"^Mean difference$", "The mean under the first condition minus that under the second."),
+    ("Reduction", r"^Reduction$", "By how much the mean is lower under the second condition, as a share of the first."),
+    (
+        "Shapiro and Wilk's test",
+        r"Shapiro",
+        "Asks whether values look normally distributed; a small p speaks against it.",
+    ),
+)
+"""A word, where in a text it is used, and what it means, from the simple to the particular."""
+
+
+def explained(texts: Sequence[str]) -> list[tuple[str, str]]:
+    """The words that stand in any of the texts, and what they mean; each text is a paragraph or a cell."""
+    distinct = set(texts)
+    return [(word, meaning) for word, where, meaning in _WORDS if any(re.search(where, text) for text in distinct)]

@@ -1,0 +1,184 @@
+"""The methods of a study as a paragraph to paste, from its settings and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from pipeline.estimators import build_estimator
+from pipeline.study import Comparison, Sensing, Study
+from pipeline.wording import adjustment, counted, listing, number, subject, unit_of
+
+Row = Mapping[str, Any]
+
+_TESTS = {
+    "rm_anova": "repeated-measures ANOVA (generalized η²)",
+    "t_paired": "paired t tests (two-sided; d_z with its noncentral-t interval)",
+    "wilcoxon": "Wilcoxon signed-rank tests (two-sided; rank-biserial correlation)",
+    "friedman": "Friedman's test (Kendall's W)",
+    "art_anova": "ANOVA on aligned ranks (ART; partial η²)",
+    "mixed_model": (
+        "linear mixed models with a random intercept for each participant (REML, Satterthwaite's degrees of freedom)"
+    ),
+    "crossover": "the analysis of a 2 × 2 crossover (treatment, period, carry-over)",
+    "tost": "two one-sided paired t tests of equivalence (TOST)",
+    "bayes_t": "JZS Bayes factors of the paired difference",
+}
+_ORIGINS = {
+    "simulated": "The data were simulated by a model, not measured with people.",
+    "reconstructed": "The data were reconstructed to fit printed figures; they are not anybody's measurements.",
+}
+
+
+def methods(study: Study, results: Mapping[str, Any], versions: Mapping[str, str]) -> str:
+    """Design, n, conditions, measures, estimators and their settings, tests, corrections, exclusions, software."""
+    sentences = [
+        *_design(study, results),
+        *_measures(study, results),
+        *_estimators(study),
+        *_tests(study, results["comparisons"]),
+        *_exclusions(study, results["exclusions"]),
+        *_software(versions),
+    ]
+    return " ".join(sentences)
+
+
+def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
+    if study.data_origin in _ORIGINS:
+        yield _ORIGINS[study.data_origin]
+    facts, conditions = results["study"]["participants"], list(study.conditions)
+    people = counted(facts["n"], "participant") + _who(facts)
+    if len(conditions) == 1:
+        yield f"There were {people} and one condition, {conditions[0]}."
+        return
+    yield (
+        f"There were {people} and {counted(len(conditions), 'condition')}, compared within participants:"
+        f" {listing(conditions)}; {conditions[0]} was the baseline."
+    )
+
+
+def _who(facts: Mapping[str, Any]) -> str:
+    """Sex and age as far as they are known."""
+    told = [f"{count} {name}" for name, count in (facts.get("sex") or {}).items()]
+    age = facts.get("age")
+    if age:
+        told.append(f"aged {number(age['min'], 0)} to {number(age['max'], 0)} years, M = {number(age['mean'], 1)}")
+    return f" ({', '.join(told)})" if told else ""
+
+
+def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
+    """What was measured; of a questionnaire its scales together."""
+    scales: dict[str, list[str]] = {}
+    others: list[str] = []
+    for measure in dict.fromkeys(row["measure"] for row in results["descriptives"]):
+        questionnaire, slash, scale = measure.partition("/")
+        if slash:
+            scales.setdefault(questionnaire, []).append(scale.replace("_", " "))
+        else:
+            unit = unit_of(measure)
+            others.append(f"{subject(measure)}{f' in {unit}' if unit else ''}")
+    named = [f"{subject(f'{name}/ratings')} ({', '.join(parts)})" for name, parts in scales.items()]
+    if others or named:
+        yield f"Measures: {'; '.join([*others, *named])}. Each participant's mean in each condition was one value."
+
+
+def _estimators(study: Study) -> Iterator[str]:
+    """Each estimator with all its settings, stated or not."""
+    if not study.estimators or study.sessions is None:
+        return
+    sensors = [f"{name} ({', '.join(_stated(stream))})" for name, stream in study.sensor_streams.items()]
+    yield f"Sensors, as stated to the estimators: {'; '.join(sensors)}."
+    told = []
+    for name, settings in study.estimators.items():
+        built = build_estimator(study, name)
+        values = [
+            f"{field.name} = {_value(getattr(built, field.name))}"
+            for field in fields(built)  # type: ignore[arg-type]
+            if field.name != "sensors"
+        ]
+        kind = settings.type if settings.type == name else f"{name} is {settings.type}"
+        streams = [f"streams {listing(list(settings.use))}"] if settings.use else []
+        told.append(f"{kind} ({', '.join([*streams, *values])})" if streams or values else kind)
+    yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(told)}."
+    for condition, name in study.shown.items():
+        yield f"Condition {condition} displayed {name}."
+
+
+def _stated(stream: Sensing) -> Iterator[str]:
+    """A sensor's kind, noise and latency."""
+    yield stream.kind
+    for name, value in stream:
+        if name.startswith("noise_sd") or name == "latency_s":
+            yield f"{name} = {_value(value)}"
+
+
+def _value(value: object) -> str:
+    return f"{value:g}".replace("e+0", "e") if isinstance(value, float) else str(value)
+
+
+def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
+    """Each entry's test, of which measures, and how families of p values were adjusted."""
+    if not rows:
+        return
+    said: dict[str, list[str]] = {}
+    for entry in study.comparisons:
+        of = subject(entry.measure).replace(" *", " scales") if "*" in entry.measure else subject(entry.measure)
+        mine = [row for row in rows if row["test"] == entry.test]
+        said.setdefault(_asked(entry, mine) + _followed_up(entry, mine), []).append(of)
+    for test, measures in said.items():
+        yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
+    if any((row["details"] or {}).get("p_gg") is not None for row in rows):
+        yield "Of more than two conditions p was corrected for sphericity after Greenhouse and Geisser."
+    yield f"The level of significance was {_level(study.alpha)}; intervals are of 95 %."
+
+
+def _level(alpha: float) -> str:
+    return f"{alpha:g}".removeprefix("0")
+
+
+def _asked(entry: Comparison, rows: Sequence[Row]) -> str:
+    """`Wilcoxon signed-rank tests (…), exact, midranks, zeros dropped, p Holm-adjusted`; rows are of its test."""
+    parts = [_TESTS[entry.test]]
+    if entry.test in ("rm_anova", "art_anova") and len(entry.within) > 1:
+        parts.append(f"of the factors {listing(list(entry.within))}")
+    if entry.test == "mixed_model":
+        parts.append(f"fixed terms {listing(list(entry.fixed))}")
+    if entry.bounds is not None:
+        parts.append(f"bounds {number(entry.bounds[0])} and {number(entry.bounds[1])}")
+    if entry.test == "bayes_t":
+        parts.append(f"Cauchy prior of scale {entry.prior_scale:g} on d_z")
+    if entry.test == "wilcoxon":
+        zeros = "Pratt" if entry.zeros == "pratt" else "dropped"
+        parts += dict.fromkeys(row["method"] for row in rows if zeros in row["method"])
+    if entry.adjust != "none":
+        parts.append(f"p {adjustment(entry.adjust)}-adjusted")
+    return ", ".join(parts)
+
+
+def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
+    """How the pairs after an entry's test were adjusted, if there are any; rows are of its test."""
+    pairs = [row for row in rows if row["contrast"] is not None]
+    followed = entry.test in ("rm_anova", "mixed_model") and any(row["adjust"] == entry.follow_up for row in pairs)
+    if not followed or entry.follow_up == "none":
+        return ""
+    return f", followed up pair by pair with {adjustment(entry.follow_up)}-adjusted t tests"
+
+
+def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:
+    """Who was left out by decision and why, and how much else is missing."""
+    for one in study.exclusions:
+        named = [f"{key} {value}" for key, value in one.model_dump().items() if value and key != "reason"]
+        yield f"Excluded: {', '.join(named)} ({one.reason.strip().rstrip('.')})."
+    aside = sum(row["what"] == "session set aside" for row in rows)
+    if aside:
+        yield f"Of the sessions {aside} could not be used and {'was' if aside == 1 else 'were'} set aside."
+    incomplete = {row["participant"] for row in rows if row["what"] == "left out of comparisons"}
+    if incomplete:
+        yield f"Of the participants {len(incomplete)} lacked a value and did not count in the comparisons concerned."
+
+
+def _software(versions: Mapping[str, str]) -> Iterator[str]:
+    listed = [f"{name} {version}" for name, version in versions.items() if name not in ("steadyhand", "Python")]
+    ours = f"Steadyhand {versions['steadyhand']}" if "steadyhand" in versions else "Steadyhand"
+    yield f"All was computed with {ours} on Python {versions['Python']} ({', '.join(listed)})."

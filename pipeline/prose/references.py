@@ -1,0 +1,210 @@
+"""What a study's report rests on, as BibTeX and as text: only what was used. The entries stand in references.bib."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pipeline.study import Study
+
+Row = Mapping[str, Any]
+
+PAPER = "feng2017"
+_OF_TEST = {
+    "wilcoxon": ("wilcoxon1945",),
+    "friedman": ("friedman1937",),
+    "art_anova": ("wobbrock2011",),
+    "mixed_model": ("laird1982", "satterthwaite1946"),
+    "crossover": ("jones2014",),
+    "tost": ("schuirmann1987",),
+    "bayes_t": ("rouder2009",),
+}
+_OF_EFFECT_SIZE = {
+    "generalized eta squared": "olejnik2003",
+    "Cohen's d_z": "lakens2013",
+    "matched-pairs rank-biserial": "kerby2014",
+    "Kendall's W": "kendall1939",
+}
+_OF_ADJUSTMENT = {"holm": "holm1979", "bonferroni": "dunn1961", "benjamini_hochberg": "benjamini1995"}
+_OF_QUESTIONNAIRE = {"nasa_tlx": "hart1988", "sus": "brooke1996", "ueq": "laugwitz2008"}
+_OF_ESTIMATOR = {
+    "one_euro": "casiez2012",
+    "holt": "holt2004",
+    "position_kalman": "kalman1960",
+    "window_gp": PAPER,
+    "fusion_kalman": "kalman1960",
+}
+_OF_PACKAGE = {
+    "numpy": "harris2020",
+    "scipy": "virtanen2020",
+    "pandas": "mckinney2010",
+    "numba": "lam2015",
+    "matplotlib": "hunter2007",
+    "vqf": "laidig2023",
+}
+_ENTRY = re.compile(r"@(\w+)\{([\w.-]+),\n(.*?)\n\}", re.DOTALL)
+_FIELD = re.compile(r"  (\w+) = \{(.*)\},?")
+_DOI = re.compile(r"10\.\d{4,9}/[A-Za-z0-9./()-]*[A-Za-z0-9]")
+_LATEX = str.maketrans(
+    {
+        **{mark: f"\\{mark}" for mark in "#$%&_"},
+        "\\": r"\textbackslash{}",
+        "{": r"\textbraceleft{}",
+        "}": r"\textbraceright{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        **dict.fromkeys((*range(32), *range(127, 160)), " "),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An entry of a bibliography: its kind and key, its fields as BibTeX has them, and what it was used for."""
+
+    kind: str
+    key: str
+    fields: Mapping[str, str]
+    used_for: str = ""
+
+    @property
+    def bibtex(self) -> str:
+        """The entry."""
+        lines = [f"  {name} = {{{value}}},\n" for name, value in self.fields.items()]
+        return f"@{self.kind}{{{self.key},\n{''.join(lines)}}}\n"
+
+    @property
+    def text(self) -> str:
+        """The entry for people: authors, year, title, where, DOI."""
+        told = {name: _read(value) for name, value in self.fields.items()}
+        authors = told.get("author", "").replace(" and others", ", et al.").replace(" and ", ", ")
+        issue = f"({told['number']})" if "number" in told else ""
+        where = " ".join(filter(None, (told.get("journal", told.get("booktitle")), told.get("volume", "") + issue)))
+        edition = f"{told['edition']} ed." if "edition" in told else ""
+        source = ", ".join(filter(None, (where, told.get("pages"), edition, told.get("publisher"))))
+        head = " ".join(filter(None, (authors, f"({told['year']})." if "year" in told else "")))
+        doi = f"doi {told['doi']}" if "doi" in told else ""
+        title = ", version ".join(filter(None, (told.get("title"), told.get("version"))))
+        sentences = (f"{part.rstrip('.')}." for part in (title, source, told.get("note")) if part)
+        return " ".join(filter(None, (head, *sentences, doi)))
+
+
+def used(study: Study, rows: Sequence[Row], measures: Iterable[str], versions: Mapping[str, str]) -> list[Reference]:
+    """What the study rests on: its source, the paper, tests, questionnaires, estimators, packages; each once.
+
+    `rows` are its comparisons, `versions` those of the packages that made the report.
+    """
+    found: dict[str, list[str]] = {}
+    for key, used_for in (*_of_methods(rows), *_of_measures(measures), *_of_estimators(study)):
+        if used_for not in found.setdefault(key, []):
+            found[key].append(used_for)
+    known = _entries()
+    source = _source(study)
+    listed = [source] if source else []
+    found = {PAPER: ["the method that Steadyhand implements", *found.pop(PAPER, [])], **found}
+    listed += [_with(known[key], "; ".join(used_for)) for key, used_for in found.items()]
+    return listed + [_package(name, version, found) for name, version in versions.items()]
+
+
+def bibliography(references: Iterable[Reference]) -> str:
+    """The file references.bib."""
+    return "\n".join(reference.bibtex for reference in references)
+
+
+def _with(reference: Reference, used_for: str, **fields: str) -> Reference:
+    return Reference(reference.kind, reference.key, {**reference.fields, **fields}, used_for)
+
+
+def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
+    """Tests, effect sizes, corrections and diagnostics of comparisons."""
+    for row in rows:
+        details = row["details"] or {}
+        for key in _OF_TEST.get(row["test"], ()):
+            yield key, _TESTS[row["test"]]
+        if "Pratt" in row["method"]:
+            yield "pratt1959", "zeros of the signed-rank test"
+        if row["effect_size"] is not None and row["effect_size_name"] in _OF_EFFECT_SIZE:
+            yield _OF_EFFECT_SIZE[row["effect_size_name"]], row["effect_size_name"]
+        if row["p_adjusted"] is not None:
+            yield _OF_ADJUSTMENT[row["adjust"]], "adjusted p values"
+        if details.get("p_gg") is not None:
+            yield "greenhouse1959", "correction for sphericity"
+        if details.get("shapiro_w") is not None or details.get("residual_shapiro_w") is not None:
+            yield "shapiro1965", "normality of differences"
+        if "outlier_rule" in details:
+            yield "iglewicz1993", "participants far out"
+
+
+_TESTS = {
+    "wilcoxon": "signed-rank test",
+    "friedman": "Friedman test",
+    "art_anova": "aligned rank transform",
+    "mixed_model": "mixed model",
+    "crossover": "crossover analysis",
+    "tost": "test of equivalence",
+    "bayes_t": "Bayes factor",
+}
+
+
+def _of_measures(measures: Iterable[str]) -> Iterator[tuple[str, str]]:
+    for measure in measures:
+        questionnaire, slash, _ = measure.partition("/")
+        if slash and questionnaire in _OF_QUESTIONNAIRE:
+            yield _OF_QUESTIONNAIRE[questionnaire], "questionnaire"
+
+
+def _of_estimators(study: Study) -> Iterator[tuple[str, str]]:
+    for settings in study.estimators.values():
+        if settings.type in _OF_ESTIMATOR:
+            yield _OF_ESTIMATOR[settings.type], f"estimator {settings.type}"
+
+
+def _source(study: Study) -> Reference | None:
+    """Where the study is published, as study.yaml cites it; None where that is the paper, which is listed anyway."""
+    citation = " ".join(study.citation.split())
+    doi = _DOI.search(citation)
+    if not citation or (doi and doi.group() == _entries()[PAPER].fields["doi"]):
+        return None
+    fields = {"title": escaped(study.title), "note": escaped(citation)}
+    if doi:
+        fields["doi"] = doi.group()
+    return Reference("misc", "study", fields, "the study's source")
+
+
+def _package(name: str, version: str, found: Mapping[str, object]) -> Reference:
+    """A package by its paper, where it has one, with its version; one that is listed already is a mere program."""
+    key = _OF_PACKAGE.get(name)
+    if key is not None and key not in found:
+        return _with(_entries()[key], name, note=f"{name}, version {version}")
+    return Reference("software", f"package_{name}", {"title": name, "version": version}, "software")
+
+
+def escaped(text: str) -> str:
+    """A user's text as BibTeX takes it: no mark of it ends a field or means something to LaTeX."""
+    return text.translate(_LATEX)
+
+
+def _read(value: str) -> str:
+    """A field as people read it; what was escaped is as it was."""
+    for mark, code in _LATEX.items():
+        if isinstance(code, str) and code.startswith("\\text"):
+            value = value.replace(code, f"\0{mark}\0") if isinstance(mark, int) else value
+    parts = value.split("\0")
+    plain = [_unmarked(part) if at % 2 == 0 else chr(int(part)) for at, part in enumerate(parts)]
+    return "".join(plain)
+
+
+def _unmarked(text: str) -> str:
+    text = text.replace("``", "“").replace("''", "”").replace("--", "–")
+    return re.sub(r"[{}]", "", re.sub(r"\\([#$%&_])", r"\1", text))
+
+
+@cache
+def _entries() -> dict[str, Reference]:
+    """The entries of references.bib by their keys."""
+    text = Path(__file__).with_suffix(".bib").read_text(encoding="utf-8")
+    return {key: Reference(kind, key, dict(_FIELD.findall(fields))) for kind, key, fields in _ENTRY.findall(text)}

@@ -1,0 +1,240 @@
+"""A comparison as a sentence to paste, written from its row: direction, amount, evidence. No figure is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+from pipeline.wording import (
+    EFFECTS_OF_CONDITION,
+    contrast,
+    decisive_p,
+    effect_size,
+    evidence,
+    interval,
+    listing,
+    number,
+    percent,
+    statistic_value,
+    subject,
+    unit_of,
+)
+
+Row = Mapping[str, Any]
+
+_BEFORE_INTERVAL = ", 95 % CI "
+_ROUND_OFF = 1e-12  # of the mean: what is left where two means are the same
+_DIGITS = 3  # of p, as APA prints it
+_NAMED = {
+    "art_anova": "aligned rank transform",
+    "mixed_model": "mixed model",
+    "crossover": "crossover analysis",
+    "t_paired": "paired t test",
+}
+"""How the tests are named that F, t, W₊ and χ² alone do not tell."""
+_NAMES = {
+    **_NAMED,
+    "rm_anova": "repeated-measures ANOVA",
+    "wilcoxon": "Wilcoxon signed-rank test",
+    "friedman": "Friedman test",
+    "tost": "test of equivalence",
+    "bayes_t": "Bayes factor",
+}
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a sentence may say beside its row: conditions in order, level, descriptives by measure and condition."""
+
+    conditions: tuple[str, ...]
+    alpha: float
+    descriptives: Mapping[tuple[str, str], Row]
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two things compared: `with` conditions, `in` periods, `at` levels; and under what else."""
+
+    first: str
+    second: str
+    among: str
+    where: str = ""
+
+
+def told_of(conditions: Sequence[str], alpha: float, descriptives: Sequence[Row]) -> Told:
+    """What sentences may say of a study."""
+    return Told(tuple(conditions), alpha, {(row["measure"], row["condition"]): row for row in descriptives})
+
+
+def sentence(row: Row, told: Told) -> str:
+    """A row of `comparisons` in APA's manner, with its direction in words; why not, where it is not defined."""
+    what = subject(row["measure"])
+    if row["status"] != "ok":
+        of = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f" of {contrast(row)}"
+        return f"{what}: the {_test(row)}{of} is {row['status']} (n = {row['n']})."
+    if row["test"] == "bayes_t":
+        return _bayes(row, told, what)
+    if row["test"] == "tost":
+        return _equivalence(row, told, what)
+    pair, difference = _pair(row, told.conditions), _difference(row)
+    if pair is not None and difference is not None:
+        return _directed(row, told, what, pair, difference)
+    return _effect(row, told, what)
+
+
+def _test(row: Row) -> str:
+    follows_up = row["test"] == "rm_anova" and row["contrast"] is not None
+    return "follow-up t test" if follows_up else _NAMES[row["test"]]
+
+
+def _directed(row: Row, told: Told, what: str, pair: _Pair, difference: float) -> str:
+    """Which of two is lower, by how much, and whether that is significant."""
+    amount = _amount(row, difference)
+    side = f"{'lower' if difference > 0 else 'higher'} {pair.among} {pair.second}" if difference else "the same in both"
+    if _significant(row, told.alpha) and difference:
+        head = f"{what} was significantly {side} than {pair.among} {pair.first}{pair.where}"
+        inside = [amount, *_means(row, told)]
+    else:
+        head = f"{what} did not differ significantly between {pair.first} and {pair.second}{pair.where}"
+        inside = [f"{side} {amount}".strip(), *_means(row, told)]
+    said = "; ".join(part for part in inside if part)
+    return f"{head}{f' ({said})' if said else ''}, {_evidence(row, told)}."
+
+
+def _amount(row: Row, difference: float) -> str:
+    """`by 6.10 s, 26.7 %`: the estimate or the difference of the means, where it goes the way that was tested."""
+    value = row["effect_size"] if row["effect_size_name"] == "estimate" else row["mean_difference"]
+    if value is None or difference == 0:
+        return ""
+    size = f"{number(abs(value))} {unit_of(row['measure'])}".strip()
+    if value * difference < 0:
+        return f"by ranks, while its mean was {'lower' if value > 0 else 'higher'} by {size}"
+    of_first = row["reduction"] is not None and row["effect_size_name"] != "estimate"
+    return f"by {size}" + (f", {percent(abs(row['reduction']))}" if of_first else "")
+
+
+def _effect(row: Row, told: Told, what: str) -> str:
+    """An effect without a direction: of several conditions, of another factor, of an interaction."""
+    found = _significant(row, told.alpha)
+    if row["effect"] in EFFECTS_OF_CONDITION and row["contrast"] is None:
+        verb = "differed significantly" if found else "did not differ significantly"
+        means = "; ".join(_means(row, told))
+        among = f"between {listing(list(told.conditions))}{f' ({means})' if means else ''}"
+        return f"{what} {verb} {among}, {_evidence(row, told)}."
+    kind = "interaction" if ":" in row["effect"] and row["contrast"] is None else "effect"
+    verb = "was" if found else "was not"
+    return f"{what}: the {kind} of {contrast(row)} {verb} statistically significant, {_evidence(row, told)}."
+
+
+def _equivalence(row: Row, told: Told, what: str) -> str:
+    """Whether the mean difference lies within the bounds."""
+    details, pair = row["details"], _pair(row, told.conditions)
+    unit = unit_of(row["measure"])
+    between = f"between {pair.first} and {pair.second}" if pair else f"of {contrast({**row, 'details': None})}"
+    bounds = f"{interval(*details['bounds'])} {unit}".strip()
+    shown = "lies" if _significant(row, told.alpha) else "was not shown to lie"
+    inside = f"90 % CI {interval(*details['ci90_difference'])}" if details.get("ci90_difference") else ""
+    mean = f"{number(row['mean_difference'])} {unit}".strip()
+    parts = [mean, inside] if inside else [mean]
+    evident = f"two one-sided t tests, {evidence(row, _digits(row, told.alpha), _BEFORE_INTERVAL)}, n = {row['n']}"
+    return f"{what}: the mean difference {between} ({', '.join(parts)}) {shown} within {bounds}, {evident}."
+
+
+def _bayes(row: Row, told: Told, what: str) -> str:
+    """How many times as likely the data are under a difference as under none, or the reverse."""
+    pair, factor = _pair(row, told.conditions), row["statistic"]
+    between = f"between {pair.first} and {pair.second}" if pair else f"of {contrast(row)}"
+    likelier, other = ("no difference", "one") if factor is not None and factor < 1 else ("a difference", "none")
+    if factor is None:  # larger than any number a computer holds
+        times, bayes = "more than 10³⁰⁸", f"ln BF₁₀ = {number(row['details']['log_bf10'])}"
+    else:
+        times, bayes = number(factor if factor >= 1 else 1 / factor), f"BF₁₀ = {statistic_value(row)}"
+    prior = f"Cauchy prior of scale {row['details']['prior_scale']:g}"
+    return (
+        f"{what}: the data are {times} times as likely under {likelier} {between} as under {other}, {bayes}"
+        f" ({prior}), {effect_size(row, _BEFORE_INTERVAL)}, n = {row['n']}."
+    )
+
+
+def _evidence(row: Row, told: Told) -> str:
+    """What the test is called where its letter does not say it, its figures, and how many took part."""
+    named = ""
+    if row["test"] == "wilcoxon":
+        named = f"{row['method'].split(', ')[0].split(' ')[0]} Wilcoxon signed-rank test, "
+    elif row["test"] == "rm_anova" and row["contrast"] is not None:
+        named = "follow-up, "
+    elif row["test"] in _NAMED:
+        named = f"{_NAMED[row['test']]}, "
+    figures = evidence(row, _digits(row, told.alpha), _BEFORE_INTERVAL)
+    singular = ", singular fit" if (row["details"] or {}).get("singular") else ""
+    return f"{named}{figures}, n = {row['n']}{singular}"
+
+
+def _digits(row: Row, alpha: float) -> int:
+    """One digit more where three would put a p on the other side of the level."""
+    details = row["details"] or {}
+    known = [p for p in (row["p"], row["p_adjusted"], details.get("p_gg")) if p is not None]
+    crosses = any((round(p, _DIGITS) < alpha) != (p < alpha) for p in known)
+    return _DIGITS + 1 if crosses else _DIGITS
+
+
+def _significant(row: Row, alpha: float) -> bool:
+    p = decisive_p(row)
+    return p is not None and p < alpha
+
+
+def _difference(row: Row) -> float | None:
+    """First minus second, as far as the test says it: by ranks, estimated, or of the means."""
+    if row["test"] == "wilcoxon" or row["effect_size_name"] == "estimate":
+        return None if row["effect_size"] is None else float(row["effect_size"])
+    if row["mean_difference"] is None:
+        return None
+    same = row["reduction"] is not None and abs(row["reduction"]) < _ROUND_OFF
+    return 0.0 if same else float(row["mean_difference"])
+
+
+def _pair(row: Row, conditions: Sequence[str]) -> _Pair | None:
+    """What two things a row compares; None where it is not two, or names that hold " - " can be read in two ways."""
+    of_condition = row["effect"] in EFFECTS_OF_CONDITION or row["effect"].startswith("condition:")
+    if row["contrast"] is None:
+        both = len(conditions) == 2 and row["effect"] in EFFECTS_OF_CONDITION
+        return _Pair(conditions[0], conditions[1], "with") if both else None
+    compared, where = row["contrast"], ""
+    if ":" in row["effect"] and " | " in compared:
+        compared, where = compared.rsplit(" | ", 1)
+        where = f" at {where}"
+    if of_condition or ":" in row["effect"]:
+        found = [pair for pair in combinations(conditions, 2) if " - ".join(pair) == compared]
+        return _Pair(*found[0], "with", where) if len(found) == 1 else None
+    first, dash, second = compared.partition(" - ")
+    if not dash or " - " in second or row["effect"] == "carry-over":
+        return None
+    return _Pair(first, second, "in period" if row["effect"] == "period" else "at", where)
+
+
+def _means(row: Row, told: Told) -> Iterator[str]:
+    """M and SD of each condition, where all of them are compared and they are of the same people as the test."""
+    if row["effect"] not in EFFECTS_OF_CONDITION or (row["contrast"] is not None and len(told.conditions) > 2):
+        return
+    found = [told.descriptives.get((row["measure"], condition)) for condition in told.conditions]
+    if all(one is not None and one["n"] == row["n"] for one in found):
+        yield from (_mean(one) for one in found if one is not None)
+
+
+def _mean(described: Row) -> str:
+    spread = "" if described["sd"] is None else f", SD = {number(described['sd'])}"
+    return f"{described['condition']}: M = {number(described['mean'])}{spread}"
+
+
+def means_sentence(measure: str, told: Told) -> str:
+    """M, SD and n of every condition, for a measure whose tests do not tell them."""
+    found = [one for condition in told.conditions if (one := told.descriptives.get((measure, condition)))]
+    parts = [f"{_mean(one)}, n = {one['n']}" for one in found]
+    return f"{subject(measure)}: {'; '.join(parts)}." if parts else ""
+
+
+def tells_means(row: Row, told: Told) -> bool:
+    """Does the row's sentence say the means of all conditions?"""
+    return row["status"] == "ok" and row["test"] not in ("bayes_t", "tost") and any(_means(row, told))
