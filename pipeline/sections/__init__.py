@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.document.model import Section
-from pipeline.sections import accuracy, comparisons, design, outcomes, overview, printed, provenance, quality
+from pipeline.sections import accuracy, comparisons, design, outcomes, overview, paths, printed, provenance, quality
 from pipeline.sections.material import Material
 
 SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
@@ -13,6 +13,7 @@ SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     design.section,
     quality.section,
     accuracy.section,
+    paths.section,
     outcomes.selection,
     outcomes.time,
     outcomes.workload,
