@@ -16,7 +16,8 @@ from pipeline.study import Study
 
 EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
 _SETTLED_S = 1.0
-_STRETCHES = 120  # of a session, each of a second or more
+_STRETCHES = 120  # of a session at the most
+_STRETCH_NS = 1_000_000_000  # at the least
 
 
 def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -97,22 +98,19 @@ def rates(ingested: Path) -> Iterator[dict[str, Any]]:
     if arrived.empty:
         return
     first, last = int(arrived["arrival_ns"].min()), int(arrived["arrival_ns"].max())
-    width_ns = max(1_000_000_000, -(-(last - first + 1) // _STRETCHES))
-    count = (last - first) // width_ns + 1
+    count = int(np.clip((last - first) // _STRETCH_NS, 1, _STRETCHES))
+    edges = first + (last + 1 - first) * np.arange(count + 1) // count
     for (session, stream), rows in arrived.groupby(["session", "stream"], sort=False):
         arrival = np.sort(rows["arrival_ns"].to_numpy(np.int64))
-        stretch = (arrival - first) // width_ns
-        messages = np.bincount(stretch, minlength=count)
+        stretch = np.searchsorted(edges, arrival, side="right") - 1
         silence = np.zeros(count)
         np.maximum.at(silence, stretch, np.diff(arrival, prepend=first) * tables.NANOSECONDS)
-        for index in range(count):
-            end = min(first + (index + 1) * width_ns, last + 1)
-            begin = first + index * width_ns
+        for index, messages in enumerate(np.bincount(stretch, minlength=count)):
             yield {
                 "session": session,
                 "stream": stream,
-                "time_ns": begin,
-                "duration_s": (end - begin) * tables.NANOSECONDS,
-                "messages": int(messages[index]),
+                "time_ns": int(edges[index]),
+                "duration_s": float(edges[index + 1] - edges[index]) * tables.NANOSECONDS,
+                "messages": int(messages),
                 "gap_max_s": float(silence[index]),
             }

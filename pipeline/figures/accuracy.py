@@ -127,14 +127,17 @@ def calibration(table: pd.DataFrame) -> Figure:
         rows = table[table["estimator"] == estimator]
         axes.plot(grid, 100 * (2 * stats.norm.cdf(grid) - 1), color=BLACK, linewidth=1, linestyle=(0, (4, 2)))
         if rows["session"].nunique() > 1:
-            for _, one in rows.groupby("session", sort=False):
-                axes.plot(one["percent_of_sd"] / 100, 100 * one["within"] / one["n"], color=GREY, **_FAINT)
+            axes.plot(*_one_line(rows), color=GREY, **_FAINT)
         k, share = shares(rows)
         look: dict[str, Any] = {"color": colour(index), "marker": marker(index), "markersize": 4}
         axes.plot(k, 100 * share, **look)
         axes.set_title(f"{name(estimator, 22)} (n = {_sessions(rows)})", fontsize=8.5)
         if index % across == 0:
             axes.set_ylabel("Within k SD (%)")
+    every[0].plot([], [], color=BLACK, linewidth=1, linestyle=(0, (4, 2)), label="normal")
+    every[0].plot([], [], color=colour(0), marker=marker(0), markersize=4, label="all sessions")
+    every[0].plot([], [], color=GREY, label="one session", **_FAINT)
+    figure.legend(loc="outside upper left", ncols=3)
     every[0].set_ylim(0, 102)
     every[0].set_xlim(left=0)
     for axes in lowest(every, across):
@@ -143,6 +146,15 @@ def calibration(table: pd.DataFrame) -> Figure:
 
 
 _FAINT: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.5}
+
+
+def _one_line(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
+    """Each session's k and share in percent, NaN between sessions: one line draws faster than many."""
+    whole = rows.pivot(index="percent_of_sd", columns="session", values=["within", "n"]).astype("float64")
+    share = 100 * (whole["within"] / whole["n"]).to_numpy()
+    k = np.broadcast_to(whole.index.to_numpy(np.float64)[:, None] / 100, share.shape)
+    parted = [np.vstack([part, np.full(part.shape[1], np.nan)]).T.ravel() for part in (k, share)]
+    return parted[0], parted[1]
 
 
 def shares(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:

@@ -147,7 +147,7 @@ def path(
             axes.scatter(begin[:, 0], begin[:, 1], s=30, marker=">", color=colour(index), edgecolor="white", zorder=4)
     _marked(axes, events, plane)
     _square(axes, plane)
-    figure.legend(loc="outside upper left", ncols=4)
+    figure.legend(loc="outside upper left", ncols=5)
     return figure
 
 
@@ -167,17 +167,20 @@ def paths(
     """
     told = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
     people = sorted(set(told["participant"]))
-    figure, every, across = multiples(len(people), 1.6)
+    seen = [tracks, positions, events]
+    extent = _extent([rows[[f"{axis}_mm" for axis in plane]].to_numpy(np.float64) for rows in seen])
+    row_height = 0.35 + 1.5 * float(np.clip(extent[1] / extent[0], 0.3, 1.2))
+    figure, every, across = multiples(len(people), row_height)
     for index, (axes, person) in enumerate(zip(every, people, strict=True)):
         mine = told[told["participant"] == person]
         zorder = as_pixels(axes, len(tracks) + len(positions))
         for place, (condition, line) in enumerate(shown.items()):
             for session in mine.loc[mine["condition"] == condition, "session"]:
-                one, seen = tracks[tracks["session"] == session], positions[positions["session"] == session]
-                points = way(one, seen, line, plane)
+                one, found = tracks[tracks["session"] == session], positions[positions["session"] == session]
+                points = way(one, found, line, plane)
                 axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(place), zorder=zorder)
         _marked(axes, events[events["session"].isin(mine["session"])], plane, small=True)
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal", adjustable="box")
         axes.set_title(name(person, 18), fontsize=8.5)
         if index % across == 0:
             axes.set_ylabel(f"{plane[1]} (mm)")
@@ -211,13 +214,18 @@ def _marked(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False)
     """Targets and selections."""
     targets = _targets(events, plane)
     chosen = events.loc[events["type"] == "selection", [f"{axis}_mm" for axis in plane]].dropna().to_numpy(np.float64)
-    size = 14 if small else 60
+    size = 9 if small else 60
     many: dict[str, Any] = {"rasterized": len(targets) + len(chosen) > MARKS_MAX}
     if len(targets):
-        ring: dict[str, Any] = {"facecolors": "none", "edgecolors": BLACK, "linewidths": 0.9, "zorder": 3}
+        ring: dict[str, Any] = {
+            "facecolors": "none",
+            "edgecolors": BLACK,
+            "linewidths": 0.6 if small else 0.9,
+            "zorder": 3,
+        }
         axes.scatter(targets[:, 0], targets[:, 1], s=size, label=f"targets (n = {len(targets)})", **ring, **many)
     if len(chosen):
-        cross: dict[str, Any] = {"marker": "x", "color": BLACK, "linewidths": 0.9, "zorder": 4}
+        cross: dict[str, Any] = {"marker": "x", "color": BLACK, "linewidths": 0.5 if small else 0.9, "zorder": 4}
         axes.scatter(chosen[:, 0], chosen[:, 1], s=size / 2.5, label=f"selections (n = {len(chosen)})", **cross, **many)
 
 

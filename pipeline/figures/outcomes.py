@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     options: dict[str, Any] = {"gridspec_kw": {"width_ratios": ratio}} if compared else {}
     figure, axes = panels(1, 2 if compared else 1, 3.1, **options)
     _rainclouds(axes[0], wide)
+    _from_zero(axes[0], [wide])
     axes[0].set_ylabel(name(measure_label(measure)))
     axes[0].set_title(f"Participants (n = {len(complete)} complete)")
     if compared:
@@ -66,6 +67,7 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
         axes.set_title(f"{name(short_label(measure), 24)} (n = {len(table.dropna())})")
         if index % across == 0:
             axes.set_ylabel("Rating")
+    _from_zero(every[0], wide.values())
     return figure
 
 
@@ -82,10 +84,13 @@ def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
     length = max(8, (24 if small else 40) // len(at))
     axes.set_xticks(at, [name(condition, length) for condition in wide.columns])
     axes.set_xlim(-0.6, len(at) - 0.4)
-    values = finite(wide)
-    if len(values) and values.min() >= 0:
-        axes.set_ylim(bottom=0)
     grouped(axes)
+
+
+def _from_zero(axes: Axes, tables: Iterable[pd.DataFrame]) -> None:
+    """Values begin at zero where none is below it; asked for once all are drawn, for it ends the scaling."""
+    if not any((finite(table) < 0).any() for table in tables):
+        axes.set_ylim(bottom=0)
 
 
 def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple[str, str]) -> None:
@@ -200,7 +205,7 @@ def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
             rows = mine[mine["condition"] == condition].sort_values("trial", kind="stable")
             look: dict[str, Any] = {"color": colour(place), "marker": marker(place), "zorder": zorder}
             where = rows["trial"].to_numpy(np.float64), rows["position_error_mm"].to_numpy(np.float64)
-            axes.plot(*where, markersize=2.5, linewidth=0.7, alpha=0.8, label=name(condition), **look)
+            axes.plot(*where, markersize=2.5, linewidth=0.5, alpha=0.75, label=name(condition), **look)
         axes.set_title(f"{name(person, 18)} (n = {len(mine)})", fontsize=8.5)
         if index % across == 0:
             axes.set_ylabel("Error (mm)")

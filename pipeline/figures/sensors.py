@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from pipeline.figures.style import (
     panels,
     styled,
 )
-from pipeline.wording import MINUS
+from pipeline.wording import MINUS, seconds
 
 LEAD_RANGE_S = 0.5
 _TIME = "Time since the session's start (s)"
@@ -71,12 +72,23 @@ def estimates(excerpts: pd.DataFrame) -> Figure:
         _estimate(row[0], excerpts, estimator, COLOURS[index % _SHADES])
         if reference is not None:
             _error(row[1], excerpts, estimator, COLOURS[index % _SHADES])
+    if reference is not None and names:
+        every[0, 1].set_ylim(*_errors_range(excerpts, names))
     _around(every[0, 0], finite(excerpts.loc[excerpts["kind"] != "acceleration", "value"]))
     handles, labels = every[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=4)
     for axes in every[-1]:
         axes.set_xlabel(_TIME)
     return figure
+
+
+def _errors_range(excerpts: pd.DataFrame, names: Sequence[str]) -> tuple[float, float]:
+    """Room for every error and the usual band; the wide one of an estimator that has just begun may be cut."""
+    reach = 1.0
+    for one in names:
+        _, error, sd = errors_in(excerpts, one)
+        reach = max(reach, np.abs(finite(error)).max(initial=0.0), 2 * float(np.median(finite(sd))) if len(sd) else 0.0)
+    return -1.15 * reach, 1.15 * reach
 
 
 def _around(axes: Axes, values: FloatArray) -> None:
@@ -154,7 +166,7 @@ def lead(lead_curves: pd.DataFrame) -> Figure:
         if not highest > 0:
             continue
         peak = peak_s(rows)
-        label = name(estimator) if peak is None else f"{name(estimator)}: {1000 * peak:+.0f} ms".replace("-", MINUS)
+        label = name(estimator) if peak is None else f"{name(estimator)}: {seconds(peak)} ms"
         axes.plot(1000 * shift, correlation / highest, color=colour(index), label=label)
         if peak is not None:
             mark: dict[str, Any] = {"markersize": 7, "markeredgecolor": "white", "color": colour(index)}

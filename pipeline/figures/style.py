@@ -112,6 +112,8 @@ def multiples(
     down = -(-count // across)
     shared: dict[str, Any] = {"sharex": True, "sharey": True} | options
     figure, every = panels(down, across, 0.6 + row_height * down, **shared)
+    for axes in every:
+        axes.locator_params(nbins=4)
     for spare in every[count:]:
         spare.set_visible(False)
         if shared["sharex"]:

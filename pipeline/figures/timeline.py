@@ -15,6 +15,9 @@ from pipeline.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, FloatArray, 
 _GAP_TIMES = 5  # a silence this many times as long as usual is marked
 _NS = 1e-9
 _ROW = 0.17  # inches
+_SHADES = 20  # told apart
+_PALE = 0.93
+_CROSS: dict[str, Any] = {"marker": "X", "color": COLOURS[5], "edgecolor": BLACK, "linewidths": 0.5, "s": 26}
 
 
 @styled
@@ -86,27 +89,28 @@ def silences(stream_rates: pd.DataFrame) -> pd.DataFrame:
 
 
 def _cells(axes: Axes, shares: pd.DataFrame, at: dict[tuple[str, str], float]) -> None:
-    """A box for each stretch; the emptier the paler."""
-    if shares.empty:
-        return
-    y = np.array([at[str(a), str(b)] for a, b in zip(shares["session"], shares["stream"], strict=True)])
-    begin = shares["begin_s"].to_numpy(np.float64)
-    end = begin + shares["duration_s"].to_numpy(np.float64)
-    x: FloatArray = np.stack([begin, end, end, begin], axis=1)
-    corners = np.stack([x, y[:, None] + np.array([-0.4, -0.4, 0.4, 0.4])], axis=2)
-    blue = np.array([0x00, 0x72, 0xB2]) / 255
-    share = shares["share"].to_numpy(np.float64)[:, None]
-    boxes = PolyCollection(list(corners), facecolors=0.93 - share * (0.93 - blue), linewidths=0)
-    boxes.set_rasterized(len(shares) > MARKS_MAX)
-    axes.add_collection(boxes)
+    """A box for as long as about the same share arrives; the emptier the paler."""
+    shade = (shares["share"] * _SHADES).round() / _SHADES
+    row = pd.Series([at[str(a), str(b)] for a, b in zip(shares["session"], shares["stream"], strict=True)])
+    told = pd.DataFrame({"row": row.to_numpy(), "shade": shade.to_numpy(), "begin": shares["begin_s"].to_numpy()})
+    told["end"] = told["begin"] + shares["duration_s"].to_numpy()
+    run = (told[["row", "shade"]].diff() != 0).any(axis=1).cumsum()
+    boxes = told.groupby(run).agg({"row": "first", "shade": "first", "begin": "first", "end": "last"})
+    x: FloatArray = boxes[["begin", "end", "end", "begin"]].to_numpy(np.float64)
+    y = boxes["row"].to_numpy(np.float64)[:, None] + np.array([-0.4, -0.4, 0.4, 0.4])
+    full = np.array([0x00, 0x72, 0xB2]) / 255
+    colours = _PALE - boxes["shade"].to_numpy(np.float64)[:, None] * (_PALE - full)
+    drawn = PolyCollection(list(np.stack([x, y], axis=2)), facecolors=colours, linewidths=0)
+    drawn.set_rasterized(len(boxes) > MARKS_MAX)
+    axes.add_collection(drawn)
 
 
 def _silences(axes: Axes, shares: pd.DataFrame, at: dict[tuple[str, str], float]) -> None:
     found = silences(shares)
     y = [at[str(a), str(b)] for a, b in zip(found["session"], found["stream"], strict=True)]
     middle = found["begin_s"] + found["duration_s"] / 2
-    look: dict[str, Any] = {"marker": "x", "color": COLOURS[1], "linewidths": 1.1, "zorder": 3}
-    axes.scatter(middle, y, s=13, rasterized=len(found) > MARKS_MAX, **look)
+    look: dict[str, Any] = _CROSS | {"zorder": 3}
+    axes.scatter(middle, y, rasterized=len(found) > MARKS_MAX, **look)
 
 
 def _events(
@@ -126,7 +130,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
     """What shades and marks stand for."""
     axes.scatter([], [], marker="s", color=COLOURS[0], label="as many messages as usual")
     axes.scatter([], [], marker="s", color="#ededed", label="none")
-    axes.scatter([], [], marker="x", color=COLOURS[1], label="silence")
+    axes.scatter([], [], label="silence", **_CROSS)
     axes.plot([], [], color=BLACK, linewidth=0.9, label="trial's start")
     axes.scatter([], [], marker="v", color=BLACK, s=12, label="selection")
     figure.legend(loc="outside upper left", ncols=5)
