@@ -23,6 +23,7 @@ from pipeline.figures.style import (
     colour,
     finite,
     interval,
+    legend,
     lowest,
     marker,
     mean_and_interval,
@@ -108,7 +109,7 @@ def lag_and_error(accuracy: pd.DataFrame) -> Figure:
     axes.axhline(0, color=GREY, linewidth=0.8)
     _along_rmse(axes, accuracy["rmse_mm"])
     axes.set_ylabel(_LAG)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    legend(figure, [axes], 1, "outside right center")
     return figure
 
 
@@ -137,7 +138,7 @@ def calibration(table: pd.DataFrame) -> Figure:
     every[0].plot([], [], color=BLACK, linewidth=1, linestyle=(0, (4, 2)), label="normal")
     every[0].plot([], [], color=colour(0), marker=marker(0), markersize=4, label="all sessions")
     every[0].plot([], [], color=GREY, label="one session", **_FAINT)
-    figure.legend(loc="outside upper left", ncols=3)
+    legend(figure, figure.axes, 3)
     every[0].set_ylim(0, 102)
     every[0].set_xlim(left=0)
     for axes in lowest(every, across):
@@ -198,8 +199,7 @@ def trade_off(means: pd.DataFrame) -> Figure:
         panel.set_ylabel(label)
         panel.margins(0.2, 0.1)  # room for labels
         _along_rmse(panel, means["rmse_mm"])
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    legend(figure, [axes[0]], 4)
     figure.draw_without_rendering()  # only then is it known how far apart marks are
     for panel, (stem, unit, scale, _) in zip(axes, known, strict=False):
         _ranks(figure, panel, means, scale * means[f"{stem}{unit}"])

@@ -24,6 +24,7 @@ from pipeline.figures.style import (
     colour,
     finite,
     grouped,
+    legend,
     lowest,
     marker,
     multiples,
@@ -35,6 +36,7 @@ from pipeline.figures.style import (
 
 Plane = tuple[str, str]
 XY: Plane = ("x", "y")
+_PANEL = 3.4  # inches: the highest
 _VERTICES = 1500  # of a path; a line of more looks the same
 _CANVAS_MARGIN = 0.06
 _TARGETS_NAMED = 30  # more numbers would lie on each other
@@ -96,7 +98,7 @@ def task_layout(task: Task) -> Figure:
     across, down = _CANVAS_MARGIN * (right - left), _CANVAS_MARGIN * (top - bottom)
     axes.set_xlim(left - across, right + across)
     axes.set_ylim(bottom - down, top + down)
-    figure.legend(loc="outside upper left", ncols=3)
+    legend(figure, figure.axes, 3)
     return figure
 
 
@@ -147,7 +149,7 @@ def path(
             axes.scatter(begin[:, 0], begin[:, 1], s=30, marker=">", color=colour(index), edgecolor="white", zorder=4)
     _marked(axes, events, plane)
     _square(axes, plane)
-    figure.legend(loc="outside upper left", ncols=5)
+    legend(figure, figure.axes, 5)
     return figure
 
 
@@ -188,8 +190,7 @@ def paths(
         axes.set_xlabel(f"{plane[0]} (mm)")
     for place, (condition, line) in enumerate(shown.items()):
         every[0].plot([], [], color=colour(place), label=f"{name(condition)}: {name(line)}")
-    handles, labels = every[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=3)
+    legend(figure, [every[0]], 3)
     return figure
 
 
@@ -251,7 +252,7 @@ def selection_errors(
     """
     scale, unit = (1.0, "mm") if px_per_mm is None else (px_per_mm, "px")
     across = min(len(conditions), 4)
-    figure, every, across = multiples(len(conditions), WIDTH / across * 0.92, a_row=4)
+    figure, every, across = multiples(len(conditions), min(WIDTH / across * 0.92, _PANEL), a_row=4)
     reach = 0.0
     for index, (axes, condition) in enumerate(zip(every, conditions, strict=True)):
         rows = selections[selections["condition"] == condition]

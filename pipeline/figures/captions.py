@@ -317,21 +317,28 @@ def task_layout(task: Task) -> Said:
     return Said(f"The task: {told}.", f"Layout of {told}.")
 
 
-def _length_m(points: FloatArray) -> float:
-    steps = np.diff(points[np.isfinite(points).all(axis=1)], axis=0)
-    return float(np.sum(np.hypot(*steps.T))) / 1000 if len(steps) else 0.0
+def _span_of(points: FloatArray) -> tuple[float, float]:
+    known = points[np.isfinite(points).all(axis=1)]
+    across, up = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
+    return float(across), float(up)
+
+
+def _extent(points: FloatArray) -> str:
+    across, up = _span_of(points)
+    return f"{number(across, 0)} × {number(up, 0)} mm"
 
 
 def path(
     tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
 ) -> Said:
-    """How long each way is: one that trembles is longer."""
-    lengths = [f"{line} {number(_length_m(way(tracks, positions, line, plane)), 2)} m" for line in lines]
+    """What each line spans, and how many targets and selections there are."""
     sessions = [*tracks["session"].iloc[:1], *positions["session"].iloc[:1]]
     where = f" in session {sessions[0]}" if sessions else ""
-    told = f"Length of the way drawn, which grows where a line trembles: {_listed(lengths, ', ')}."
+    spans = _listed((f"{line} {_extent(way(tracks, positions, line, plane))}" for line in lines), ", ")
+    told = f"Extent of each line: {spans}; {counted(int((events['type'] == 'selection').sum()), 'selection')}."
     return Said(
-        f"The hand's way{where}, {plane[0]} against {plane[1]}; it begins at the arrow. {told}",
+        f"The hand's way{where}, {plane[0]} against {plane[1]}; it begins at the arrow. {told} Look where lines leave"
+        " each other and how much each trembles.",
         f"Lines of the hand's path in the plane{where}. {told}",
     )
 
@@ -344,22 +351,25 @@ def paths(
     shown: Mapping[str, str],
     plane: Plane = XY,
 ) -> Said:
-    """How many ways of how many participants, and how long they are."""
+    """How many ways there are of each condition, and which reaches furthest."""
     told = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
-    parts = []
+    counts, furthest = [], ("", 0.0, "")
     for condition, line in shown.items():
-        mine = told.loc[told["condition"] == condition, "session"]
-        lengths = [
-            _length_m(way(tracks[tracks["session"] == one], positions[positions["session"] == one], line, plane))
-            for one in mine
-        ]
-        if lengths:
-            parts.append(f"{condition} ({line}) {number(float(np.median(lengths)), 2)} m, n = {len(lengths)}")
-    lengths_told = f"Median length of a way: {_listed(parts)}."
+        mine = list(told.loc[told["condition"] == condition, "session"])
+        if mine:
+            counts.append(f"{condition} ({line}), n = {len(mine)}")
+        for one in mine:
+            points = way(tracks[tracks["session"] == one], positions[positions["session"] == one], line, plane)
+            reach = float(np.hypot(*_span_of(points)))
+            if reach > furthest[1]:
+                furthest = (str(one), reach, _extent(points))
+    summary = f"{_listed(counts)}."
+    summary += f" The widest is session {furthest[0]}, {furthest[2]}." if furthest[0] else ""
     people = counted(told["participant"].nunique(), "participant")
     return Said(
-        f"What was displayed on the way past the targets, a panel a participant ({people}). {lengths_told}",
-        f"Paths of {people} in the plane. {lengths_told}",
+        f"What was displayed on the way past the targets, a panel a participant ({people}): {summary} Look for ways"
+        " that leave the others.",
+        f"Paths of {people} in the plane: {summary}",
     )
 
 

@@ -21,6 +21,7 @@ from pipeline.figures.style import (
     finite,
     grouped,
     interval,
+    legend,
     lowest,
     marker,
     multiples,
@@ -185,7 +186,7 @@ def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
         axes.tick_params(axis="x", rotation=60)
     axes.set_ylabel("Rating")
     grouped(axes)
-    figure.legend(loc="outside upper left", ncols=min(len(conditions), 6))
+    legend(figure, figure.axes, min(len(conditions), 6))
     return figure
 
 
@@ -212,6 +213,5 @@ def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
     every[0].set_ylim(bottom=0)
     for axes in lowest(every, across):
         axes.set_xlabel("Trial")
-    handles, labels = every[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=min(len(conditions), 6))
+    legend(figure, [every[0]], min(len(conditions), 6))
     return figure

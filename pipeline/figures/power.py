@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.figures.style import GREY, FloatArray, colour, marker, panels, styled
+from pipeline.figures.style import GREY, FloatArray, colour, legend, marker, panels, styled
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def power(table: pd.DataFrame, series: Mapping[str, str], target: float, needed:
     axes.set_title(labels.title)
     axes.set_xlabel("Complete participants")
     axes.set_ylabel(labels.value)
-    figure.legend(loc="outside lower left", ncols=2)
+    legend(figure, [axes], 2, "outside lower left")
     return figure
 
 

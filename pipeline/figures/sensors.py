@@ -19,6 +19,7 @@ from pipeline.figures.style import (
     colour,
     finite,
     grouped,
+    legend,
     marker,
     name,
     panels,
@@ -53,7 +54,7 @@ def streams(excerpts: pd.DataFrame) -> Figure:
         axes[1].set_ylabel(f"Acceleration,\n{axis} (mm/s²)")
         grouped(axes[1])
     axes[-1].set_xlabel(_TIME)
-    figure.legend(loc="outside upper left", ncols=3)
+    legend(figure, figure.axes, 3)
     return figure
 
 
@@ -75,8 +76,7 @@ def estimates(excerpts: pd.DataFrame) -> Figure:
     if reference is not None and names:
         every[0, 1].set_ylim(*_errors_range(excerpts, names))
     _around(every[0, 0], finite(excerpts.loc[excerpts["kind"] != "acceleration", "value"]))
-    handles, labels = every[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    legend(figure, [every[0, 0]], 4)
     for axes in every[-1]:
         axes.set_xlabel(_TIME)
     return figure
@@ -166,7 +166,7 @@ def lead(lead_curves: pd.DataFrame) -> Figure:
         if not highest > 0:
             continue
         peak = peak_s(rows)
-        label = name(estimator) if peak is None else f"{name(estimator)}: {seconds(peak)} ms"
+        label = name(estimator) if peak is None else f"{name(estimator)}: peak at {seconds(peak)} ms"
         axes.plot(1000 * shift, correlation / highest, color=colour(index), label=label)
         if peak is not None:
             mark: dict[str, Any] = {"markersize": 7, "markeredgecolor": "white", "color": colour(index)}
@@ -174,7 +174,7 @@ def lead(lead_curves: pd.DataFrame) -> Figure:
     axes.axvline(0, color=GREY, linewidth=0.8)
     axes.set_xlabel("Lead over the tracker (ms); to the right: ahead of it")
     axes.set_ylabel("Cross-correlation\n(share of its peak)")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="peak at")
+    legend(figure, [axes], 1, "outside right center")
     return figure
 
 

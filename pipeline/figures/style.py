@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any, Literal, ParamSpec
 
 import matplotlib as mpl
 import matplotlib.ticker
 import numpy as np
 import numpy.typing as npt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -19,6 +20,7 @@ from pipeline.wording import MINUS, THIN
 
 FloatArray = npt.NDArray[np.float64]
 Drawn = ParamSpec("Drawn")
+Place = Literal["outside upper left", "outside lower left", "outside right center"]
 
 # Okabe and Ito (2008), darkest first, so that neighbours also differ in print without colour.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
@@ -82,6 +84,8 @@ def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:
 def name(text: object, length: int = _NAME_LENGTH) -> str:
     """A name as a figure can show it: with glyphs for all of it, and no longer than leaves room for the data."""
     shown = showable(str(text))
+    if shown.startswith("_"):  # matplotlib leaves such names out of legends
+        shown = THIN + shown
     return shown if len(shown) <= length else f"{shown[: length - 1]}…"
 
 
@@ -124,6 +128,16 @@ def multiples(
 def lowest(every: Sequence[Axes], across: int) -> list[Axes]:
     """The panels with nothing below them."""
     return list(every[-across:])
+
+
+def legend(figure: Figure, axes: Iterable[Axes], columns: int = 4, place: Place = "outside upper left") -> None:
+    """What marks and lines stand for, each once, outside the panels; nothing where none has a label."""
+    told: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            told.setdefault(label, handle)
+    if told:
+        figure.legend(list(told.values()), list(told), loc=place, ncols=columns)
 
 
 def mean_and_interval(values: FloatArray) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from pipeline.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, FloatArray, name, panels, styled
+from pipeline.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, FloatArray, legend, name, panels, styled
 
 _GAP_TIMES = 5  # a silence this many times as long as usual is marked
 _NS = 1e-9
@@ -133,4 +133,4 @@ def _legend(figure: Figure, axes: Axes) -> None:
     axes.scatter([], [], label="silence", **_CROSS)
     axes.plot([], [], color=BLACK, linewidth=0.9, label="trial's start")
     axes.scatter([], [], marker="v", color=BLACK, s=12, label="selection")
-    figure.legend(loc="outside upper left", ncols=5)
+    legend(figure, figure.axes, 5)

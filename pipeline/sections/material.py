@@ -89,9 +89,11 @@ class Material:
         function: Callable[..., matplotlib.figure.Figure],
         said: Callable[..., captions.Said],
         *arguments: Any,
+        more: str = "",
     ) -> Figure:
-        """A figure with what its caption function says of the same arguments."""
-        return self.figure(name, function, *said(*arguments), *arguments)
+        """A figure with what its caption function says of the same arguments, and more, such as what is left out."""
+        caption, alt = said(*arguments)
+        return self.figure(name, function, f"{caption}{more}", alt, *arguments)
 
 
 def safe_name(text: str) -> str:
@@ -100,6 +102,11 @@ def safe_name(text: str) -> str:
     if plain == text.replace("_", "-").replace("/", "-") and len(plain) <= _NAME_LENGTH:
         return plain
     return f"{plain[:_NAME_LENGTH]}-{hashlib.sha256(text.encode()).hexdigest()[:6]}".lstrip("-")
+
+
+def first_of(shown: int, there: int, what: str) -> str:
+    """That a figure shows the first of many, or nothing where it shows all."""
+    return f" The first {shown} of {there} {what}." if there > shown else ""
 
 
 def conditions_text(conditions: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from pipeline import figures
 from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.figures import captions
 from pipeline.figures.canvas import offsets_mm
-from pipeline.sections.material import Material, Row, safe_name
+from pipeline.sections.material import Material, Row, first_of, safe_name
 from pipeline.wording import (
     TESTS,
     adjustment,
@@ -138,10 +138,11 @@ def _selected(material: Material) -> list[Block]:
                 material.drawn("selection-errors", figures.selection_errors, captions.selection_errors, *shown)
             )
     several = trials.groupby(["participant", "condition"])["trial"].nunique().max() if len(trials) else 0
-    people = sorted(set(trials["participant"]))[:_PEOPLE_MAX]
+    people = sorted(set(trials["participant"]))
     if several > 1:
-        some = trials[trials["participant"].isin(people)]
-        blocks.append(material.drawn("trials", figures.trials, captions.trials, some, study.conditions))
+        some = trials[trials["participant"].isin(people[:_PEOPLE_MAX])]
+        more = first_of(_PEOPLE_MAX, len(people), "participants")
+        blocks.append(material.drawn("trials", figures.trials, captions.trials, some, study.conditions, more=more))
     return blocks
 
 

@@ -8,7 +8,7 @@ from pipeline import figures, tables
 from pipeline.document.model import Block, Section
 from pipeline.figures import captions
 from pipeline.figures.canvas import Plane
-from pipeline.sections.material import Material
+from pipeline.sections.material import Material, first_of
 
 _SESSIONS_MAX = 48  # drawn; a page of more would be slow to open
 _READ = ("tracks", "positions", "events")
@@ -23,7 +23,7 @@ def section(material: Material) -> Section | None:
     plane = (axes[0], axes[1])
     blocks = _one(material, used, plane)
     if blocks and len(used) > 1:
-        blocks += _every(material, used[:_SESSIONS_MAX], plane)
+        blocks += _every(material, used, plane)
     return Section("paths", "Hand paths", tuple(blocks)) if blocks else None
 
 
@@ -40,7 +40,8 @@ def _one(material: Material, used: list[int], plane: Plane) -> list[Block]:
 
 def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
     """What each session displayed, a panel a participant."""
-    shown = {}
+    shown, more = {}, first_of(_SESSIONS_MAX, len(used), "sessions")
+    used = used[:_SESSIONS_MAX]
     for place in used:
         line, condition = _displayed(material, place), material.sessions[place].condition
         if line is not None and condition is not None:
@@ -56,7 +57,7 @@ def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
         found["events"].append(events)
     sessions = pd.DataFrame([material.sessions[place].ids for place in used])
     whole = [pd.concat(found[name]) for name in _READ]
-    return [material.drawn("paths", figures.paths, captions.paths, *whole, sessions, ordered, plane)]
+    return [material.drawn("paths", figures.paths, captions.paths, *whole, sessions, ordered, plane, more=more)]
 
 
 def _read(material: Material, name: str, place: int) -> pd.DataFrame:

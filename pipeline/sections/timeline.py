@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline import figures, tables
 from pipeline.document.model import Block
 from pipeline.figures import captions
-from pipeline.sections.material import Material
+from pipeline.sections.material import Material, first_of
 
 _SESSIONS_MAX = 40  # a page holds no more rows
 
@@ -17,4 +17,5 @@ def blocks(material: Material) -> list[Block]:
         return []
     events = tables.read("events", material.ingested[:_SESSIONS_MAX])
     exclusions = tables.frame("exclusions", material.rows("exclusions"))
-    return [material.drawn("timeline", figures.timeline, captions.timeline, rates, events, exclusions)]
+    more = first_of(_SESSIONS_MAX, len(material.sessions), "sessions")
+    return [material.drawn("timeline", figures.timeline, captions.timeline, rates, events, exclusions, more=more)]
