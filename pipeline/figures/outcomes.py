@@ -206,7 +206,9 @@ def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
             rows = mine[mine["condition"] == condition].sort_values("trial", kind="stable")
             look: dict[str, Any] = {"color": colour(place), "marker": marker(place), "zorder": zorder}
             where = rows["trial"].to_numpy(np.float64), rows["position_error_mm"].to_numpy(np.float64)
-            axes.plot(*where, markersize=2.5, linewidth=0.5, alpha=0.75, label=name(condition), **look)
+            axes.plot(
+                *where, markersize=2.5, linewidth=0.5 if zorder > 0 else 0, alpha=0.75, label=name(condition), **look
+            )
         axes.set_title(f"{name(person, 18)} (n = {len(mine)})", fontsize=8.5)
         if index % across == 0:
             axes.set_ylabel("Error (mm)")

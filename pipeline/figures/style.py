@@ -51,7 +51,7 @@ _STYLE: dict[Any, Any] = {
     "text.parse_math": False,  # a name with two dollar signs is a name
     "svg.fonttype": "path",
     "svg.hashsalt": "steadyhand",
-    "savefig.dpi": 200,
+    "savefig.dpi": 150,  # of what is kept as pixels
 }
 
 
