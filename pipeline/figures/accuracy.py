@@ -128,7 +128,7 @@ def calibration(table: pd.DataFrame) -> Figure:
         rows = table[table["estimator"] == estimator]
         axes.plot(grid, 100 * (2 * stats.norm.cdf(grid) - 1), color=BLACK, linewidth=1, linestyle=(0, (4, 2)))
         if rows["session"].nunique() > 1:
-            axes.plot(*_one_line(rows), color=GREY, **_FAINT)
+            axes.plot(*_one_line(rows), color=GREY, rasterized=len(rows) > MARKS_MAX, **_FAINT)
         k, share = shares(rows)
         look: dict[str, Any] = {"color": colour(index), "marker": marker(index), "markersize": 4}
         axes.plot(k, 100 * share, **look)

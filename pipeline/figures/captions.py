@@ -153,7 +153,7 @@ def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Said:
     head = f"Selection error trial by trial, a panel a participant (n = {counted(people, 'participant')}"
     head += f", {counted(len(recorded), 'selection')})."
     told = _halves(recorded, conditions)
-    return Said(f"{head} {told}".strip(), f"Lines of selection error by trial. {told}".strip())
+    return Said(f"{head} {told}".strip(), f"Selection error by trial, a panel a participant. {told}".strip())
 
 
 def _halves(recorded: pd.DataFrame, conditions: Sequence[str]) -> str:

@@ -93,3 +93,10 @@ def test_calibration_pools_instants_and_not_shares(tmp_path: Path) -> None:
     shown = texts(figures.calibration(table), tmp_path)
     assert {"gp (n = 2 sessions)", "raw (n = 1 session)", "normal", "k (stated SDs)", "Within k SD (%)"} <= set(shown)
     assert "where a normal has 95 %: gp 60 %, raw 60 %" in captions.calibration(table).caption
+
+
+def test_the_lines_of_many_sessions_are_pixels(tmp_path: Path) -> None:
+    rows = [row for n in range(1500) for row in counts("gp", f"s{n}", {100: n % 100, 196: 100}, 100)]
+    path = saved(figures.calibration(tables.frame("calibration", rows)), tmp_path)
+    assert pictures(path) == 1
+    assert path.stat().st_size < 200_000
