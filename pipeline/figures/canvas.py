@@ -224,10 +224,24 @@ def _marked(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False)
             "linewidths": 0.6 if small else 0.9,
             "zorder": 3,
         }
-        axes.scatter(targets[:, 0], targets[:, 1], s=size, label=f"targets (n = {len(targets)})", **ring, **many)
+        axes.scatter(
+            targets[:, 0],
+            targets[:, 1],
+            s=size,
+            label="targets" if small else f"targets (n = {len(targets)})",
+            **ring,
+            **many,
+        )
     if len(chosen):
         cross: dict[str, Any] = {"marker": "x", "color": BLACK, "linewidths": 0.5 if small else 0.9, "zorder": 4}
-        axes.scatter(chosen[:, 0], chosen[:, 1], s=size / 2.5, label=f"selections (n = {len(chosen)})", **cross, **many)
+        axes.scatter(
+            chosen[:, 0],
+            chosen[:, 1],
+            s=size / 2.5,
+            label="selections" if small else f"selections (n = {len(chosen)})",
+            **cross,
+            **many,
+        )
 
 
 def _extent(parts: Sequence[FloatArray]) -> tuple[float, float]:

@@ -100,6 +100,7 @@ def test_every_participant_has_a_panel_and_the_widest_way_is_named(session: Any,
     figure = figures.paths(both, positions, events, sessions, {"a": "fusion"})
     shown = texts(figure, tmp_path)
     assert {"P1", "P2", "a: fusion", "x (mm)", "y (mm)"} <= set(shown)
+    assert not [text for text in shown if "n = " in text]  # a panel's number is not the figure's
     assert pictures(tmp_path / "figure.svg") == 2  # thousands of rows
     said = captions.paths(both, positions, events, sessions, {"a": "fusion"}).caption
     assert "2 participants" in said
