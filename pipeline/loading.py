@@ -23,8 +23,8 @@ from pipeline.study import Session, Study
 STAGE_OF: Mapping[str, str] = {
     **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),
     "tracks": "fuse",
-    "noise_residuals": "assess",
-    **dict.fromkeys(("observations", "orders"), "measure"),
+    **dict.fromkeys(("noise_residuals", "excerpts", "lead_curves", "stream_rates"), "assess"),
+    **dict.fromkeys(("observations", "orders", "selections"), "measure"),
     **dict.fromkeys(
         (
             "descriptives",
@@ -36,6 +36,7 @@ STAGE_OF: Mapping[str, str] = {
             "trials",
             "accuracy",
             "accuracy_means",
+            "calibration",
             "shown_at_selection",
             "replay_agreement",
             "sensor_noise",

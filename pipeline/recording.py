@@ -236,6 +236,12 @@ def _instants(study: Study, imu: pd.DataFrame, positions: pd.DataFrame, origin_n
     return times
 
 
+def in_session_s(loaded: Recording, rows: pd.DataFrame) -> FloatArray:
+    """The times of a table's rows in seconds since the session's first message."""
+    since: FloatArray = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
+    return since
+
+
 def seeded(*names: str) -> np.random.Generator:
     """Random numbers that depend on names alone, so that a result does not depend on order or on other sessions."""
     digest = hashlib.sha256("\x1f".join(names).encode()).digest()

@@ -214,6 +214,35 @@ TABLES: Mapping[str, pa.Schema] = {
         ("stated_sd", _FLOAT),
     ),
     "noise_residuals": _schema(("session", _TEXT), ("stream", _TEXT), ("axis", _TEXT), ("residual", _FLOAT)),
+    "excerpts": _schema(  # value and sd in mm, of kind acceleration in mm/s²
+        ("session", _TEXT),
+        ("axis", _TEXT),
+        ("kind", _TEXT),  # tracker (by arrival), reference, acceleration, estimate
+        ("name", _TEXT),  # of the stream or the estimator
+        ("time_s", _FLOAT),  # since the session's first message
+        ("value", _FLOAT),
+        ("sd", _FLOAT),
+    ),
+    "lead_curves": _schema(("session", _TEXT), ("estimator", _TEXT), ("lead_s", _FLOAT), ("correlation_mm2", _FLOAT)),
+    "calibration": _schema(  # how many (instant, axis) of n have an error within so many hundredths of the stated SD
+        ("session", _TEXT), ("estimator", _TEXT), ("percent_of_sd", _COUNT), ("within", _COUNT), ("n", _COUNT)
+    ),
+    "stream_rates": _schema(  # what arrived from time_ns on; gap_max_s: the longest silence to end then
+        ("session", _TEXT),
+        ("stream", _TEXT),
+        ("time_ns", _TIME),
+        ("duration_s", _FLOAT),
+        ("messages", _COUNT),
+        ("gap_max_s", _FLOAT),
+    ),
+    "selections": _schema(
+        ("participant", _TEXT),
+        ("condition", _TEXT),
+        ("session", _TEXT),
+        ("trial", _COUNT),
+        *[(f"target_{axis}_mm", _FLOAT) for axis in "xyz"],
+        *_POSITION,
+    ),
     "shown_at_selection": _schema(("condition", _TEXT), ("estimator", _TEXT), ("n", _COUNT), ("rmse_mm", _FLOAT)),
     "replay_trials": _schema(
         ("study", _TEXT),

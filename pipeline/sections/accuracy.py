@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
 import pandas as pd
 
-from fusion_core import FloatArray, Samples, accuracy
-from pipeline import figures, recording, tables
+from pipeline import figures, tables
 from pipeline.document.model import Block, Paragraph, Section, Strong, Table, columns
-from pipeline.figures import View
-from pipeline.recording import SMOOTHED, Recording
+from pipeline.figures import captions
+from pipeline.recording import SMOOTHED
 from pipeline.sections.material import Material, Row
 from pipeline.wording import NOTHING, counted, number, percent, seconds
 
-_VIEW_S = 4.0  # long enough for a reach, short enough to see single frames
 _ROWS_MAX = 120
 
 
@@ -36,7 +30,7 @@ def section(material: Material) -> Section | None:
         if any(row["reference"] == SMOOTHED for row in rows):
             blocks.append(Paragraph((Strong("No reference was recorded."), SMOOTHED_REMARK)))
         blocks.append(_summary_table(material, rows))
-        blocks.append(_error_figure(material, pd.DataFrame(rows)))
+        blocks += _over_sessions(material, tables.frame("accuracy", rows))
     else:
         blocks.append(Paragraph(("The logs hold no reference position, so errors cannot be given.",)))
     blocks += _session_figures(material)
@@ -131,121 +125,26 @@ def _session_table(rows: list[Row]) -> Table:
     )
 
 
-def _error_figure(material: Material, rows: pd.DataFrame) -> Block:
-    n = rows["session"].nunique()
-    best = rows.groupby("estimator")["rmse_mm"].mean().idxmin()
-    return material.figure(
-        "accuracy",
-        figures.errors,
-        f"Error (left) and lag (right) of each estimator, a small mark a session (n = {n}), the large one their mean. "
-        "An estimator that helps sits to the left in both.",
-        f"Dot plot of RMSE and lag by estimator over {n} sessions; {best} has the lowest mean RMSE.",
-        rows,
-    )
+def _over_sessions(material: Material, rows: pd.DataFrame) -> list[Block]:
+    """Error and lag by estimator, one against the other, and the stated SD against what happened."""
+    blocks: list[Block] = [material.drawn("accuracy", figures.errors, captions.errors, rows)]
+    if rows["lag_s"].notna().any():
+        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, captions.lag_and_error, rows))
+    counts = material.table("calibration")
+    if len(counts):
+        blocks.append(material.drawn("calibration", figures.calibration, captions.calibration, counts))
+    return blocks
 
 
 def _session_figures(material: Material) -> list[Block]:
     """The paper's figures for one session: the first that can be used."""
-    session = material.sessions[0]
-    loaded = recording.load(material.study, material.ingested[0])
-    tracks = tables.read("tracks", material.fused[0])
-    if tracks.empty or not loaded.samples:
-        return []
-    view = _view(material, loaded, tracks)
-    span = f"session {session.id}, axis {view.axis}, the {_VIEW_S:g} s with most movement"
-    blocks: list[Block] = [
-        material.figure(
-            "streams",
-            figures.streams,
-            f"What the sensors delivered ({span}). The tracker's frames are noisy and come late; the accelerations are "
-            "prompt.",
-            f"Tracker positions over time with the reference, and accelerations below, for {span}.",
-            view,
-        )
-    ]
-    if view.tracks:
-        blocks.append(
-            material.figure(
-                "estimates",
-                figures.estimates,
-                f"What each estimator makes of them ({span}): its mean and two stated SDs, and beside it its error in"
-                " the band it states. Look whether it runs behind the reference, how much it trembles, and whether the"
-                " error stays in the band.",
-                f"One panel an estimator ({', '.join(view.tracks)}) with mean, band, reference and tracker frames.",
-                view,
-            )
-        )
-    return blocks + _lead_figure(material, loaded, tracks, session.id)
-
-
-def _view(material: Material, loaded: Recording, tracks: pd.DataFrame) -> View:
-    """The stretch and axis with the largest movement of the tracker."""
-    study = material.study
-    tracker = loaded.samples[study.stream_of_kind("position") or next(iter(loaded.samples))]
-    axis, begin = _liveliest(tracker)
-    end = begin + _VIEW_S
-
-    def cut(time: FloatArray, *values: FloatArray) -> tuple[FloatArray, ...]:
-        inside = (time >= begin) & (time <= end)
-        return tuple(array[inside] for array in (time, *values))
-
-    accelerations = study.stream_of_kind("acceleration")
-    felt = loaded.samples.get(accelerations) if accelerations else None
-    shown: dict[str, Any] = {}
-    letter = study.axes[axis]
-    for name, rows in tracks.groupby("estimator", sort=False):
-        time = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
-        mean, sd = (rows[column].to_numpy(np.float64) for column in (f"{letter}_mm", f"sd_{letter}_mm"))
-        part = cut(time, mean, sd)
-        if study.estimators[str(name)].type != "raw" and len(part[0]):
-            shown[str(name)] = part
-    pair: Mapping[str, Any] = {
-        "reference": None if loaded.reference is None else cut(loaded.reference.time, loaded.reference.value[:, axis]),
-        "accelerations": None if felt is None or len(felt) == 0 else cut(felt.time, felt.value[:, axis]),
-    }
-    frames = cut(tracker.arrival, tracker.value[:, axis])
-    return View(letter, (frames[0], frames[1]), tracks=shown, **pair)
-
-
-def _liveliest(tracker: Samples) -> tuple[int, float]:
-    """Axis, and beginning of the stretch, in which the tracker covers most ground."""
-    best = (-1.0, 0, float(tracker.arrival[0]))
-    for begin in np.arange(tracker.arrival[0], max(tracker.arrival[-1] - _VIEW_S, tracker.arrival[0]) + 1e-9, 0.5):
-        inside = (tracker.arrival >= begin) & (tracker.arrival <= begin + _VIEW_S)
-        if inside.sum() < 2:
-            continue
-        ranges = np.ptp(tracker.value[inside], axis=0)
-        axis = int(np.argmax(ranges))
-        if ranges[axis] > best[0]:
-            best = (float(ranges[axis]), axis, float(begin))
-    return best[1], best[2]
-
-
-def _lead_figure(material: Material, loaded: Recording, tracks: pd.DataFrame, session: str) -> list[Block]:
-    name = material.study.stream_of_kind("position")
-    if name is None:
-        return []
-    curves, peaks = {}, {}
-    for estimator, rows in tracks.groupby("estimator", sort=False):
-        time = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
-        settled = time >= loaded.samples[name].arrival[0] + 1.0
-        mean = rows[[f"{axis}_mm" for axis in material.study.axes]].to_numpy(np.float64)
-        curve = accuracy.lead_curve(time[settled], mean[settled], loaded.samples[name])
-        if curve is not None and np.max(np.abs(curve[1])) > 0:
-            curves[str(estimator)] = curve
-            peaks[str(estimator)] = accuracy.lead_by_cross_correlation(
-                time[settled], mean[settled], loaded.samples[name]
-            )
-    if not curves:
-        return []
-    return [
-        material.figure(
-            "lead",
-            figures.lead,
-            f"How far each estimator is ahead of the tracker as it arrived, by the paper's method (session {session}): "
-            "the marks are the peaks. Flat tops make the peak fragile; the lag above does not rest on it.",
-            f"Cross-correlation curves of {', '.join(curves)} with the tracker, peaks marked.",
-            curves,
-            peaks,
-        )
-    ]
+    folder = material.assessed[(material.used() or [0])[0]]
+    excerpts, curves = (tables.read(name, folder) for name in ("excerpts", "lead_curves"))
+    blocks: list[Block] = []
+    if len(excerpts):
+        blocks.append(material.drawn("streams", figures.streams, captions.streams, excerpts))
+    if (excerpts["kind"] == "estimate").any():
+        blocks.append(material.drawn("estimates", figures.estimates, captions.estimates, excerpts))
+    if len(curves):
+        blocks.append(material.drawn("lead", figures.lead, captions.lead, curves))
+    return blocks

@@ -13,6 +13,7 @@ import pandas as pd
 
 from pipeline import figures, tables
 from pipeline.document.model import Figure
+from pipeline.figures import captions
 from pipeline.study import Session, Study
 from pipeline.wording import listing
 
@@ -29,7 +30,10 @@ ORIGINS = {
 
 @dataclass(frozen=True)
 class Material:
-    """A study's settings, results and tables. `ingested` and `fused` are a folder a session, in their order."""
+    """A study's settings, results and tables. `ingested` and `fused` are a folder a session, in their order.
+
+    `whole` are the folders with tables of the whole study.
+    """
 
     name: str
     study: Study
@@ -41,10 +45,19 @@ class Material:
     assessed: tuple[Path, ...]
     figures: Path
     inputs: Mapping[str, str]
+    whole: tuple[Path, ...]
 
     def rows(self, table: str) -> list[Row]:
         """The rows of a table of results.json."""
         return list(self.results[table])
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the whole study."""
+        return tables.read(name, [folder for folder in self.whole if (folder / f"{name}.parquet").is_file()][:1])
+
+    def used(self) -> list[int]:
+        """The places, in `sessions`, of those that are not excluded as a whole."""
+        return [place for place, session in enumerate(self.sessions) if not self.study.exclusion_of(session)]
 
     def comparisons_of(self, measure: str) -> list[Row]:
         """The comparisons of one measure."""
@@ -70,6 +83,18 @@ class Material:
         figures.draw(function, self.figures / f"{name}.svg", *arguments)
         return Figure(f"figure-{name}", f"{name}.svg", caption, alt)
 
+    def drawn(
+        self,
+        name: str,
+        function: Callable[..., matplotlib.figure.Figure],
+        said: Callable[..., captions.Said],
+        *arguments: Any,
+        more: str = "",
+    ) -> Figure:
+        """A figure with what its caption function says of the same arguments, and more, such as what is left out."""
+        caption, alt = said(*arguments)
+        return self.figure(name, function, f"{caption}{more}", alt, *arguments)
+
 
 def safe_name(text: str) -> str:
     """A name fit for a file, different for different texts: letters, digits and dashes."""
@@ -77,6 +102,11 @@ def safe_name(text: str) -> str:
     if plain == text.replace("_", "-").replace("/", "-") and len(plain) <= _NAME_LENGTH:
         return plain
     return f"{plain[:_NAME_LENGTH]}-{hashlib.sha256(text.encode()).hexdigest()[:6]}".lstrip("-")
+
+
+def first_of(shown: int, there: int, what: str) -> str:
+    """That a figure shows the first of many, or nothing where it shows all."""
+    return f" The first {shown} of {there} {what}." if there > shown else ""
 
 
 def conditions_text(conditions: Sequence[str]) -> str:

@@ -7,17 +7,17 @@ from itertools import groupby
 
 from pipeline import figures
 from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
-from pipeline.sections.material import Material, Row, safe_name
+from pipeline.figures import captions
+from pipeline.figures.canvas import offsets_mm
+from pipeline.sections.material import Material, Row, first_of, safe_name
 from pipeline.wording import (
     TESTS,
     adjustment,
     comparison_sentence,
     contrast,
-    counted,
     effect_size,
     evidence,
     interval,
-    listing,
     measure_label,
     number,
     p_value,
@@ -27,6 +27,7 @@ from pipeline.wording import (
 
 _SELECTION = ("selection_mse_px2", "selection_mse_mm2", "selection_rmse_px", "selection_rmse_mm")
 _TIME = ("completion_time_s", "trial_time_s")
+_PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
 
 
 def selection(material: Material) -> Section | None:
@@ -39,8 +40,9 @@ def selection(material: Material) -> Section | None:
         "How far from the target people selected. MSE is a participant's mean squared distance over trials; RMSE is the"
         " square root of the mean of the participants' MSEs, in the unit of the display."
     )
-    blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-selection", names)]
+    blocks: list[Block] = [Paragraph((text,)), *_task(material), _descriptives(material, "table-selection", names)]
     blocks += _measured(material, drawn)
+    blocks += _selected(material)
     if material.rows("shown_at_selection"):
         blocks.append(_shown(material))
     return Section("selection", "Target selection", tuple(blocks))
@@ -108,27 +110,39 @@ def _measured(material: Material, measure: str) -> list[Block]:
     wide = material.participant_means(measure)
     if not wide.notna().any().any():
         return []
-    label, conditions = measure_label(measure), list(material.study.conditions)
-    complete = len(wide.dropna())
-    reading = (
-        "Small marks are participants, lines join the same one; large marks are means with 95 % intervals."
-        if len(conditions) > 1
-        else "Small marks are participants; the large one is their mean with its 95 % interval."
-    )
-    if len(conditions) == 2:
-        reading += " Right: each participant's difference; an interval that leaves out zero speaks for a real one."
+    label = measure_label(measure)
     blocks: list[Block] = [
-        material.figure(
-            f"measure-{safe_name(measure)}",
-            figures.paired,
-            f"{label} by condition, {counted(complete, 'participant')} complete. {reading}",
-            f"{label}: values of each participant under {listing(conditions)}, with means and intervals.",
-            wide,
-            measure,
-        )
+        material.drawn(f"measure-{safe_name(measure)}", figures.paired, captions.paired, wide, measure)
     ]
     for sentence in _sentences(material.comparisons_of(measure)):
         blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
+    return blocks
+
+
+def _task(material: Material) -> list[Block]:
+    """The layout of the task, where study.yaml has one."""
+    task = getattr(material.study, "task", None)
+    return [] if task is None else [material.drawn("task", figures.task_layout, captions.task_layout, task)]
+
+
+def _selected(material: Material) -> list[Block]:
+    """Where selections fell about their targets, and each participant's errors trial by trial."""
+    study, selections, trials = material.study, material.table("selections"), material.table("trials")
+    blocks: list[Block] = []
+    if len(study.axes) > 1:
+        plane = (study.axes[0], study.axes[1])
+        scale = study.display.px_per_mm if study.display is not None and study.display.unit == "px" else None
+        if len(offsets_mm(selections, plane)):
+            shown = (selections, study.conditions, plane, scale)
+            blocks.append(
+                material.drawn("selection-errors", figures.selection_errors, captions.selection_errors, *shown)
+            )
+    several = trials.groupby(["participant", "condition"])["trial"].nunique().max() if len(trials) else 0
+    people = sorted(set(trials["participant"]))
+    if several > 1:
+        some = trials[trials["participant"].isin(people[:_PEOPLE_MAX])]
+        more = first_of(_PEOPLE_MAX, len(people), "participants")
+        blocks.append(material.drawn("trials", figures.trials, captions.trials, some, study.conditions, more=more))
     return blocks
 
 
@@ -152,23 +166,13 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
     scales = [name for name in names if not name.endswith("/total")]
     title = measure_label(f"{questionnaire}/x").partition(":")[0]
     wide = {name: material.participant_means(name) for name in scales}
-    conditions = list(material.study.conditions)
-    n = max(len(table.dropna()) for table in wide.values())
     blocks: list[Block] = [_ratings_table(material, questionnaire, title, names)]
     tested = [row for name in names for row in material.comparisons_of(name)]
     if tested:
         blocks.append(_tests_table(questionnaire, title, tested))
-    blocks.append(
-        material.figure(
-            f"ratings-{safe_name(questionnaire)}",
-            figures.workload,
-            f"{title} ratings by scale and condition (n = {n}): boxes hold the middle half of the participants, the"
-            " thick line is the median, marks are participants. Compare boxes of the same scale.",
-            f"Box plots of the {title} scales {listing([short_label(name) for name in scales])} for"
-            f" {listing(conditions)}.",
-            wide,
-        )
-    )
+    called = f"ratings-{safe_name(questionnaire)}"
+    blocks.append(material.drawn(called, figures.workload, captions.workload, wide))
+    blocks.append(material.drawn(f"{called}-people", figures.scales, captions.scales, wide))
     return blocks
 
 

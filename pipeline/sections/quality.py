@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 
-from fusion_core import FloatArray
 from pipeline import figures, session_quality, tables
 from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
+from pipeline.figures import captions
+from pipeline.sections import timeline
 from pipeline.sections.material import Material, Row
 from pipeline.sections.without_exclusions import without_exclusions
 from pipeline.session_quality import FACTS, LIGHTS, SYMBOLS, Judged, light_of
@@ -24,6 +24,7 @@ def section(material: Material) -> Section:
     if material.rows("quality"):
         blocks += _lights(material)
         blocks.append(_quality_table(material))
+        blocks += timeline.blocks(material)
         if material.rows("sensor_noise"):
             blocks += _noise(material)
         elif material.rows("accuracy"):
@@ -190,8 +191,7 @@ def _noise(material: Material) -> list[Block]:
     """The sensors' noise in still stretches, against what study.yaml states."""
     rows = pd.DataFrame(material.rows("sensor_noise"))
     names = [name for name in material.study.streams if name in set(rows["stream"])]
-    units = [str(rows.loc[rows["stream"] == name, "unit"].iloc[0]) for name in names]
-    values = _residuals(material, names)
+    units = pd.Series({name: str(rows.loc[rows["stream"] == name, "unit"].iloc[0]) for name in names})
     cells = tuple(
         (
             row["session"],
@@ -214,17 +214,7 @@ def _noise(material: Material) -> list[Block]:
         "SD in study.yaml",
     )
     return [
-        material.figure(
-            "sensor-noise",
-            figures.noise,
-            "Readings in still stretches, slow drift taken off, with the Gaussian of the same SD. The estimators take "
-            "the noise to be Gaussian: look whether the bars follow the curve. A hand is never quite still, so this is "
-            "an upper bound of the sensor's own noise.",
-            "; ".join(f"Histogram for {name} with a Gaussian curve" for name in names) + ".",
-            values,
-            units,
-            names,
-        ),
+        material.drawn("sensor-noise", figures.noise, captions.noise, _residuals(material, names), units),
         Table(
             "table-noise",
             "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",
@@ -235,13 +225,13 @@ def _noise(material: Material) -> list[Block]:
     ]
 
 
-def _residuals(material: Material, names: Sequence[str]) -> list[FloatArray]:
-    """Each stream's residuals of all sessions, in mm, mm/s or mm/s²; session by session, for there may be millions."""
-    found: dict[str, list[FloatArray]] = {name: [] for name in names}
+def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:
+    """Every session's residuals by stream; session by session, and names as numbers, for there may be millions."""
+    parts = []
     for folder in material.assessed:
-        for name, rows in tables.read("noise_residuals", folder).groupby("stream"):
-            found[str(name)].append(rows["residual"].to_numpy(np.float64))
-    return [np.concatenate(parts) for parts in found.values()]
+        rows = tables.read("noise_residuals", folder)[["stream", "residual"]]
+        parts.append(rows.assign(stream=rows["stream"].astype(pd.CategoricalDtype(list(names)))))
+    return pd.concat(parts)
 
 
 def _agreement_table(material: Material) -> Table:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from fusion_core import FloatArray, Samples, accuracy, noise
-from pipeline import recording, tables
+from pipeline import excerpts, recording, tables
 from pipeline.estimators import sensors
 from pipeline.phone import described
 from pipeline.recording import Recording
@@ -19,11 +19,12 @@ from pipeline.trials import selections_by_trial
 
 _UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}
 _SETTLED_S = 1.0  # after the first frame's arrival: the grid of accuracy begins there
+_PERCENT_OF_SD = (*range(25, 200, 25), 196, *range(200, 401, 50))  # at which errors are counted
 Row = dict[str, Any]
 
 
 def run(work: Work) -> Outcome:
-    """One session's accuracy, replay_agreement, sensor_noise, noise_residuals and trials."""
+    """One session's accuracy, agreement, noise, trials and selections, and what figures of it show."""
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
@@ -39,8 +40,14 @@ def run(work: Work) -> Outcome:
     measured, residuals = _noise(study, session.id, loaded)
     tables.write("sensor_noise", tables.frame("sensor_noise", measured), work.out)
     tables.write("noise_residuals", residuals, work.out)
-    trials = list(trial_rows(work, tables.read("events", ingested), tracks))
-    tables.write("trials", tables.frame("trials", trials), work.out)
+    events = tables.read("events", ingested)
+    tables.write("trials", tables.frame("trials", trial_rows(work, events, tracks)), work.out)
+    tables.write("selections", tables.frame("selections", selection_rows(work, events)), work.out)
+    counted = calibration_rows(study, session.id, loaded, reference, tracks)
+    tables.write("calibration", tables.frame("calibration", counted), work.out)
+    tables.write("excerpts", excerpts.excerpt(study, session.id, loaded, tracks), work.out)
+    tables.write("lead_curves", excerpts.lead_curves(study, session.id, loaded, tracks), work.out)
+    tables.write("stream_rates", tables.frame("stream_rates", excerpts.rates(ingested)), work.out)
     return Outcome()
 
 
@@ -54,16 +61,11 @@ def accuracy_row(
 ) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
     study, tracker = work.study, work.study.tracker
-    if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
+    found = _on_grid(study, loaded, named, rows)
+    if named is None or tracker is None or found is None:
         return None
     name, reference = named
-    time = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
-    truth = accuracy.interpolate(reference, time)
-    on_grid = (time >= loaded.samples[tracker].arrival[0] + _SETTLED_S) & np.isfinite(truth).all(axis=1)
-    if not on_grid.any():
-        return None
-    mean, sd = _mean_and_sd(rows, study.axes)
-    time, mean, sd, truth = time[on_grid], mean[on_grid], sd[on_grid], truth[on_grid]
+    time, mean, sd, truth = found
     random = recording.seeded(work.session.id, estimator)
     lag = accuracy.lag(time, mean, reference, random)
     return {
@@ -80,6 +82,59 @@ def accuracy_row(
         "lead_xcorr_s": accuracy.lead_by_cross_correlation(time, mean, loaded.samples[tracker]),
         "jitter_mm": accuracy.jitter(time, mean, reference),
     }
+
+
+def _on_grid(
+    study: Study, loaded: Recording, named: tuple[str, Samples] | None, rows: pd.DataFrame
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Time in s, mean, stated SD and reference (n, d) on the grid of accuracy; None where there is none."""
+    tracker = study.tracker
+    if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
+        return None
+    time = recording.in_session_s(loaded, rows)
+    truth = accuracy.interpolate(named[1], time)
+    on_grid = (time >= loaded.samples[tracker].arrival[0] + _SETTLED_S) & np.isfinite(truth).all(axis=1)
+    if not on_grid.any():
+        return None
+    mean, sd = _mean_and_sd(rows, study.axes)
+    return time[on_grid], mean[on_grid], sd[on_grid], truth[on_grid]
+
+
+def calibration_rows(
+    study: Study,
+    session: str,
+    loaded: Recording,
+    reference: tuple[str, Samples] | None,
+    tracks: dict[str, pd.DataFrame],
+) -> Iterator[Row]:
+    """How many errors are within k stated SDs, on the grid of accuracy; nothing for one that states no SD."""
+    for name, rows in tracks.items():
+        found = _on_grid(study, loaded, reference, rows)
+        if found is None:
+            continue
+        _, mean, sd, truth = found
+        error, known = np.abs(mean - truth), sd > 0
+        for percent in _PERCENT_OF_SD if known.any() else ():
+            within = int(np.sum(error[known] <= percent / 100 * sd[known]))
+            yield {
+                "session": session,
+                "estimator": name,
+                "percent_of_sd": percent,
+                "within": within,
+                "n": int(known.sum()),
+            }
+
+
+def selection_rows(work: Work, events: pd.DataFrame) -> Iterator[Row]:
+    """The first selection of each trial, with its target as the selection or, failing that, the start has it."""
+    for start, selection in _trials(events):
+        if selection is not None:
+            yield {
+                **work.session.ids,
+                "trial": start.trial,
+                **{f"target_{axis}_mm": value for axis, value in _target(start, selection).items()},
+                **{f"{axis}_mm": _first(selection[f"{axis}_mm"]) for axis in "xyz"},
+            }
 
 
 def _agreement(work: Work, loaded: Recording) -> list[Row]:
@@ -133,23 +188,38 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
     return noise.still_by_acceleration(samples) if samples is not None else None
 
 
-def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
-    """Each trial as recorded, and what each estimator would have shown when the participant selected."""
+class _Start(NamedTuple):
+    """A trial's start: the number the trial goes by, and the event."""
+
+    trial: int
+    event: Any
+
+
+def _trials(events: pd.DataFrame) -> Iterator[tuple[_Start, pd.Series | None]]:
+    """Each trial with its first selection."""
     starts, selections = selections_by_trial(events)
     start: Any
     for index, start in enumerate(starts.itertuples()):
         after = selections[selections["start"] == index]
-        trial = {
-            **work.session.ids,
-            "trial": index + 1 if pd.isna(start.trial) else int(start.trial),
-        }
-        if after.empty:
+        named = _Start(index + 1 if pd.isna(start.trial) else int(start.trial), start)
+        yield named, None if after.empty else after.iloc[0]
+
+
+def _target(start: _Start, selection: pd.Series) -> dict[str, float | None]:
+    """Where the target was, in mm, by axis."""
+    return {axis: _first(selection[f"target_{axis}_mm"], getattr(start.event, f"target_{axis}_mm")) for axis in "xyz"}
+
+
+def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
+    """Each trial as recorded, and what each estimator would have shown when the participant selected."""
+    for start, selection in _trials(events):
+        trial = {**work.session.ids, "trial": start.trial}
+        if selection is None:
             yield trial | {"estimator": "recorded"}
             continue
-        selection = after.iloc[0]
-        target = {axis: _first(selection[f"target_{axis}_mm"], getattr(start, f"target_{axis}_mm")) for axis in "xyz"}
+        target = _target(start, selection)
         axes = [axis for axis in "xyz" if target[axis] is not None]
-        duration_s = float(selection["time_ns"] - start.time_ns) * tables.NANOSECONDS
+        duration_s = float(selection["time_ns"] - start.event.time_ns) * tables.NANOSECONDS
         shown: dict[str, pd.Series] = {"recorded": selection}
         for name, rows in tracks.items():
             before = rows[rows["time_ns"] <= selection["time_ns"]]

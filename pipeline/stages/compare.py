@@ -24,7 +24,7 @@ from pipeline.study import Study
 from pipeline.wording import measure_order
 
 Row = dict[str, Any]
-_SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones")
+_SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones", "calibration")
 
 
 def run(work: Work) -> Outcome:

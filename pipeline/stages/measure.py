@@ -26,7 +26,7 @@ def run(work: Work) -> Outcome:
     """The study's trials, measures and exclusions; PipelineError for a bad table."""
     study = work.study
     exclusions: list[Row] = []
-    trials = _trials(work)
+    trials, selections = _trials(work)
     tabled = _measures_table(work)
     values = pd.concat(
         [
@@ -43,6 +43,7 @@ def run(work: Work) -> Outcome:
         values = values[~_matches(excluded, values)]
         if excluded.measure is None:
             trials = trials[~_matches(excluded, trials)]
+            selections = selections[~_matches(excluded, selections)]
         exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
     exclusions += _incomplete_trials(trials)
     values = _finite(values, exclusions)
@@ -57,6 +58,7 @@ def run(work: Work) -> Outcome:
         _write_values(whole, counted, orders.placed(unfiltered, run, sequences), work.out / ALL_DATA)
     tables.write("orders", run, work.out)
     tables.write("trials", trials, work.out)
+    tables.write("selections", selections, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
 
@@ -73,12 +75,12 @@ def _path(work: Work, field: str) -> Any:
     return None if name is None else work.folder / name
 
 
-def _trials(work: Work) -> pd.DataFrame:
-    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown."""
+def _trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown; selections."""
     trials = tables.read("trials", work.entries["assess"])
     path = _path(work, "trials")
     if path is None:
-        return trials
+        return trials, tables.read("selections", work.entries["assess"])
     if len(trials):
         raise PipelineError(
             f"{path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:` out of "
@@ -99,7 +101,11 @@ def _trials(work: Work) -> pd.DataFrame:
         position_error_mm=np.sqrt(squared),
         duration_s=duration_s.where(duration_s >= 0),
     )
-    return tables.as_table("trials", tabled)
+    targets = table[["trial", *CELL, *(f"target_{axis}_mm" for axis in "xyz")]]
+    selected = targets.assign(
+        session=tabled["session"], **{f"{axis}_mm": table[f"selected_{axis}_mm"] for axis in "xyz"}
+    )
+    return tables.as_table("trials", tabled), tables.as_table("selections", selected)
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:

@@ -22,6 +22,7 @@ _FROM_COMPARE = (
     "sensor_noise",
     "phones",
     "accuracy_means",
+    "calibration",
     "shown_at_selection",
     "quality",
     "exclusions",
@@ -39,6 +40,7 @@ def run(work: Work) -> Outcome:
         (work.out / folder).mkdir()
     for name in _FROM_COMPARE:
         _write_csv(name, tables.read(name, compared), work)
+    _write_csv("selections", tables.read("selections", work.entry("measure")), work)
     material = Material(
         work.study_name,
         work.study,
@@ -50,6 +52,7 @@ def run(work: Work) -> Outcome:
         work.entries["assess"],
         work.out / "figures",
         work.inputs,
+        (compared, work.entry("measure")),
     )
     sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
     sections += glossary.of(sections)

@@ -1,0 +1,116 @@
+"""What figures of one session show: its liveliest seconds, how far estimators are ahead, and what arrived when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from fusion_core import FloatArray, Samples, accuracy
+from pipeline import tables
+from pipeline.recording import Recording, in_session_s
+from pipeline.study import Study
+
+EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
+_SETTLED_S = 1.0
+_STRETCHES = 120  # of a session at the most
+_STRETCH_NS = 1_000_000_000  # at the least
+
+
+def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The table `excerpts`: the stretch and axis in which the tracker moves most; `raw` is the tracker once more."""
+    name = study.stream_of_kind("position")
+    if name is None or len(loaded.samples[name]) == 0:
+        return tables.frame("excerpts", [])
+    tracker = loaded.samples[name]
+    axis, begin = _liveliest(tracker)
+    letter = study.axes_of(name)[axis]
+    parts = [_cut(begin, "tracker", name, tracker.arrival, tracker.value[:, axis])]
+    if loaded.reference is not None:
+        of_reference = study.stream_of_kind("reference") or "reference"
+        column = study.axes.index(letter)
+        parts.append(_cut(begin, "reference", of_reference, loaded.reference.time, loaded.reference.value[:, column]))
+    felt = study.stream_of_kind("acceleration")
+    if felt is not None:
+        samples = loaded.samples[felt]
+        parts.append(
+            _cut(begin, "acceleration", felt, samples.time, samples.value[:, study.axes_of(felt).index(letter)])
+        )
+    for estimator, rows in tracks.items():
+        if study.estimators[estimator].type != "raw":
+            mean, sd = (rows[column].to_numpy(np.float64) for column in (f"{letter}_mm", f"sd_{letter}_mm"))
+            parts.append(_cut(begin, "estimate", estimator, in_session_s(loaded, rows), mean, sd))
+    return tables.as_table("excerpts", pd.concat(parts).assign(session=session, axis=letter))
+
+
+def _cut(
+    begin: float, kind: str, name: str, time: FloatArray, value: FloatArray, sd: FloatArray | None = None
+) -> pd.DataFrame:
+    """What of a signal is in the stretch."""
+    inside = (time >= begin) & (time <= begin + EXCERPT_S)
+    spread = np.full(len(time), np.nan) if sd is None else sd
+    found = {"time_s": time[inside], "value": value[inside], "sd": spread[inside]}
+    return pd.DataFrame(found).assign(kind=kind, name=name)
+
+
+def _liveliest(tracker: Samples) -> tuple[int, float]:
+    """Axis, and beginning of the stretch, in which the tracker covers most ground."""
+    best = (-1.0, 0, float(tracker.arrival[0]))
+    last = max(tracker.arrival[-1] - EXCERPT_S, tracker.arrival[0])
+    for begin in np.arange(tracker.arrival[0], last + 1e-9, 0.5):
+        inside = (tracker.arrival >= begin) & (tracker.arrival <= begin + EXCERPT_S)
+        if inside.sum() < 2:
+            continue
+        ranges = np.ptp(tracker.value[inside], axis=0)
+        axis = int(np.argmax(ranges))
+        if ranges[axis] > best[0]:
+            best = (float(ranges[axis]), axis, float(begin))
+    return best[1], best[2]
+
+
+def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The table `lead_curves`: each estimator's cross-correlation with the tracker, within half a second."""
+    name = study.tracker
+    parts = [tables.frame("lead_curves", [])]
+    if name is None or len(loaded.samples[name]) == 0:
+        return parts[0]
+    tracker = loaded.samples[name]
+    for estimator, rows in tracks.items():
+        time = in_session_s(loaded, rows)
+        settled = time >= tracker.arrival[0] + _SETTLED_S
+        mean = rows[[f"{axis}_mm" for axis in study.axes]].to_numpy(np.float64)
+        curve = accuracy.lead_curve(time[settled], mean[settled], tracker)
+        if curve is None or not np.max(np.abs(curve[1])) > 0:
+            continue
+        near = np.abs(curve[0]) <= accuracy.LAG_RANGE_S
+        part = pd.DataFrame({"lead_s": curve[0][near], "correlation_mm2": curve[1][near]})
+        parts.append(tables.as_table("lead_curves", part.assign(session=session, estimator=estimator)))
+    return parts[0] if len(parts) == 1 else pd.concat(parts[1:])
+
+
+def rates(ingested: Path) -> Iterator[dict[str, Any]]:
+    """Rows of `stream_rates`: what arrived of each stream, stretch by stretch, over the whole session."""
+    columns = ["session", "stream", "arrival_ns"]
+    arrived = pd.concat([tables.read(name, ingested)[columns] for name in ("positions", "readings", "imu")])
+    if arrived.empty:
+        return
+    first, last = int(arrived["arrival_ns"].min()), int(arrived["arrival_ns"].max())
+    count = int(np.clip((last - first) // _STRETCH_NS, 1, _STRETCHES))
+    edges = first + (last + 1 - first) * np.arange(count + 1) // count
+    for (session, stream), rows in arrived.groupby(["session", "stream"], sort=False):
+        arrival = np.sort(rows["arrival_ns"].to_numpy(np.int64))
+        stretch = np.searchsorted(edges, arrival, side="right") - 1
+        silence = np.zeros(count)
+        np.maximum.at(silence, stretch, np.diff(arrival, prepend=first) * tables.NANOSECONDS)
+        for index, messages in enumerate(np.bincount(stretch, minlength=count)):
+            yield {
+                "session": session,
+                "stream": stream,
+                "time_ns": int(edges[index]),
+                "duration_s": float(edges[index + 1] - edges[index]) * tables.NANOSECONDS,
+                "messages": int(messages),
+                "gap_max_s": float(silence[index]),
+            }

@@ -1,0 +1,102 @@
+"""Error, lag, their trade-off and calibration: means over sessions, shares over instants."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.collections import LineCollection
+from scipy import stats
+
+from pipeline import figures, tables
+from pipeline.figures import captions
+from pipeline.figures.accuracy import shares
+from tests.pipeline.figures.drawn import pictures, saved, texts
+
+
+def accuracy(**estimators: tuple[list[float], list[float]]) -> pd.DataFrame:
+    """RMSE in mm and lag in s of each session."""
+    return tables.frame(
+        "accuracy",
+        [
+            {"session": f"s{place}", "estimator": name, "rmse_mm": rmse, "lag_s": lag}
+            for name, columns in estimators.items()
+            for place, (rmse, lag) in enumerate(zip(*columns, strict=True))
+        ],
+    )
+
+
+FOUND = accuracy(raw=([30, 34], [0.11, 0.13]), good=([9, 11], [-0.002, 0.004]), quick=([20, 22], [0.0, 0.0]))
+
+
+def test_least_error_and_least_lag_are_named(tmp_path: Path) -> None:
+    shown = texts(figures.errors(FOUND), tmp_path)
+    assert {"raw", "good", "quick", "RMSE against the reference (mm)", "Lag behind the reference (ms)"} <= set(shown)
+    assert "Error (n = 2 sessions)" in shown
+    said = captions.errors(FOUND).caption
+    assert "Least RMSE: good, 10.00 mm; most: raw, 32.00 mm. Least lag: quick, 0 ms." in said
+
+
+def test_intervals_of_the_trade_off_are_over_sessions(tmp_path: Path) -> None:
+    figure = figures.lag_and_error(FOUND)
+    bars = figure.axes[0].containers[0].get_children()[-2]  # of the first estimator's RMSE
+    assert isinstance(bars, LineCollection)
+    low, high = stats.t.interval(0.95, 1, 32, stats.sem([30, 34]))
+    np.testing.assert_allclose(np.sort(np.asarray(bars.get_segments()[0])[:, 0]), [low, high])
+    assert "raw (n = 2)" in texts(figure, tmp_path)
+    assert "than good and quick" in captions.lag_and_error(FOUND).caption
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        accuracy(one=([5.0], [0.1])),
+        accuracy(one=([5.0], [np.nan])),
+        accuracy(one=([np.nan], [0.1]), two=([0.0, 0.0], [0.0, 0.0])),
+        accuracy(one=([5.0] * 3, [0.1] * 3), two=([900.0] * 3, [0.1] * 3)),
+    ],
+)
+def test_one_session_missing_and_constant_accuracy(found: pd.DataFrame, tmp_path: Path) -> None:
+    for draw, say in ((figures.errors, captions.errors), (figures.lag_and_error, captions.lag_and_error)):
+        saved(draw(found), tmp_path)
+        assert "nan" not in f"{say(found)}"
+
+
+def test_many_sessions_are_pixels(tmp_path: Path) -> None:
+    many = accuracy(one=(list(np.linspace(5, 9, 3000)), list(np.linspace(0.01, 0.05, 3000))))
+    path = saved(figures.errors(many), tmp_path)
+    assert pictures(path) > 0
+    assert path.stat().st_size < 200_000
+
+
+def counts(estimator: str, session: str, within: dict[int, int], n: int) -> list[dict[str, object]]:
+    return [
+        {"session": session, "estimator": estimator, "percent_of_sd": k, "within": count, "n": n}
+        for k, count in within.items()
+    ]
+
+
+def test_calibration_pools_instants_and_not_shares(tmp_path: Path) -> None:
+    table = tables.frame(
+        "calibration",
+        [
+            *counts("gp", "s1", {100: 90, 196: 100}, 100),
+            *counts("gp", "s2", {100: 0, 196: 500}, 900),
+            *counts("raw", "s1", {100: 50, 196: 60}, 100),
+        ],
+    )
+    k, share = shares(table[table["estimator"] == "gp"])
+    np.testing.assert_allclose(k, [1.0, 1.96])
+    np.testing.assert_allclose(share, [0.09, 0.6])
+    shown = texts(figures.calibration(table), tmp_path)
+    assert {"gp (n = 2 sessions)", "raw (n = 1 session)", "normal", "k (stated SDs)", "Within k SD (%)"} <= set(shown)
+    assert "where a normal has 95 %: gp 60 %, raw 60 %" in captions.calibration(table).caption
+
+
+def test_the_lines_of_many_sessions_are_pixels(tmp_path: Path) -> None:
+    rows = [row for n in range(1500) for row in counts("gp", f"s{n}", {100: n % 100, 196: 100}, 100)]
+    path = saved(figures.calibration(tables.frame("calibration", rows)), tmp_path)
+    assert pictures(path) == 1
+    assert path.stat().st_size < 200_000
