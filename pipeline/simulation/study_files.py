@@ -108,6 +108,8 @@ def _check(setting: Setting) -> None:
     ):
         if not wanted:
             raise PipelineError(f"{setting.where}: {field}: is missing; the simulation writes to what it names")
+    if study.repeats is not None and setting.simulation.repeats == 0:
+        raise PipelineError(f"{setting.where}: repeats: names a file, but simulation: repeats is 0; take it out")
     for published in setting.simulation.published:
         for condition in published.conditions:
             if condition not in study.conditions:

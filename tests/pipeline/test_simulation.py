@@ -279,10 +279,10 @@ def test_a_run_that_is_stopped_leaves_the_files_of_the_run_before(
     folder: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """And what is made anew with fewer people leaves none of the others behind."""
-    study = written(folder, settings(repeats=0))
+    study = written(folder, {**settings(repeats=0), "repeats": None})
     assert run(capsys, monkeypatch, "simulate", study, "--jobs", "1").code == 0
     before = {path.relative_to(study): path.read_bytes() for path in study.rglob("*") if path.is_file()}
-    (study / "study.yaml").write_text(json.dumps(settings(repeats=0, seed=99)))
+    (study / "study.yaml").write_text(json.dumps({**settings(repeats=0, seed=99), "repeats": None}))
 
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
@@ -293,7 +293,7 @@ def test_a_run_that_is_stopped_leaves_the_files_of_the_run_before(
     after = {path.relative_to(study): path.read_bytes() for path in study.rglob("*") if path.is_file()}
     assert {name for name in before if before[name] != after[name]} == {Path("study.yaml")}
     assert before.keys() == after.keys()
-    (study / "study.yaml").write_text(json.dumps(settings(repeats=0, participants=1)))
+    (study / "study.yaml").write_text(json.dumps({**settings(repeats=0, participants=1), "repeats": None}))
     assert run(capsys, monkeypatch, "simulate", study, "--if-needed", "--jobs", "1").code == 0
     assert sorted(path.name for path in (study / "data").iterdir()) == ["P01_fusion.mcap", "P01_kinect.mcap"]
 
@@ -309,6 +309,7 @@ def test_a_run_that_is_stopped_leaves_the_files_of_the_run_before(
         ),
         ({"shown": {"kinect": "kinect"}}, 'shown says nothing of "fusion"'),
         ({"axes": ["x"]}, "selection needs axes: [x, y], found ['x']"),
+        ({"simulation": settings(repeats=0)["simulation"]}, "repeats: names a file, but simulation: repeats is 0"),
         ({"participants": None}, "participants: is missing; the simulation writes to what it names"),
         ({"sessions": "data/{session}.mcap"}, "needs {participant} and {condition} for the logs' names"),
     ],
