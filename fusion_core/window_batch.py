@@ -19,7 +19,7 @@ from fusion_core.window_gains import CONSTANT, WINDOW, ZERO, Prior, covariance, 
 
 
 class Streams(NamedTuple):
-    """Positions and the other sensor's readings, by time (n,) in s, values (n, d); which sensors of a prior they are."""
+    """Positions and other readings, by time (n,) in s, values (n, d); which sensors of a prior they are."""
 
     tracker: int
     frame_time: FloatArray
@@ -204,7 +204,7 @@ def _conclude(
         if prior.mean == CONSTANT:
             total += share * _dot(of_constant, held.of_values[axis, :size])
         elif prior.mean == WINDOW:
-            total += missing * np.mean(held.centred[:positions, axis])
+            total += missing * float(np.mean(held.centred[:positions, axis]))
         mean[axis], sd[axis] = origin[axis] + total, np.sqrt(variance)
 
 

@@ -287,11 +287,14 @@ class WindowGP:
         if self._regular_names is not None:
             left = self._regular_windows(frames, others, times, spans, mean, sd)
         if len(left):
+            other = self._index[names[0]] if names else 0
             streams = window_batch.Streams(
                 self._index[self._tracker],
-                *(np.ascontiguousarray(column, dtype=np.float64) for column in (frames.time, frames.value)),
-                self._index[names[0]] if names else 0,
-                *(np.ascontiguousarray(column, dtype=np.float64) for column in (others.time, others.value)),
+                np.ascontiguousarray(frames.time, dtype=np.float64),
+                np.ascontiguousarray(frames.value, dtype=np.float64),
+                other,
+                np.ascontiguousarray(others.time, dtype=np.float64),
+                np.ascontiguousarray(others.value, dtype=np.float64),
             )
             window_batch.estimates(self._prior, streams, times, spans, left, mean, sd)
         return Track(times, mean, sd)

@@ -372,7 +372,11 @@ def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
     return pa.concat_tables(parts) if parts else TABLES[name].empty_table()
 
 
-def of_stream(table: pa.Table, stream: str) -> dict[str, np.ndarray[Any, Any]]:
+Columns = Mapping[str, np.ndarray[Any, Any]]
+"""Columns of a table by name, (n,) each."""
+
+
+def of_stream(table: pa.Table, stream: str) -> Columns:
     """The columns of one stream's rows as arrays (n,): times in ns, and figures, NaN where they are null."""
     rows = table.filter(pc.equal(table["stream"], stream))
     names = [column.name for column in table.schema if column.type != _TEXT]

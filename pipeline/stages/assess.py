@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from fusion_core import FloatArray, Samples, accuracy, noise
 from pipeline import recording, tables
 from pipeline.estimators import sensors
 from pipeline.phone import described
-from pipeline.recording import Recording
+from pipeline.recording import Recording, Shown
 from pipeline.stage import Outcome, Work
 from pipeline.study import Study
 from pipeline.trials import selections_by_trial
@@ -27,43 +28,49 @@ def run(work: Work) -> Outcome:
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
-    tracks: dict[str, pd.DataFrame] = {}
-    for name, part in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False):
-        tracks[str(name)] = part
+    tracks = _tracks(study, tables.read_arrow("tracks", work.entry("fuse")))
     reference = recording.reference(study, loaded)
     rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
-    tables.write("accuracy", tables.frame("accuracy", [row for row in rows if row]), work.out)
-    tables.write("replay_agreement", tables.frame("replay_agreement", _agreement(work, loaded)), work.out)
+    tables.write("accuracy", tables.of_rows("accuracy", [row for row in rows if row]), work.out)
+    tables.write("replay_agreement", tables.of_rows("replay_agreement", _agreement(work, loaded)), work.out)
     phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]
-    tables.write("phones", tables.frame("phones", phones), work.out)
+    tables.write("phones", tables.of_rows("phones", phones), work.out)
     measured, residuals = _noise(study, session.id, loaded)
-    tables.write("sensor_noise", tables.frame("sensor_noise", measured), work.out)
+    tables.write("sensor_noise", tables.of_rows("sensor_noise", measured), work.out)
     tables.write("noise_residuals", residuals, work.out)
-    trials = list(trial_rows(work, tables.read("events", ingested), tracks))
-    tables.write("trials", tables.frame("trials", trials), work.out)
+    trials = list(trial_rows(work, tables.read_arrow("events", ingested).to_pylist(), tracks))
+    tables.write("trials", tables.of_rows("trials", trials), work.out)
     return Outcome()
 
 
-def _mean_and_sd(rows: pd.DataFrame, axes: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    mean = rows[[f"{axis}_mm" for axis in axes]].to_numpy(np.float64)
-    return mean, rows[[f"sd_{axis}_mm" for axis in axes]].to_numpy(np.float64)
+def _tracks(study: Study, table: pa.Table) -> dict[str, Shown]:
+    """What each estimator would have shown."""
+    found = {}
+    for name in study.estimators:
+        rows = table.filter(pc.equal(table["estimator"], name))
+        if len(rows):
+            mean, sd = (
+                np.column_stack([rows[column.format(axis)].to_numpy() for axis in study.axes])
+                for column in ("{}_mm", "sd_{}_mm")
+            )
+            found[name] = Shown(rows["time_ns"].to_numpy(), mean, sd)
+    return found
 
 
 def accuracy_row(
-    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, rows: pd.DataFrame
+    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, shown: Shown
 ) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
-    study, tracker = work.study, work.study.tracker
+    tracker = work.study.tracker
     if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
         return None
     name, reference = named
-    time = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
+    time: FloatArray = np.asarray(shown.time_ns - loaded.origin_ns, dtype=np.float64) * tables.NANOSECONDS
     truth = accuracy.interpolate(reference, time)
     on_grid = (time >= loaded.samples[tracker].arrival[0] + _SETTLED_S) & np.isfinite(truth).all(axis=1)
     if not on_grid.any():
         return None
-    mean, sd = _mean_and_sd(rows, study.axes)
-    time, mean, sd, truth = time[on_grid], mean[on_grid], sd[on_grid], truth[on_grid]
+    time, mean, sd, truth = time[on_grid], shown.mean[on_grid], shown.sd[on_grid], truth[on_grid]
     random = recording.seeded(work.session.id, estimator)
     lag = accuracy.lag(time, mean, reference, random)
     return {
@@ -96,10 +103,10 @@ def _agreement(work: Work, loaded: Recording) -> list[Row]:
     return [row]
 
 
-def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd.DataFrame]:
+def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pa.Table]:
     """Each sensor's noise in the longest still stretch, and the residuals behind it."""
     rows: list[Row] = []
-    residuals = []
+    residuals = [tables.of_rows("noise_residuals", [])]
     stretch = _still(study, loaded)
     for name, sensor in sensors(study).items():
         samples = loaded.samples[name]
@@ -119,9 +126,9 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd
             }
         )
         for index, axis in enumerate(study.axes_of(name)):
-            part = pd.DataFrame({"residual": left[:, index]}).assign(session=session, stream=name, axis=axis)
-            residuals.append(tables.as_table("noise_residuals", part))
-    return rows, pd.concat(residuals) if residuals else tables.frame("noise_residuals", [])
+            columns = {"session": session, "stream": name, "axis": axis, "residual": left[:, index]}
+            residuals.append(tables.of_columns("noise_residuals", len(left), columns))
+    return rows, pa.concat_tables(residuals).combine_chunks()
 
 
 def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
@@ -133,30 +140,28 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
     return noise.still_by_acceleration(samples) if samples is not None else None
 
 
-def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
+def trial_rows(work: Work, events: Sequence[Row], tracks: Mapping[str, Shown]) -> Iterator[Row]:
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
     starts, selections = selections_by_trial(events)
-    start: Any
-    for index, start in enumerate(starts.itertuples()):
-        after = selections[selections["start"] == index]
-        trial = {
-            **work.session.ids,
-            "trial": index + 1 if pd.isna(start.trial) else int(start.trial),
-        }
-        if after.empty:
+    first: dict[int, Row] = {}
+    for selection, place in selections:
+        first.setdefault(place, dict(selection))
+    for index, start in enumerate(starts):
+        trial = {**work.session.ids, "trial": index + 1 if start["trial"] is None else start["trial"]}
+        if index not in first:
             yield trial | {"estimator": "recorded"}
             continue
-        selection = after.iloc[0]
-        target = {axis: _first(selection[f"target_{axis}_mm"], getattr(start, f"target_{axis}_mm")) for axis in "xyz"}
-        axes = [axis for axis in "xyz" if target[axis] is not None]
-        duration_s = float(selection["time_ns"] - start.time_ns) * tables.NANOSECONDS
-        shown: dict[str, pd.Series] = {"recorded": selection}
-        for name, rows in tracks.items():
-            before = rows[rows["time_ns"] <= selection["time_ns"]]
-            if len(before):
-                shown[name] = before.iloc[-1]
+        selected = first[index]
+        named = {axis: f"target_{axis}_mm" for axis in "xyz"}
+        target = {axis: start[key] if selected[key] is None else selected[key] for axis, key in named.items()}
+        duration_s = float(selected["time_ns"] - start["time_ns"]) * tables.NANOSECONDS
+        shown: dict[str, Row] = {"recorded": {axis: selected[f"{axis}_mm"] for axis in "xyz"}}
+        for name, track in tracks.items():
+            at = int(np.searchsorted(track.time_ns, selected["time_ns"], side="right")) - 1
+            if at >= 0:
+                shown[name] = dict(zip(work.study.axes, track.mean[at].tolist(), strict=True))
         for name, where in shown.items():
-            squared = _squared_error(where, target, axes if name == "recorded" else list(work.study.axes))
+            squared = _squared_error(where, target)
             error = None if squared is None else float(np.sqrt(squared))
             yield trial | {
                 "estimator": name,
@@ -166,14 +171,9 @@ def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]
             }
 
 
-def _first(*values: Any) -> float | None:
-    return next((float(value) for value in values if not pd.isna(value)), None)
-
-
-def _squared_error(where: pd.Series, target: dict[str, float | None], axes: list[str]) -> float | None:
+def _squared_error(where: Row, target: Row) -> float | None:
     """Squared distance in mm² over the axes the target has; None if it has none or a coordinate is missing."""
-    used = [axis for axis in axes if target[axis] is not None]
-    values = [where[f"{axis}_mm"] for axis in used]
-    if not used or any(pd.isna(value) for value in values):
+    used = [axis for axis in where if target[axis] is not None]
+    if not used or any(where[axis] is None for axis in used):
         return None
-    return float(sum((value - target[axis]) ** 2 for axis, value in zip(used, values, strict=True)))
+    return float(sum((where[axis] - target[axis]) ** 2 for axis in used))
