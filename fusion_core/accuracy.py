@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -88,14 +87,13 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     usable = np.isfinite(distance).all(axis=1)
     if not usable.any() or np.ptp(time[usable]) < 1.0:
         return NO_INTERVAL
-    distance = distance[usable]
+    distance = distance if usable.all() else distance[usable]
     summed = distance.sum(axis=0)[None, :]
     whole = _lowest(shifts, summed)[0]
     if _flat(summed)[0] or not shifts[0] < whole < shifts[-1]:
         return NO_INTERVAL
     block = max(1, round(_BLOCK_S / float(np.median(np.diff(time[usable])))))
-    cumulative = np.vstack([np.zeros(len(shifts)), np.cumsum(distance, axis=0)])
-    sums = cumulative[block:] - cumulative[:-block]
+    sums = lag_steps.block_sums(distance, block)
     picks = random.integers(len(sums), size=(_RESAMPLES, max(1, len(distance) // block)))
     resampled = lag_steps.resampled(sums, picks)
     resampled = resampled[~_flat(resampled)]
@@ -194,11 +192,9 @@ def stretches(time: FloatArray, holds: BoolArray, shortest_s: float) -> Iterator
     if len(time) == 0:
         return
     broken = np.flatnonzero(~holds[1:] | ~holds[:-1] | (np.diff(time) > GAP_S))
-    edges = np.concatenate([[-1], broken, [len(time) - 1]])
-    for before, last in pairwise(edges):
-        begin, end = float(time[before + 1]), float(time[last])
-        if holds[last] and end - begin >= shortest_s:
-            yield begin, end
+    first, last = np.concatenate([[0], broken + 1]), np.concatenate([broken, [len(time) - 1]])
+    long_enough = holds[last] & (time[last] - time[first] >= shortest_s)
+    yield from zip(time[first[long_enough]].tolist(), time[last[long_enough]].tolist(), strict=True)
 
 
 def jitter(time: FloatArray, estimate: FloatArray, reference: Samples) -> float:

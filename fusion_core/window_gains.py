@@ -22,6 +22,7 @@ class Prior(NamedTuple):
     mean: int
     noise_variance: FloatArray  # (sensors,)
     bias_variance: FloatArray  # (sensors,): what its readings share
+    constant: FloatArray  # (sensors,): what each reads of a hand that stays at 1 mm
     is_tracker: npt.NDArray[np.bool_]  # (sensors,)
     begins: IntArray  # (sensors + 1,): a sensor's terms are begins[s] : begins[s + 1]
     weight: FloatArray  # (terms,)
@@ -30,21 +31,20 @@ class Prior(NamedTuple):
 
 
 @njit(cache=True)
-def gains(prior: Prior, lag: FloatArray, sensor: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Weights (n, m) and variance (n,) of n windows of m readings: `lag` (n, m) is their time minus now in s.
+def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Weights (n, m) and variance (n,) of n windows of m readings at `time` (n, m) in s, when it is `now` (n,).
 
     `sensor` (m,) says whose readings they are.
     """
-    count, size = lag.shape
+    count, size = time.shape
     weights, variance = np.empty((count, size)), np.empty(count)
-    among, with_now, constant = np.empty((size, size)), np.empty(size), np.zeros(size)
+    among, with_now, constant = np.empty((size, size)), np.empty(size), np.empty(size)
     of_constant, signal_variance = np.empty(size), prior.signal_variance_mm2
     for row in range(size):
-        for term in range(prior.begins[sensor[row]], prior.begins[sensor[row] + 1]):
-            if prior.derivative[term] == 0:
-                constant[row] += prior.weight[term]
+        constant[row] = prior.constant[sensor[row]]
     for index in range(count):
-        _covariances(prior, lag[index], sensor, among, with_now)
+        _covariances(prior, time[index], sensor, among)
+        covariance_with_now(prior, time[index] - now[index], sensor, with_now)
         _solve(among, with_now, constant, weights[index], of_constant)
         explained, missing, precision, positions = 0.0, 1.0, 0.0, 0
         for row in range(size):
@@ -65,27 +65,47 @@ def gains(prior: Prior, lag: FloatArray, sensor: IntArray) -> tuple[FloatArray, 
 
 
 @njit(cache=True)
-def _covariances(prior: Prior, lag: FloatArray, sensor: IntArray, among: FloatArray, with_now: FloatArray) -> None:
-    """Readings among themselves, the lower triangle, and with the position now."""
-    variance, scale, begins = prior.signal_variance_mm2, prior.inverse_scale_s2, prior.begins
-    weight, derivative, at_s = prior.weight, prior.derivative, prior.at_s
-    for row in range(len(lag)):
-        own = sensor[row]
-        with_now[row] = 0.0
-        for term in range(begins[own], begins[own + 1]):
-            shared = squared_exponential(lag[row] + at_s[term], derivative[term], 0, variance, scale)
-            with_now[row] += weight[term] * shared
+def _covariances(prior: Prior, time: FloatArray, sensor: IntArray, among: FloatArray) -> None:
+    """Readings among themselves, the lower triangle."""
+    for row in range(len(time)):
         for column in range(row + 1):
-            other, total = sensor[column], 0.0
-            for term in range(begins[own], begins[own + 1]):
-                for its in range(begins[other], begins[other + 1]):
-                    apart = lag[row] + at_s[term] - lag[column] - at_s[its]
-                    shared = squared_exponential(apart, derivative[term], derivative[its], variance, scale)
-                    total += weight[term] * weight[its] * shared
-            if own == other:
-                total += prior.bias_variance[own]
-            among[row, column] = total
-        among[row, row] += prior.noise_variance[own]
+            among[row, column] = covariance(prior, sensor[row], sensor[column], time[row] - time[column])
+        among[row, row] += prior.noise_variance[sensor[row]]
+
+
+@njit(cache=True)
+def covariance_with_now(prior: Prior, lag: FloatArray, sensor: IntArray, with_now: FloatArray) -> None:
+    """Readings `lag` (m,) before now, of sensors (m,), with the position now, into the first m of `with_now`."""
+    for row in range(len(lag)):
+        total = 0.0
+        for term in range(prior.begins[sensor[row]], prior.begins[sensor[row] + 1]):
+            apart = lag[row] + prior.at_s[term]
+            total += prior.weight[term] * squared_exponential(
+                apart, prior.derivative[term], 0, prior.signal_variance_mm2, prior.inverse_scale_s2
+            )
+        with_now[row] = total
+
+
+@njit(cache=True)
+def covariance(prior: Prior, own: int, other: int, lag: float) -> float:
+    """A reading of one sensor with one of another, or its own, `lag` s before it; without the noise."""
+    total = 0.0
+    for term in range(prior.begins[own], prior.begins[own + 1]):
+        for its in range(prior.begins[other], prior.begins[other + 1]):
+            total += (
+                prior.weight[term]
+                * prior.weight[its]
+                * squared_exponential(
+                    lag + prior.at_s[term] - prior.at_s[its],
+                    prior.derivative[term],
+                    prior.derivative[its],
+                    prior.signal_variance_mm2,
+                    prior.inverse_scale_s2,
+                )
+            )
+    if own == other:
+        total += prior.bias_variance[own]
+    return total
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})  # or sums of products take a step each

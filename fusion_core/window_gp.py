@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from fusion_core import window_gains, window_steps
+from fusion_core import window_batch, window_gains, window_steps
 from fusion_core.checks import require_not_negative, require_one_of, require_positive
 from fusion_core.estimator import replay_loop, require_reading, require_readings, unknown
 from fusion_core.kernels import IntArray
@@ -18,7 +18,6 @@ from fusion_core.sensors import Sensor, Term, position_sensor, require_covered, 
 
 _ACCELERATION = 2
 _MEANS = {"zero": window_gains.ZERO, "constant": window_gains.CONSTANT, "window": window_gains.WINDOW}
-_CHUNK_NUMBERS = 4_000_000  # covariance entries held at once: 32 MB
 _MOST_SETS = 64  # of patterns
 _MOST_PATTERNS = 4096  # of regular windows whose weights are remembered
 Pattern = tuple[int, int, int, int]
@@ -107,10 +106,16 @@ class WindowGP:
         `lag` (…, m) is each reading's time minus now in s, `names` the m sensors. Returns weights (…, m) and variance
         (…). With a constant mean the weights of positions sum to 1.
         """
-        index = np.array([self._index[name] for name in names], np.int64)
         flat = np.ascontiguousarray(lag, dtype=np.float64).reshape(-1, len(names))
-        weights, variance = window_gains.gains(self._prior, flat, index)
+        weights, variance = self._gains(flat, np.zeros(len(flat)), names)
         return weights.reshape(lag.shape), variance.reshape(lag.shape[:-1])
+
+    def _gains(self, time: FloatArray, now: FloatArray, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+        """As `gains`, of readings at `time` (n, m) when it is `now` (n,)."""
+        found: tuple[FloatArray, FloatArray] = window_gains.gains(
+            self._prior, time, now, np.array([self._index[name] for name in names], np.int64)
+        )
+        return found
 
     @cached_property
     def _index(self) -> dict[str, int]:
@@ -127,6 +132,7 @@ class WindowGP:
             _MEANS[self.mean],
             noise_variance=np.array([sensor.noise_sd**2 for sensor in self.sensors.values()], np.float64),
             bias_variance=np.where(accelerations, self.bias_sd_mm_s2**2, 0.0),
+            constant=np.array([self._constant[name] for name in self.sensors], np.float64),
             is_tracker=np.array([name == self._tracker for name in self.sensors]),
             begins=np.cumsum([0, *map(len, terms)]),
             weight=np.array([term.weight for term in flat], np.float64),
@@ -223,7 +229,8 @@ class WindowGP:
                 newest = int(window_steps.in_ns(now - measured[n_positions - 1]))
                 last = int(window_steps.in_ns(now - measured[-1])) if len(names) > n_positions else 0
                 return self._of_pattern((n_positions, len(names) - n_positions, newest, last))
-        return self.gains(measured - now, names)
+        weights, variance = self._gains(measured[None, :], np.array([now]), names)
+        return weights[0], variance[0]
 
     @cached_property
     def _regular_names(self) -> tuple[str, ...] | None:
@@ -287,12 +294,17 @@ class WindowGP:
         left = np.flatnonzero(spans[1] > 0)
         if self._regular_names is not None:
             left = self._regular_windows(frames, others, times, spans, mean, sd)
-        for rows, weights, variance, values, constant in self._windows(frames, others, names, times, spans, left):
-            newest = frames.value[spans[1, rows] - 1]
-            origin = newest if self.mean != "zero" else np.zeros_like(newest)
-            centred = values - constant[None, :, None] * origin[:, None, :]
-            mean[rows] = origin + (weights[:, None, :] @ centred)[:, 0]
-            sd[rows] = np.sqrt(variance)[:, None]
+        if len(left):
+            other = self._index[names[0]] if names else 0
+            streams = window_batch.Streams(
+                self._index[self._tracker],
+                np.ascontiguousarray(frames.time, dtype=np.float64),
+                np.ascontiguousarray(frames.value, dtype=np.float64),
+                other,
+                np.ascontiguousarray(others.time, dtype=np.float64),
+                np.ascontiguousarray(others.value, dtype=np.float64),
+            )
+            window_batch.estimates(self._prior, streams, times, spans, left, mean, sd)
         return Track(times, mean, sd)
 
     def _spans(self, frames: Samples, others: Samples, times: FloatArray) -> IntArray:
@@ -343,29 +355,3 @@ class WindowGP:
             sd,
         )
         return np.flatnonzero((which < 0) & (spans[1] > 0))
-
-    def _windows(
-        self,
-        frames: Samples,
-        others: Samples,
-        names: list[str],
-        times: FloatArray,
-        spans: IntArray,
-        wanted: IntArray,
-    ) -> Iterator[tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]]:
-        """Groups of windows of one size: rows of `times`, weights (k, m), variances, values (k, m, d), constants."""
-        first, last, begin, end = spans
-        sizes = np.stack([last - first, end - begin], axis=1)[wanted]
-        for n_positions, n_others in np.unique(sizes, axis=0):
-            group = wanted[(sizes[:, 0] == n_positions) & (sizes[:, 1] == n_others)]
-            sensors = [self._tracker] * n_positions + names * n_others
-            constant = np.array([self._constant[name] for name in sensors])
-            step = max(1, int(_CHUNK_NUMBERS // len(sensors) ** 2))
-            for rows in np.split(group, np.arange(step, len(group), step)):
-                picked = first[rows, None] + np.arange(n_positions)
-                time, values = frames.time[picked], frames.value[picked]
-                if n_others:
-                    picked = begin[rows, None] + np.arange(n_others)
-                    time = np.concatenate([time, others.time[picked]], axis=1)
-                    values = np.concatenate([values, others.value[picked]], axis=1)
-                yield rows, *self.gains(time - times[rows, None], sensors), values, constant

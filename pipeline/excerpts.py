@@ -11,7 +11,7 @@ import pandas as pd
 
 from fusion_core import FloatArray, Samples, accuracy
 from pipeline import tables
-from pipeline.recording import Recording, in_session_s
+from pipeline.recording import Recording, Shown
 from pipeline.study import Study
 
 EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
@@ -20,7 +20,7 @@ _STRETCHES = 120  # of a session at the most
 _STRETCH_NS = 1_000_000_000  # at the least
 
 
-def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
     """The table `excerpts`: the stretch and axis in which the tracker moves most; `raw` is the tracker once more."""
     name = study.stream_of_kind("position")
     if name is None or len(loaded.samples[name]) == 0:
@@ -39,10 +39,11 @@ def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, 
         parts.append(
             _cut(begin, "acceleration", felt, samples.time, samples.value[:, study.axes_of(felt).index(letter)])
         )
-    for estimator, rows in tracks.items():
+    of_estimates = study.axes.index(letter)
+    for estimator, shown in tracks.items():
         if study.estimators[estimator].type != "raw":
-            mean, sd = (rows[column].to_numpy(np.float64) for column in (f"{letter}_mm", f"sd_{letter}_mm"))
-            parts.append(_cut(begin, "estimate", estimator, in_session_s(loaded, rows), mean, sd))
+            mean, sd = shown.mean[:, of_estimates], shown.sd[:, of_estimates]
+            parts.append(_cut(begin, "estimate", estimator, loaded.to_s(shown.time_ns), mean, sd))
     return tables.as_table("excerpts", pd.concat(parts).assign(session=session, axis=letter))
 
 
@@ -71,17 +72,16 @@ def _liveliest(tracker: Samples) -> tuple[int, float]:
     return best[1], best[2]
 
 
-def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
     """The table `lead_curves`: each estimator's cross-correlation with the tracker, within half a second."""
     name = study.tracker
     parts = [tables.frame("lead_curves", [])]
     if name is None or len(loaded.samples[name]) == 0:
         return parts[0]
     tracker = loaded.samples[name]
-    for estimator, rows in tracks.items():
-        time = in_session_s(loaded, rows)
+    for estimator, shown in tracks.items():
+        time, mean = loaded.to_s(shown.time_ns), shown.mean
         settled = time >= tracker.arrival[0] + _SETTLED_S
-        mean = rows[[f"{axis}_mm" for axis in study.axes]].to_numpy(np.float64)
         curve = accuracy.lead_curve(time[settled], mean[settled], tracker)
         if curve is None or not np.max(np.abs(curve[1])) > 0:
             continue

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 
 from fusion_core import FloatArray, Samples, Sensor
 from fusion_core.alignment import carried, headed, heading, level, nearest, rotate, rotations
 from fusion_core.calibration import Body, Calibration, calibrate, mounted
 from pipeline.study import AccelerationStream
+from pipeline.tables import Columns
 
 _MM_PER_M = 1000.0
 _HEADING_SD_RAD = 0.3  # above it an orientation is not known
@@ -52,10 +52,12 @@ Tracker = tuple[Samples, Sensor]
 """Positions of all three axes, and the sensor they are from."""
 
 
-def phone(rows: pd.DataFrame, times: tuple[FloatArray, FloatArray], sensor: Sensor) -> Imu:
+def phone(rows: Columns, times: tuple[FloatArray, FloatArray], sensor: Sensor) -> Imu:
     """The readings of a stream from its rows of `imu` and their times of measurement and arrival."""
-    force = rows[["ax_mm_s2", "ay_mm_s2", "az_mm_s2"]].to_numpy(np.float64)
-    return Imu(*times, force, rows[["gx_rad_s", "gy_rad_s", "gz_rad_s"]].to_numpy(np.float64), sensor)
+    force, turning = (
+        np.column_stack([rows[name.format(axis)] for axis in "xyz"]) for name in ("a{}_mm_s2", "g{}_rad_s")
+    )
+    return Imu(*times, force, turning, sensor)
 
 
 def aligned(imu: Imu, logged: FloatArray, stream: AccelerationStream, tracker: Tracker | None) -> Phone:

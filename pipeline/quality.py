@@ -18,19 +18,20 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
     order = np.argsort(readings.arrival_ns, kind="stable")
     stamp, arrival = readings.stamp_ns[order], readings.arrival_ns[order]
     remarks = [*readings.notes, *notes]
+    apart_ns = np.diff(np.sort(stamp))
     row: dict[str, Any] = {
         "session": session,
         "stream": stream,
         "messages_read": readings.read,
         "messages_lost": readings.lost,
-        "duplicates": readings.read - len(np.unique(stamp)),
+        "duplicates": int(np.sum(apart_ns == 0)),
         "out_of_order": _behind(stamp),
     }
     if readings.lost is None:
         remarks.append("how many messages the log lost cannot be known")
     if np.any(np.diff(readings.arrival_ns) < 0):
         remarks.append("messages are not in order of arrival in the file; sorted")
-    steps: FloatArray = np.diff(np.unique(stamp)).astype(np.float64) * _SECONDS
+    steps: FloatArray = apart_ns[apart_ns > 0].astype(np.float64) * _SECONDS
     if len(steps):
         usual = float(np.median(steps))
         missing = int(np.sum(np.round(steps[steps > 1.5 * usual] / usual) - 1))

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.alignment import nearest, rotate
@@ -26,6 +27,7 @@ from pipeline.study import (
     Study,
     VelocityStream,
 )
+from pipeline.tables import Columns
 
 SMOOTHED = "smoothed"  # the name of the reference that a study without one gets
 _AXES = ("x", "y", "z")
@@ -65,18 +67,30 @@ class Recording:
         """Seconds since the origin as the tables' nanoseconds."""
         return np.rint(time / tables.NANOSECONDS).astype(np.int64) + self.origin_ns
 
+    def to_s(self, time_ns: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
+        """The tables' nanoseconds as seconds since the origin."""
+        return np.asarray(time_ns - self.origin_ns, dtype=np.float64) * tables.NANOSECONDS
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What an estimator would have shown, as its table holds it: `time_ns` (n,), `mean` and `sd` (n, d) in mm."""
+
+    time_ns: np.ndarray[Any, np.dtype[np.int64]]
+    mean: FloatArray
+    sd: FloatArray
+
 
 def load(study: Study, entry: Path) -> Recording:
     """A session's recording from its ingested tables."""
-    imu = tables.read("imu", entry)
-    others = {name: tables.read(name, entry) for name in ("positions", "readings")}
-    stamps = pd.concat([others["positions"]["arrival_ns"], imu["arrival_ns"]])
-    origin_ns = int(stamps.min()) if len(stamps) else 0
+    imu, positions, readings = (tables.read_arrow(name, entry) for name in ("imu", "positions", "readings"))
+    first = [pc.min(table["arrival_ns"]).as_py() for table in (imu, positions) if len(table)]
+    origin_ns = min(first, default=0)
     whole: dict[str, Samples] = {}
     for name, stream in study.streams.items():
         if not isinstance(stream, AccelerationStream):
-            rows = others["readings" if isinstance(stream, VelocityStream | LinearStream) else "positions"]
-            whole[name] = _vectors(rows[rows["stream"] == name], stream, origin_ns)
+            table = readings if isinstance(stream, VelocityStream | LinearStream) else positions
+            whole[name] = _vectors(tables.of_stream(table, name), stream, origin_ns)
     phones = _phones(study, imu, origin_ns, whole)
     samples = {
         name: _of_axes(phones[name].body.acceleration() if name in phones else whole[name], study, name)
@@ -85,7 +99,7 @@ def load(study: Study, entry: Path) -> Recording:
     return Recording(
         origin_ns,
         samples,
-        _instants(study, imu, others["positions"], origin_ns),
+        _instants(study, imu, positions, origin_ns),
         _only(study, ReferenceStream, whole),
         _only(study, DisplayStream, whole),
         phones,
@@ -98,12 +112,12 @@ def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
 
     Phones are left alone, and with them whatever their mounting would correct; so this is quick.
     """
-    rows = tables.read("positions", entry)
-    origin_ns = int(rows["arrival_ns"].min()) if len(rows) else 0
+    table = tables.read_arrow("positions", entry)
+    origin_ns = pc.min(table["arrival_ns"]).as_py() if len(table) else 0
     found = {}
     for name, stream in study.streams.items():
         if isinstance(stream, PositionStream | ReferenceStream | DisplayStream):
-            whole = _vectors(rows[rows["stream"] == name], stream, origin_ns)
+            whole = _vectors(tables.of_stream(table, name), stream, origin_ns)
             index = [_AXES.index(axis) for axis in shown_axes(study, name)]
             found[name] = Samples(whole.time, whole.arrival, whole.value[:, index])
     return origin_ns, found
@@ -114,22 +128,21 @@ def shown_axes(study: Study, name: str) -> tuple[str, ...]:
     return tuple(study.axes_of(name)) if name in study.sensor_streams else tuple(study.axes)
 
 
-def _vectors(rows: pd.DataFrame, stream: Stream, origin_ns: int) -> Samples:
+def _vectors(rows: Columns, stream: Stream, origin_ns: int) -> Samples:
     """All three axes of a stream of vectors, in the tracker's frame and clock."""
-    columns = ["x_mm", "y_mm", "z_mm"] if "x_mm" in rows else list(_AXES)
-    value = rows[columns].to_numpy(np.float64)
+    columns = ("x_mm", "y_mm", "z_mm") if "x_mm" in rows else _AXES
+    value = np.column_stack([rows[column] for column in columns])
     if isinstance(stream, ReferenceStream) and len(value):
         value = rotate(np.array(stream.rotation_xyzw), value) + np.array(stream.translation_mm)
     late = stream.stamp == "arrival" or stream.kind in ("reference", "display")
     return tables.samples(*_times(rows, stream.latency_s if late else 0.0), value, origin_ns)
 
 
-def _times(rows: pd.DataFrame, latency_s: float) -> tuple[Any, Any]:
-    time_ns, arrival_ns = rows["time_ns"].to_numpy(np.int64), rows["arrival_ns"].to_numpy(np.int64)
-    return time_ns - round(latency_s / tables.NANOSECONDS), arrival_ns
+def _times(rows: Columns, latency_s: float) -> tuple[Any, Any]:
+    return rows["time_ns"] - round(latency_s / tables.NANOSECONDS), rows["arrival_ns"]
 
 
-def _phones(study: Study, imu: pd.DataFrame, origin_ns: int, whole: dict[str, Samples]) -> dict[str, Phone]:
+def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Samples]) -> dict[str, Phone]:
     """Every stream of accelerations, all three axes."""
     tracker = None
     if study.tracker is not None:
@@ -137,11 +150,11 @@ def _phones(study: Study, imu: pd.DataFrame, origin_ns: int, whole: dict[str, Sa
     found = {}
     for name, stream in study.sensor_streams.items():
         if isinstance(stream, AccelerationStream):
-            rows = imu[imu["stream"] == name]
+            rows = tables.of_stream(imu, name)
             time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamp == "arrival" else 0.0)
             times = (time_ns - origin_ns) * tables.NANOSECONDS, (arrival_ns - origin_ns) * tables.NANOSECONDS
             imu_readings = phone(rows, times, _of_space(sensor(study, stream)))
-            logged = rows[["qx", "qy", "qz", "qw"]].to_numpy(np.float64)
+            logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])
             found[name] = aligned(imu_readings, logged, stream, tracker)
     return found
 
@@ -207,6 +220,13 @@ def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track
     return Track(times, mean, sd)
 
 
+def tracked(study: Study, name: str, loaded: Recording) -> Shown:
+    """What it would have shown at every instant, from its first estimate on."""
+    track = show(study, name, loaded, loaded.times)
+    known = np.isfinite(track.mean).all(axis=1)
+    return Shown(loaded.to_ns(track.time[known]), track.mean[known], track.sd[known])
+
+
 def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
     """What estimates are held against, and its name: the recorded reference, else all readings smoothed."""
     recorded = study.stream_of_kind("reference")
@@ -227,19 +247,13 @@ def _in_time(study: Study) -> dict[str, Sensor]:
     return {name: one for name, one in found.items() if not any(term.at_s for term in one.terms)}
 
 
-def _instants(study: Study, imu: pd.DataFrame, positions: pd.DataFrame, origin_ns: int) -> FloatArray:
+def _instants(study: Study, imu: pa.Table, positions: pa.Table, origin_ns: int) -> FloatArray:
     """The arrivals of the accelerations; of the frames where there is no IMU."""
     accelerations, frames = study.stream_of_kind("acceleration"), study.stream_of_kind("position")
-    rows = imu[imu["stream"] == accelerations] if accelerations else positions[positions["stream"] == frames]
-    arrival = np.unique(rows["arrival_ns"].to_numpy(np.int64))
+    rows = tables.of_stream(imu, accelerations) if accelerations else tables.of_stream(positions, frames or "")
+    arrival = np.unique(rows["arrival_ns"])
     times: FloatArray = (arrival - origin_ns) * tables.NANOSECONDS
     return times
-
-
-def in_session_s(loaded: Recording, rows: pd.DataFrame) -> FloatArray:
-    """The times of a table's rows in seconds since the session's first message."""
-    since: FloatArray = (rows["time_ns"].to_numpy(np.int64) - loaded.origin_ns) * tables.NANOSECONDS
-    return since
 
 
 def seeded(*names: str) -> np.random.Generator:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 if TYPE_CHECKING:
@@ -311,12 +312,48 @@ Row = Mapping[str, Any]
 def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
     """Rows as the named table; a key it does not know is a programming error (KeyError)."""
     listed = list(rows)
-    columns = TABLES[name].names
-    for row in listed:
-        unknown = set(row) - set(columns)
+    columns = _known_columns(name, listed)
+    return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
+
+
+def of_rows(name: str, rows: Iterable[Row]) -> pa.Table:
+    """As `frame`, for Arrow, which takes a tenth of the time where rows are few; values must be of the columns' types.
+
+    NaN is null.
+    """
+    listed = list(rows)
+    columns = _known_columns(name, listed)
+    kinds = TABLES[name].types
+    arrays = [
+        pa.array([row.get(column) for row in listed], kind, from_pandas=True)
+        for column, kind in zip(columns, kinds, strict=True)
+    ]
+    return pa.Table.from_arrays(arrays, schema=TABLES[name])
+
+
+def _known_columns(name: str, rows: Sequence[Row]) -> list[str]:
+    """The table's columns; KeyError for a row that has another."""
+    columns: list[str] = TABLES[name].names
+    for row in rows:
+        unknown = row.keys() - set(columns)
         if unknown:
             raise KeyError(f"table {name} has no column {', '.join(sorted(unknown))}")
-    return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
+    return columns
+
+
+def of_columns(name: str, length: int, columns: Mapping[str, Any]) -> pa.Table:
+    """The named table of so many rows by arrays (length,), and single values that hold for every row.
+
+    A column that is not there, and NaN, is null.
+    """
+    arrays = []
+    for column in TABLES[name]:
+        value = columns.get(column.name)
+        if isinstance(value, np.ndarray):
+            arrays.append(pa.array(value, column.type, from_pandas=True))
+        else:
+            arrays.append(pa.repeat(pa.scalar(value, column.type), length))
+    return pa.Table.from_arrays(arrays, schema=TABLES[name])
 
 
 def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
@@ -340,35 +377,52 @@ def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
     return pd.to_numeric(values).astype("Int64")
 
 
-def write(name: str, data: pd.DataFrame, folder: Path) -> None:
+def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
     """The table as Parquet, `<name>.parquet`."""
-    table = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name], preserve_index=False)
+    if isinstance(data, pd.DataFrame):
+        data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name], preserve_index=False)
     floats = [column.name for column in TABLES[name] if column.type == _FLOAT]
     times = [column.name for column in TABLES[name] if column.name.endswith("_ns")]
     encodings = dict.fromkeys(floats, "BYTE_STREAM_SPLIT") | dict.fromkeys(times, "DELTA_BINARY_PACKED")
     plain = [column.name for column in TABLES[name] if column.name not in encodings]
-    pq.write_table(
-        table.replace_schema_metadata(None),
-        folder / f"{name}.parquet",
-        compression="zstd",
-        use_dictionary=plain,
-        column_encoding=encodings,
-        store_schema=False,
-    )
+    with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
+        pq.write_table(
+            data.replace_schema_metadata(None),
+            file,
+            compression="zstd",
+            use_dictionary=plain,
+            column_encoding=encodings,
+            store_schema=False,
+        )
 
 
 def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
     """The table out of one or many folders; those without it count as empty."""
+    # Straight to the types of `as_table`; by way of objects it takes three times as long.
+    found: pd.DataFrame = read_arrow(name, folders).to_pandas(types_mapper=_NULLABLE.get)
+    return found
+
+
+def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
+    """As `read`, as it is in the files."""
     parts = []
     for folder in [folders] if isinstance(folders, Path) else folders:
         path = folder / f"{name}.parquet"
         if path.is_file():
             with pq.ParquetFile(path) as file:
                 parts.append(file.read(use_threads=False))
-    whole = pa.concat_tables(parts) if parts else TABLES[name].empty_table()
-    # Straight to the types of `as_table`; by way of objects it takes three times as long.
-    found: pd.DataFrame = whole.to_pandas(types_mapper=_NULLABLE.get)
-    return found
+    return pa.concat_tables(parts) if parts else TABLES[name].empty_table()
+
+
+Columns = Mapping[str, np.ndarray[Any, Any]]
+"""Columns of a table by name, (n,) each."""
+
+
+def of_stream(table: pa.Table, stream: str) -> Columns:
+    """The columns of one stream's rows as arrays (n,): times in ns, and figures, NaN where they are null."""
+    rows = table.filter(pc.equal(table["stream"], stream))
+    names = [column.name for column in table.schema if column.type != _TEXT]
+    return {name: rows[name].to_numpy() for name in names}
 
 
 def records(name: str, data: pd.DataFrame) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 
 from pipeline.cache import Cache, Entry
 from pipeline.errors import PipelineError, WorkerLostError
@@ -14,6 +14,7 @@ from pipeline.stage import Stage, Work
 from pipeline.study import Session
 
 _Missing = tuple[Session, Work, str]  # with the key of the result
+_AHEAD = 256  # pieces of work handed to the executor before they are needed: more than a cluster has processes
 
 
 def entries_of(stage: Stage, result: Result, works: Sequence[tuple[Work, str]], means: Means) -> list[Entry]:
@@ -90,15 +91,24 @@ def _computed(stage: Stage, missing: Sequence[_Missing], means: Means) -> Iterat
 def _as_completed(
     stage: Stage, missing: Sequence[_Missing], means: Means, waiting: dict[Future[Entry], _Missing]
 ) -> Iterator[Future[Entry]]:
-    """Submit all, each noted in `waiting`; futures as they are done, those of this process between submissions."""
-    at_once = set()
+    """Submit all, some at a time, each in `waiting` until it is taken; futures as they are done.
+
+    Of a future that is done nothing is kept: of ten thousand sessions they would be most of what this process holds.
+    """
     for one in missing:
         future = means.executor.submit(compute, stage, *one[1:], means.cache.root)
         waiting[future] = one
-        if future.done():
-            at_once.add(future)
-            yield future
-    yield from as_completed(waiting.keys() - at_once)
+        if len(waiting) >= _AHEAD or future.done():
+            yield from _done(waiting)
+    while waiting:
+        yield from _done(waiting)
+
+
+def _done(waiting: dict[Future[Entry], _Missing]) -> Iterator[Future[Entry]]:
+    """Those that are done, at least one; each is out of `waiting` once it has been taken."""
+    for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+        yield future
+        waiting.pop(future)
 
 
 def _at_hand(entry: Entry) -> Entry:

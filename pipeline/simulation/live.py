@@ -122,12 +122,12 @@ def _show_window(window: Schedule, readings: Readings, now: float, index: int, s
     if regular:
         weights = window.weights[window.which[index]]
     else:
-        lag, sensor = np.empty((1, positions + others)), np.empty(positions + others, np.int64)
+        time, sensor = np.empty((1, positions + others)), np.empty(positions + others, np.int64)
         for row in range(positions):
-            lag[0, row], sensor[row] = readings.frame_time[first + row] - now, window.sensors[0]
+            time[0, row], sensor[row] = readings.frame_time[first + row], window.sensors[0]
         for row in range(others):
-            lag[0, positions + row], sensor[positions + row] = readings.force_time[begin + row] - now, window.sensors[1]
-        weights = window_gains.gains(window.prior, lag, sensor)[0][0]
+            time[0, positions + row], sensor[positions + row] = readings.force_time[begin + row], window.sensors[1]
+        weights = window_gains.gains(window.prior, time, np.array([now]), sensor)[0][0]
     for axis in range(len(shown)):
         origin = 0.0 if regular or window.prior.mean == window_gains.ZERO else readings.frame_mm[last - 1, axis]
         total = origin

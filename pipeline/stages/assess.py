@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from fusion_core import FloatArray, Samples, accuracy, noise
 from pipeline import excerpts, recording, tables
 from pipeline.estimators import sensors
 from pipeline.phone import described
-from pipeline.recording import Recording
+from pipeline.recording import Recording, Shown
 from pipeline.stage import Outcome, Work
 from pipeline.study import Study
 from pipeline.trials import selections_by_trial
@@ -28,40 +29,47 @@ def run(work: Work) -> Outcome:
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
-    tracks: dict[str, pd.DataFrame] = {}
-    for name, part in tables.read("tracks", work.entry("fuse")).groupby("estimator", sort=False):
-        tracks[str(name)] = part
+    tracks = _tracks(study, tables.read_arrow("tracks", work.entry("fuse")))
     reference = recording.reference(study, loaded)
     rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
-    tables.write("accuracy", tables.frame("accuracy", [row for row in rows if row]), work.out)
-    tables.write("replay_agreement", tables.frame("replay_agreement", _agreement(work, loaded)), work.out)
+    tables.write("accuracy", tables.of_rows("accuracy", [row for row in rows if row]), work.out)
+    tables.write("replay_agreement", tables.of_rows("replay_agreement", _agreement(work, loaded)), work.out)
     phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]
-    tables.write("phones", tables.frame("phones", phones), work.out)
+    tables.write("phones", tables.of_rows("phones", phones), work.out)
     measured, residuals = _noise(study, session.id, loaded)
-    tables.write("sensor_noise", tables.frame("sensor_noise", measured), work.out)
+    tables.write("sensor_noise", tables.of_rows("sensor_noise", measured), work.out)
     tables.write("noise_residuals", residuals, work.out)
-    events = tables.read("events", ingested)
-    tables.write("trials", tables.frame("trials", trial_rows(work, events, tracks)), work.out)
-    tables.write("selections", tables.frame("selections", selection_rows(work, events)), work.out)
-    counted = calibration_rows(study, session.id, loaded, reference, tracks)
-    tables.write("calibration", tables.frame("calibration", counted), work.out)
+    events = tables.read_arrow("events", ingested).to_pylist()
+    tables.write("trials", tables.of_rows("trials", list(trial_rows(work, events, tracks))), work.out)
+    tables.write("selections", tables.of_rows("selections", list(selection_rows(work, events))), work.out)
+    counted = list(calibration_rows(study, session.id, loaded, reference, tracks))
+    tables.write("calibration", tables.of_rows("calibration", counted), work.out)
     tables.write("excerpts", excerpts.excerpt(study, session.id, loaded, tracks), work.out)
     tables.write("lead_curves", excerpts.lead_curves(study, session.id, loaded, tracks), work.out)
-    tables.write("stream_rates", tables.frame("stream_rates", excerpts.rates(ingested)), work.out)
+    tables.write("stream_rates", tables.of_rows("stream_rates", list(excerpts.rates(ingested))), work.out)
     return Outcome()
 
 
-def _mean_and_sd(rows: pd.DataFrame, axes: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    mean = rows[[f"{axis}_mm" for axis in axes]].to_numpy(np.float64)
-    return mean, rows[[f"sd_{axis}_mm" for axis in axes]].to_numpy(np.float64)
+def _tracks(study: Study, table: pa.Table) -> dict[str, Shown]:
+    """What each estimator would have shown."""
+    found = {}
+    for name in study.estimators:
+        rows = table.filter(pc.equal(table["estimator"], name))
+        if len(rows):
+            mean, sd = (
+                np.column_stack([rows[column.format(axis)].to_numpy() for axis in study.axes])
+                for column in ("{}_mm", "sd_{}_mm")
+            )
+            found[name] = Shown(rows["time_ns"].to_numpy(), mean, sd)
+    return found
 
 
 def accuracy_row(
-    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, rows: pd.DataFrame
+    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, shown: Shown
 ) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
     study, tracker = work.study, work.study.tracker
-    found = _on_grid(study, loaded, named, rows)
+    found = _on_grid(study, loaded, named, shown)
     if named is None or tracker is None or found is None:
         return None
     name, reference = named
@@ -85,19 +93,18 @@ def accuracy_row(
 
 
 def _on_grid(
-    study: Study, loaded: Recording, named: tuple[str, Samples] | None, rows: pd.DataFrame
+    study: Study, loaded: Recording, named: tuple[str, Samples] | None, shown: Shown
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
     """Time in s, mean, stated SD and reference (n, d) on the grid of accuracy; None where there is none."""
     tracker = study.tracker
     if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
         return None
-    time = recording.in_session_s(loaded, rows)
+    time = loaded.to_s(shown.time_ns)
     truth = accuracy.interpolate(named[1], time)
     on_grid = (time >= loaded.samples[tracker].arrival[0] + _SETTLED_S) & np.isfinite(truth).all(axis=1)
     if not on_grid.any():
         return None
-    mean, sd = _mean_and_sd(rows, study.axes)
-    return time[on_grid], mean[on_grid], sd[on_grid], truth[on_grid]
+    return time[on_grid], shown.mean[on_grid], shown.sd[on_grid], truth[on_grid]
 
 
 def calibration_rows(
@@ -105,11 +112,11 @@ def calibration_rows(
     session: str,
     loaded: Recording,
     reference: tuple[str, Samples] | None,
-    tracks: dict[str, pd.DataFrame],
+    tracks: Mapping[str, Shown],
 ) -> Iterator[Row]:
     """How many errors are within k stated SDs, on the grid of accuracy; nothing for one that states no SD."""
-    for name, rows in tracks.items():
-        found = _on_grid(study, loaded, reference, rows)
+    for name, shown in tracks.items():
+        found = _on_grid(study, loaded, reference, shown)
         if found is None:
             continue
         _, mean, sd, truth = found
@@ -125,15 +132,15 @@ def calibration_rows(
             }
 
 
-def selection_rows(work: Work, events: pd.DataFrame) -> Iterator[Row]:
-    """The first selection of each trial, with its target as the selection or, failing that, the start has it."""
-    for start, selection in _trials(events):
-        if selection is not None:
+def selection_rows(work: Work, events: Sequence[Row]) -> Iterator[Row]:
+    """The first selection of each trial, with its target."""
+    for number, _, selected, target in _trials(events):
+        if selected is not None:
             yield {
                 **work.session.ids,
-                "trial": start.trial,
-                **{f"target_{axis}_mm": value for axis, value in _target(start, selection).items()},
-                **{f"{axis}_mm": _first(selection[f"{axis}_mm"]) for axis in "xyz"},
+                "trial": number,
+                **{f"target_{axis}_mm": value for axis, value in target.items()},
+                **{f"{axis}_mm": selected[f"{axis}_mm"] for axis in "xyz"},
             }
 
 
@@ -151,10 +158,10 @@ def _agreement(work: Work, loaded: Recording) -> list[Row]:
     return [row]
 
 
-def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd.DataFrame]:
+def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pa.Table]:
     """Each sensor's noise in the longest still stretch, and the residuals behind it."""
     rows: list[Row] = []
-    residuals = []
+    residuals = [tables.of_rows("noise_residuals", [])]
     stretch = _still(study, loaded)
     for name, sensor in sensors(study).items():
         samples = loaded.samples[name]
@@ -174,9 +181,9 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pd
             }
         )
         for index, axis in enumerate(study.axes_of(name)):
-            part = pd.DataFrame({"residual": left[:, index]}).assign(session=session, stream=name, axis=axis)
-            residuals.append(tables.as_table("noise_residuals", part))
-    return rows, pd.concat(residuals) if residuals else tables.frame("noise_residuals", [])
+            columns = {"session": session, "stream": name, "axis": axis, "residual": left[:, index]}
+            residuals.append(tables.of_columns("noise_residuals", len(left), columns))
+    return rows, pa.concat_tables(residuals).combine_chunks()
 
 
 def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
@@ -188,45 +195,46 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
     return noise.still_by_acceleration(samples) if samples is not None else None
 
 
-class _Start(NamedTuple):
-    """A trial's start: the number the trial goes by, and the event."""
+class _Trial(NamedTuple):
+    """A trial: the number it goes by, its start and its first selection as events, and where its target was, in mm."""
 
-    trial: int
-    event: Any
+    number: int
+    start: Row
+    selected: Row | None
+    target: dict[str, float | None]
 
 
-def _trials(events: pd.DataFrame) -> Iterator[tuple[_Start, pd.Series | None]]:
-    """Each trial with its first selection."""
+def _trials(events: Sequence[Row]) -> Iterator[_Trial]:
+    """Each trial; its target is as the selection or, failing that, the start has it."""
     starts, selections = selections_by_trial(events)
-    start: Any
-    for index, start in enumerate(starts.itertuples()):
-        after = selections[selections["start"] == index]
-        named = _Start(index + 1 if pd.isna(start.trial) else int(start.trial), start)
-        yield named, None if after.empty else after.iloc[0]
+    first: dict[int, Row] = {}
+    for selection, place in selections:
+        first.setdefault(place, dict(selection))
+    for index, start in enumerate(starts):
+        number = index + 1 if start["trial"] is None else start["trial"]
+        selected = first.get(index)
+        target = {}
+        for axis in "xyz":
+            key = f"target_{axis}_mm"
+            target[axis] = start[key] if selected is None or selected[key] is None else selected[key]
+        yield _Trial(number, dict(start), selected, target)
 
 
-def _target(start: _Start, selection: pd.Series) -> dict[str, float | None]:
-    """Where the target was, in mm, by axis."""
-    return {axis: _first(selection[f"target_{axis}_mm"], getattr(start.event, f"target_{axis}_mm")) for axis in "xyz"}
-
-
-def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]) -> Iterator[Row]:
+def trial_rows(work: Work, events: Sequence[Row], tracks: Mapping[str, Shown]) -> Iterator[Row]:
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
-    for start, selection in _trials(events):
-        trial = {**work.session.ids, "trial": start.trial}
-        if selection is None:
+    for number, start, selected, target in _trials(events):
+        trial = {**work.session.ids, "trial": number}
+        if selected is None:
             yield trial | {"estimator": "recorded"}
             continue
-        target = _target(start, selection)
-        axes = [axis for axis in "xyz" if target[axis] is not None]
-        duration_s = float(selection["time_ns"] - start.event.time_ns) * tables.NANOSECONDS
-        shown: dict[str, pd.Series] = {"recorded": selection}
-        for name, rows in tracks.items():
-            before = rows[rows["time_ns"] <= selection["time_ns"]]
-            if len(before):
-                shown[name] = before.iloc[-1]
+        duration_s = float(selected["time_ns"] - start["time_ns"]) * tables.NANOSECONDS
+        shown: dict[str, Row] = {"recorded": {axis: selected[f"{axis}_mm"] for axis in "xyz"}}
+        for name, track in tracks.items():
+            at = int(np.searchsorted(track.time_ns, selected["time_ns"], side="right")) - 1
+            if at >= 0:
+                shown[name] = dict(zip(work.study.axes, track.mean[at].tolist(), strict=True))
         for name, where in shown.items():
-            squared = _squared_error(where, target, axes if name == "recorded" else list(work.study.axes))
+            squared = _squared_error(where, target)
             error = None if squared is None else float(np.sqrt(squared))
             yield trial | {
                 "estimator": name,
@@ -236,14 +244,9 @@ def trial_rows(work: Work, events: pd.DataFrame, tracks: dict[str, pd.DataFrame]
             }
 
 
-def _first(*values: Any) -> float | None:
-    return next((float(value) for value in values if not pd.isna(value)), None)
-
-
-def _squared_error(where: pd.Series, target: dict[str, float | None], axes: list[str]) -> float | None:
+def _squared_error(where: Row, target: Row) -> float | None:
     """Squared distance in mm² over the axes the target has; None if it has none or a coordinate is missing."""
-    used = [axis for axis in axes if target[axis] is not None]
-    values = [where[f"{axis}_mm"] for axis in used]
-    if not used or any(pd.isna(value) for value in values):
+    used = [axis for axis in where if target[axis] is not None]
+    if not used or any(where[axis] is None for axis in used):
         return None
-    return float(sum((value - target[axis]) ** 2 for axis, value in zip(used, values, strict=True)))
+    return float(sum((where[axis] - target[axis]) ** 2 for axis in used))

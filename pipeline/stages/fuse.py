@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pandas as pd
+import pyarrow as pa
 
 from pipeline import recording, tables
-from pipeline.recording import Recording
+from pipeline.recording import Shown
 from pipeline.stage import Outcome, Work
 from pipeline.study import Study
 
@@ -15,19 +14,17 @@ def run(work: Work) -> Outcome:
     """One session's tracks: a row an estimator and instant, from its first estimate on."""
     study = work.study
     loaded = recording.load(study, work.entry("ingest"))
-    parts = []
+    parts = [tables.of_rows("tracks", [])]
     for name in study.estimators if len(loaded.times) else ():
-        parts.append(tracked(study, name, loaded, work.session.id))
-    tables.write("tracks", pd.concat(parts) if parts else tables.frame("tracks", []), work.out)
+        parts.append(_table(study, work.session.id, name, recording.tracked(study, name, loaded)))
+    tables.write("tracks", pa.concat_tables(parts).combine_chunks(), work.out)
     return Outcome()
 
 
-def tracked(study: Study, name: str, loaded: Recording, session: str) -> pd.DataFrame:
+def _table(study: Study, session: str, name: str, shown: Shown) -> pa.Table:
     """One estimator's rows of `tracks`."""
-    track = recording.show(study, name, loaded, loaded.times)
-    known = np.isfinite(track.mean).all(axis=1)
-    columns = {"session": session, "estimator": name, "time_ns": loaded.to_ns(track.time[known])}
+    columns = {"session": session, "estimator": name, "time_ns": shown.time_ns}
     for index, axis in enumerate(study.axes):
-        columns[f"{axis}_mm"] = track.mean[known, index]
-        columns[f"sd_{axis}_mm"] = track.sd[known, index]
-    return tables.as_table("tracks", pd.DataFrame(columns))
+        columns[f"{axis}_mm"] = shown.mean[:, index]
+        columns[f"sd_{axis}_mm"] = shown.sd[:, index]
+    return tables.of_columns("tracks", len(shown.time_ns), columns)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 
 from pipeline import tables
 from pipeline.errors import SessionError, did_you_mean
@@ -44,7 +44,7 @@ def run(work: Work) -> Outcome:
     in_part = list(log.faults)
     quality: list[Row] = []
     left_out: list[Row] = []
-    found: dict[str, list[pd.DataFrame]] = {"positions": [], "readings": [], "imu": []}
+    found: dict[str, list[pa.Table]] = {"positions": [], "readings": [], "imu": []}
     for name, stream in study.streams.items():
         readings = _stream(log, name, stream, in_part)
         if readings is None:
@@ -67,16 +67,16 @@ def run(work: Work) -> Outcome:
             left_out.append(row)
     for name, parts in found.items():
         if parts:
-            tables.write(name, pd.concat(parts), work.out)
+            tables.write(name, pa.concat_tables(parts).combine_chunks(), work.out)
     tables.write("events", events, work.out)
-    tables.write("quality", tables.frame("quality", quality), work.out)
+    tables.write("quality", tables.of_rows("quality", quality), work.out)
     ids = {"participant": participant, "condition": condition, "session": session.id}
     reasons = [f"{row['stream']}: {row['note']}" for row in left_out]
     listed = [{**ids, "what": "samples left out", "reason": reason} for reason in reasons]
-    tables.write("exclusions", tables.frame("exclusions", listed), work.out)
+    tables.write("exclusions", tables.of_rows("exclusions", listed), work.out)
     if "order" in log.facts:
         order = {"session": session.id, "order": log.facts["order"]}
-        tables.write("session_orders", tables.frame("session_orders", [order]), work.out)
+        tables.write("session_orders", tables.of_rows("session_orders", [order]), work.out)
     in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
@@ -151,7 +151,7 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
     return Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep]), notes
 
 
-def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.DataFrame:
+def _table(session: str, name: str, stream: Stream, readings: Readings) -> pa.Table:
     """A stream's rows, in order of arrival, in millimetres."""
     order = np.lexsort((readings.stamp_ns, readings.arrival_ns))
     columns: dict[str, Any] = {
@@ -160,22 +160,21 @@ def _table(session: str, name: str, stream: Stream, readings: Readings) -> pd.Da
         "time_ns": readings.stamp_ns[order],
         "arrival_ns": readings.arrival_ns[order],
     }
-    values = readings.values[order]
-    for index, axis in enumerate("xyz"):
-        own = stream.kind in ("velocity", "linear")
-        column = f"a{axis}_mm_s2" if stream.kind == "acceleration" else axis if own else f"{axis}_mm"
-        columns[column] = values[:, index] * MM_PER_M
-    if stream.kind == "acceleration":
-        columns |= {f"g{axis}_rad_s": values[:, 3 + index] for index, axis in enumerate("xyz")}
-        columns |= {f"q{axis}": values[:, 6 + index] for index, axis in enumerate("xyzw")}
-        return tables.as_table("imu", pd.DataFrame(columns))
+    values = np.ascontiguousarray(readings.values[order].T)
     own = stream.kind in ("velocity", "linear")
-    return tables.as_table("readings" if own else "positions", pd.DataFrame(columns))
+    for index, axis in enumerate("xyz"):
+        column = f"a{axis}_mm_s2" if stream.kind == "acceleration" else axis if own else f"{axis}_mm"
+        columns[column] = values[index] * MM_PER_M
+    if stream.kind == "acceleration":
+        columns |= {f"g{axis}_rad_s": values[3 + index] for index, axis in enumerate("xyz")}
+        columns |= {f"q{axis}": values[6 + index] for index, axis in enumerate("xyzw")}
+        return tables.of_columns("imu", len(order), columns)
+    return tables.of_columns("readings" if own else "positions", len(order), columns)
 
 
-def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[pd.DataFrame, Row | None, int]:
+def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[pa.Table, Row | None, int]:
     """The session's events by arrival, each once; their row of `quality`; and how many were repetitions."""
-    nothing = tables.frame("events", [])
+    nothing = tables.of_rows("events", [])
     if study.events is None:
         return nothing, None, 0
     readings = log.topics.get(study.events.topic)
@@ -186,16 +185,16 @@ def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[p
         in_part.append(f"events: {'; '.join(readings.notes)}")
     order = np.argsort(readings.arrival_ns, kind="stable")
     rows = [_event(session, int(readings.arrival_ns[at]), readings.events[at]) for at in order]
-    every = tables.frame("events", rows)
-    once = every.drop_duplicates()
-    repeated = len(every) - len(once)
+    once = list({tuple(row.values()): row for row in rows}.values())
+    repeated = len(rows) - len(once)
     notes = [f"{repeated} repeated events left out"] if repeated else []
-    return once, quality_row(session, "events", readings, notes), repeated
+    return tables.of_rows("events", once), quality_row(session, "events", readings, notes), repeated
 
 
 def _event(session: str, time_ns: int, event: Mapping[str, Any]) -> Row:
     row: Row = {"session": session, "time_ns": time_ns, "type": event["type"]}
-    row["trial"] = event.get("trial")
+    trial: Any = event.get("trial")
+    row["trial"] = None if trial is None else int(trial)
     for axis in "xyz":
         for key, column in ((f"target_{axis}", f"target_{axis}_mm"), (axis, f"{axis}_mm")):
             value = event.get(key)

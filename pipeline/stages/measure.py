@@ -142,19 +142,19 @@ def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
 def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
     """From session_start to the last selection, a row a session that has both; what does not fit is listed."""
     rows = []
-    events = tables.read("events", work.entries["ingest"])
     sessions = {session.id: session for session in work.sessions}
-    for session_id, happened in events.groupby("session"):
-        session = sessions[str(session_id)]
+    for session_id, happened in _events_by_session(work):
+        session = sessions[session_id]
         who: Row = session.ids
-        times = {kind: found["time_ns"] for kind, found in happened.groupby("type")}
-        selections = times.get("selection", pd.Series(dtype="int64"))
-        stray = int((selections_by_trial(happened)[1]["start"] < 0).sum())
+        begins, selections = (
+            [event["time_ns"] for event in happened if event["type"] == kind] for kind in ("session_start", "selection")
+        )
+        stray = sum(place < 0 for _, place in selections_by_trial(happened)[1])
         if stray:
             reason = f"{stray} without the trial_start of their trial"
             exclusions.append({**who, "what": "selections outside any trial", "reason": reason})
-        if "session_start" in times and len(selections):
-            seconds = float(selections.max() - times["session_start"].min()) * tables.NANOSECONDS
+        if begins and selections:
+            seconds = float(max(selections) - min(begins)) * tables.NANOSECONDS
             if seconds < 0:
                 reason = "the last selection comes before session_start"
                 exclusions.append({**who, "measure": "completion_time_s", "what": "impossible time", "reason": reason})
@@ -162,6 +162,15 @@ def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
                 rows.append((session.participant, session.condition, session.id, seconds))
     found = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
     return _values(found, "completion_time_s", "seconds", "the events")
+
+
+def _events_by_session(work: Work) -> list[tuple[str, list[Row]]]:
+    """Each session's events, in the order of their ids."""
+    found: dict[str, list[Row]] = {}
+    for folder in work.entries["ingest"]:
+        for event in tables.read_arrow("events", folder).to_pylist():
+            found.setdefault(event["session"], []).append(event)
+    return sorted(found.items())
 
 
 def _rated_values(work: Work) -> Iterator[pd.DataFrame]:

@@ -9,7 +9,6 @@ from pipeline import recording, tables
 from pipeline.recording import Recording
 from pipeline.stage import Outcome, Work
 from pipeline.stages.assess import accuracy_row, trial_rows
-from pipeline.stages.fuse import tracked
 from pipeline.study import Study
 
 _Held = tuple[Recording, tuple[str, Samples] | None]
@@ -21,12 +20,12 @@ def run(work: Work) -> Outcome:
     study, ingested = work.study, work.entry("ingest")
     (name,) = study.estimators
     loaded, reference = _recording(study, ingested)
-    track = tracked(study, name, loaded, work.session.id) if len(loaded.times) else tables.frame("tracks", [])
-    row = accuracy_row(work, loaded, reference, name, track)
-    tables.write("accuracy", tables.frame("accuracy", [row] if row else []), work.out)
-    trials = trial_rows(work, tables.read("events", ingested), {name: track})
+    shown = recording.tracked(study, name, loaded)
+    row = accuracy_row(work, loaded, reference, name, shown)
+    tables.write("accuracy", tables.of_rows("accuracy", [row] if row else []), work.out)
+    trials = trial_rows(work, tables.read_arrow("events", ingested).to_pylist(), {name: shown})
     rows = [trial for trial in trials if trial["estimator"] == name]
-    tables.write("trials", tables.frame("trials", rows), work.out)
+    tables.write("trials", tables.of_rows("trials", rows), work.out)
     return Outcome()
 
 

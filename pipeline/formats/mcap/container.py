@@ -68,6 +68,7 @@ class Walk:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     topics: dict[str, Topic] = field(default_factory=dict)
+    unshared: list[Messages] = field(default_factory=list)  # not yet given to their topics: many at once are faster
     orphans: list[Messages] = field(default_factory=list)  # their channel is named later, or never
     loose: bytearray = field(default_factory=bytearray)  # records outside of any chunk, not looked at yet
     facts: dict[str, str] = field(default_factory=dict)
@@ -191,9 +192,9 @@ def _passed_over(file: BinaryIO, length: int, checksum: int) -> int:
 
 def _adopt_orphans(walk: Walk) -> None:
     """A damaged chunk may have held a channel's name; the log's summary names it again."""
-    orphans = joined(walk.orphans)
-    walk.orphans.clear()
-    _share_out(walk, orphans)
+    _share_out(walk)
+    walk.unshared, walk.orphans = walk.orphans, []
+    _share_out(walk)
     nameless = sum(map(len, walk.orphans))
     if nameless:
         walk.note(f"{nameless} messages are left out: the log does not say what topic they belong to")
@@ -276,12 +277,16 @@ def _take_records(walk: Walk, data: bytes) -> bool:
     if too_short:
         walk.note(f"{too_short} messages are left out: they are too short to be any")
         walk.unknown_loss = True
-    _share_out(walk, messages)
+    walk.unshared.append(messages)
+    if sum(len(part.data) for part in walk.unshared) > _BLOCK:
+        _share_out(walk)
     return whole
 
 
-def _share_out(walk: Walk, messages: Messages) -> None:
+def _share_out(walk: Walk) -> None:
     """Each message to its topic, in the order of the file; the bytes of the wanted topics only are kept."""
+    messages = joined(walk.unshared)
+    walk.unshared.clear()
     shares: dict[str | None, list[IntArray]] = {}
     for channel_id, share in messages.by_channel():
         channel = walk.channels.get(channel_id)

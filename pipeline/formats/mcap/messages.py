@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipeline.formats.log import IntArray
 
-_LENGTH = struct.Struct("<Q")
+_LENGTH = struct.Struct("<xQ")  # after the opcode
 RECORD_HEAD_BYTES = 9
 _HEAD = np.dtype(
     [
@@ -86,13 +86,16 @@ def joined(parts: Sequence[Messages]) -> Messages:
     def column(name: str, kind: type) -> npt.NDArray[Any]:
         return np.concatenate([np.zeros(0, kind), *(getattr(part, name) for part in parts)])
 
-    length = column("length", np.int64)
+    if len(parts) == 1:
+        return parts[0]
+    sizes = [len(part.data) for part in parts]
+    begins = np.cumsum([0, *sizes])[: len(parts)]
     return Messages(
         column("log_time", np.uint64),
         column("publish_time", np.uint64),
         column("channel", np.uint16),
-        np.cumsum(length) - length,
-        length,
+        column("start", np.int64) + np.repeat(begins, [len(part) for part in parts]),
+        column("length", np.int64),
         b"".join([part.data for part in parts]),
     )
 
@@ -102,12 +105,12 @@ def record_starts(data: bytes, limit: int) -> tuple[list[int], bool]:
     starts: list[int] = []
     at, end = 0, len(data)
     last = end - RECORD_HEAD_BYTES
-    length_at = _LENGTH.unpack_from
+    length_at, begins = _LENGTH.unpack_from, starts.append
     for _ in range(limit + 1):
         if at > last:
             break
-        starts.append(at)
-        at += RECORD_HEAD_BYTES + length_at(data, at + 1)[0]
+        begins(at)
+        at += 9 + length_at(data, at)[0]  # RECORD_HEAD_BYTES, which looking up takes a tenth of the loop
     if at > end:
         starts.pop()
     return starts, at == end

@@ -51,7 +51,9 @@ def decode(walk: Walk, topic: str, content: Content) -> Readings:
         stamp, values = _measured(walk, messages, content, failures)
     for index in np.flatnonzero(np.maximum(messages.log_time, messages.publish_time) > _TIME_LIMIT_NS).tolist():
         failures.setdefault(index, "its time is out of all range")
-    kept = np.setdiff1d(np.arange(len(messages)), list(failures)).astype(np.int64)
+    whole = np.ones(len(messages), bool)
+    whole[list(failures)] = False
+    kept = np.flatnonzero(whole)
     return Readings(
         stamp[kept],
         messages.log_time[kept].astype(np.int64),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from mcap.records import Channel, Schema
@@ -15,6 +18,8 @@ from pipeline.formats.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields, Re
 from pipeline.formats.mcap.messages import Messages
 from pipeline.formats.mcap.schemas import SCHEMAS
 
+_DEFINITIONS_KEPT = 16
+
 
 def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
     """One of UNDECODABLE if the schema is not the content's, or cannot be followed."""
@@ -24,9 +29,7 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         raise ValueError(f"it holds {found}, and a stream of kind {content} needs {needed}")
     if schema.encoding != "ros2msg":
         raise ValueError(f'its schema is written as "{schema.encoding}", not ros2msg')
-    check_definition(schema)
-    decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
-    assert decode is not None  # noqa: S101
+    decode = _stock(channel.message_encoding, schema.name, schema.data)
 
     def one(payload: bytes) -> Reading:
         _check_length(payload, cdr.NUMBERS[content])
@@ -37,7 +40,7 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         return seconds, nanoseconds, [float(value) for value in _kept(message, content)]
 
     def many(messages: Messages, which: IntArray, found: Fields) -> None:
-        for length in np.unique(messages.length[which]):
+        for length in set(messages.length[which].tolist()):
             _decode_equally_long(messages, which[messages.length[which] == length], found)
 
     def _decode_equally_long(messages: Messages, which: IntArray, found: Fields) -> None:
@@ -56,6 +59,16 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
                 found.take(which[fits], fast, fits)
 
     return Decoder(one, many)
+
+
+@lru_cache(maxsize=_DEFINITIONS_KEPT)
+def _stock(encoding: str, name: str, definition: bytes) -> Callable[[bytes], Any]:
+    """The stock decoder of a definition, remembered: the logs of a study have the same few."""
+    schema = Schema(data=definition, encoding="ros2msg", id=1, name=name)
+    check_definition(schema)
+    decode = DecoderFactory().decoder_for(encoding, schema)
+    assert decode is not None  # noqa: S101
+    return decode
 
 
 def _check_length(payload: bytes, numbers: int) -> None:
