@@ -23,7 +23,7 @@ from pipeline.study import Session, Study
 STAGE_OF: Mapping[str, str] = {
     **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),
     "tracks": "fuse",
-    "noise_residuals": "assess",
+    **dict.fromkeys(("noise_residuals", "movements"), "assess"),
     **dict.fromkeys(("observations", "orders"), "measure"),
     **dict.fromkeys(
         (
