@@ -20,7 +20,6 @@ _LABELS = {
     "completion_time_s": "Completion time (s)",
     "trial_time_s": "Time per trial (s)",
     "throughput_bits_s": "Throughput (bit/s)",
-    "path_efficiency": "Path efficiency (shortest over covered)",
     "corrections": "Corrections per trial",
 }
 _UNITS = {

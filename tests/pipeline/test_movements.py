@@ -16,6 +16,7 @@ from pipeline import movements, tables
 from pipeline.formats.mcap import Message
 from pipeline.movements import Path as HandPath
 from pipeline.trials import selections_by_trial
+from pipeline.wording import measure_label, unit_of
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
@@ -356,3 +357,16 @@ def test_measures_of_movement_can_be_compared(folder: Folder, steadyhand: Steady
         2,
         "undefined: all differences are zero",
     )
+
+
+@pytest.mark.parametrize(
+    ("measure", "label", "unit"),
+    [
+        ("throughput_bits_s", "Throughput (bit/s)", "bit/s"),
+        ("path_efficiency", "Path efficiency", ""),
+        ("overshoot_mm", "Overshoot (mm)", "mm"),
+        ("corrections", "Corrections per trial", ""),
+    ],
+)
+def test_what_the_report_calls_them(measure: str, label: str, unit: str) -> None:
+    assert (measure_label(measure), unit_of(measure)) == (label, unit)
