@@ -23,7 +23,7 @@ from pipeline.study import Session, Study
 STAGE_OF: Mapping[str, str] = {
     **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),
     "tracks": "fuse",
-    **dict.fromkeys(("noise_residuals", "excerpts", "lead_curves", "stream_rates"), "assess"),
+    **dict.fromkeys(("noise_residuals", "movements", "excerpts", "lead_curves", "stream_rates"), "assess"),
     **dict.fromkeys(("observations", "orders", "selections"), "measure"),
     **dict.fromkeys(
         (

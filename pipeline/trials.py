@@ -1,4 +1,4 @@
-"""Which selection belongs to which trial of a session."""
+"""Which selection belongs to which trial of a session, and how people moved from one to the next."""
 
 from __future__ import annotations
 
@@ -6,14 +6,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
+
+from fusion_core import FloatArray
+from pipeline import movements, tables
 
 Row = Mapping[str, Any]
+_TOLD = ["trial", "start_s", "selection_s", "left_s"]
 
 
 def selections_by_trial(events: Sequence[Row]) -> tuple[list[Row], list[tuple[Row, int]]]:
     """A session's trial_starts in order, and its selections, each with the place of its start among them, -1 for none.
 
-    A selection belongs to the newest start before it, unless both name their trial and the names differ.
+    A selection belongs to the newest start before it, unless both name their trial and the names differ: then to the
+    one before that, if the newest start is of the very moment of the selection, or else to none.
     """
     in_order = sorted(events, key=lambda event: event["time_ns"])  # stable
     starts = [event for event in in_order if event["type"] == "trial_start"]
@@ -21,10 +27,51 @@ def selections_by_trial(events: Sequence[Row]) -> tuple[list[Row], list[tuple[Ro
     times = [event["time_ns"] for event in starts]
     found = []
     for selection in selections:
-        place = int(np.searchsorted(times, selection["time_ns"], side="right")) - 1
-        if place >= 0:
-            named, own = starts[place]["trial"], selection["trial"]
-            if named is not None and own is not None and named != own:
-                place = -1
+        place, own = int(np.searchsorted(times, selection["time_ns"], side="right")) - 1, selection["trial"]
+        while place >= 0 and own is not None and starts[place]["trial"] not in (None, own):
+            place = place - 1 if times[place] == selection["time_ns"] else -1
         found.append((selection, place))
     return starts, found
+
+
+def told(events: Sequence[Row], origin_ns: int) -> pd.DataFrame:
+    """A row a trial: trial, start_s, its first selection's time and place, its last one's (`left_`), and its target.
+
+    Coordinates are in mm, times in s since `origin_ns`; NaN for what there is not.
+    """
+    starts, selections = selections_by_trial(events)
+    by_trial: dict[int, list[Row]] = {}
+    for selection, place in selections:
+        by_trial.setdefault(place, []).append(selection)
+    rows = []
+    for index, start in enumerate(starts):
+        own = by_trial.get(index, [])
+        first, last = (own[0], own[-1]) if own else ({}, {})
+        row = {"trial": index + 1 if start["trial"] is None else start["trial"]}
+        for name, event in (("start_s", start), ("selection_s", first), ("left_s", last)):
+            row[name] = (event["time_ns"] - origin_ns) * tables.NANOSECONDS if event else np.nan
+        for axis in "xyz":
+            target = first.get(f"target_{axis}_mm")
+            row[f"target_{axis}_mm"] = start[f"target_{axis}_mm"] if target is None else target
+            row[f"selected_{axis}_mm"], row[f"left_{axis}_mm"] = first.get(f"{axis}_mm"), last.get(f"{axis}_mm")
+        rows.append(row)
+    places = [f"{what}_{axis}_mm" for what in ("target", "selected", "left") for axis in "xyz"]
+    found = pd.DataFrame(rows, columns=[*_TOLD, *places])
+    return found.astype({"trial": "Int64", **dict.fromkeys([*_TOLD[1:], *places], "float64")})
+
+
+def with_movements(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials of one session in their order, as `told` gives them, with duration_s and the columns of a movement."""
+    duration_s = (trials["selection_s"] - trials["start_s"]).to_numpy(np.float64)
+    pause_s = trials["start_s"].to_numpy(np.float64) - movements.previous(trials["left_s"].to_numpy(np.float64))
+    target, selected, left = (coordinates(trials, what) for what in ("target", "selected", "left"))
+    return trials.assign(
+        duration_s=np.where(duration_s >= 0, duration_s, np.nan),
+        **vars(movements.aimed(target, selected, left, pause_s)),
+    )
+
+
+def coordinates(trials: pd.DataFrame, what: str, axes: str = "xyz") -> FloatArray:
+    """Places (n, d) in mm of trials as `told` gives them: of a target, of what was selected or where it was left."""
+    found: FloatArray = trials[[f"{what}_{axis}_mm" for axis in axes]].to_numpy(np.float64)
+    return found

@@ -19,6 +19,8 @@ _LABELS = {
     "selection_rmse_mm": "Selection error, RMSE (mm)",
     "completion_time_s": "Completion time (s)",
     "trial_time_s": "Time per trial (s)",
+    "throughput_bits_s": "Throughput (bit/s)",
+    "corrections": "Corrections per trial",
 }
 _UNITS = {
     "_px2": " (px²)",

@@ -25,7 +25,7 @@ STAGES: tuple[Stage, ...] = (
         "session",
         "pipeline.stages.assess:run",
         reads=("ingest", "fuse"),
-        settings=("streams", "estimators", "axes", "shown"),
+        settings=("streams", "estimators", "axes", "shown", "task"),
     ),
     Stage(
         "measure",

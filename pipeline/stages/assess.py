@@ -1,4 +1,4 @@
-"""One session's facts: accuracy against the reference, agreement with the display, sensor noise, trials."""
+"""One session's facts: accuracy against the reference, agreement with the display, sensor noise, trials, movements."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusion_core import FloatArray, Samples, accuracy, noise
-from pipeline import excerpts, recording, tables
+from pipeline import excerpts, movements, recording, tables
 from pipeline.estimators import sensors
 from pipeline.phone import described
 from pipeline.recording import Recording, Shown
 from pipeline.stage import Outcome, Work
 from pipeline.study import Study
-from pipeline.trials import selections_by_trial
+from pipeline.trials import coordinates, selections_by_trial, told, with_movements
 
 _UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}
 _SETTLED_S = 1.0  # after the first frame's arrival: the grid of accuracy begins there
@@ -25,7 +26,7 @@ Row = dict[str, Any]
 
 
 def run(work: Work) -> Outcome:
-    """One session's accuracy, agreement, noise, trials and selections, and what figures of it show."""
+    """One session's accuracy, agreement, noise, trials, selections and movements, and what figures of it show."""
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
@@ -42,6 +43,7 @@ def run(work: Work) -> Outcome:
     events = tables.read_arrow("events", ingested).to_pylist()
     tables.write("trials", tables.of_rows("trials", list(trial_rows(work, events, tracks))), work.out)
     tables.write("selections", tables.of_rows("selections", list(selection_rows(work, events))), work.out)
+    tables.write("movements", _movements(work, loaded, events), work.out)
     counted = list(calibration_rows(study, session.id, loaded, reference, tracks))
     tables.write("calibration", tables.of_rows("calibration", counted), work.out)
     tables.write("excerpts", excerpts.excerpt(study, session.id, loaded, tracks), work.out)
@@ -250,3 +252,47 @@ def _squared_error(where: Row, target: Row) -> float | None:
     if not used or any(where[axis] is None for axis in used):
         return None
     return float(sum((where[axis] - target[axis]) ** 2 for axis in used))
+
+
+def _movements(work: Work, loaded: Recording, events: Sequence[Row]) -> pd.DataFrame:
+    """The session's movements from target to target, and the hand's path of each as far as it is known."""
+    trials = told(events, loaded.origin_ns)
+    if trials.empty:
+        return tables.frame("movements", [])
+    trials = with_movements(trials)
+    hand = _hand(work.study, loaded)
+    paths = [] if hand is None else movements.smoothed(hand.time, hand.value)
+    targets = coordinates(trials, "target")
+    rows = []
+    for index, (start_s, selection_s) in enumerate(zip(trials["start_s"], trials["selection_s"], strict=True)):
+        path = movements.between(paths, start_s, selection_s)
+        before = targets[index - 1] if index else np.full(3, np.nan)
+        rows.append({} if path is None else _of_path(work.study, path, before, targets[index]))
+    of_paths = pd.DataFrame(rows, index=trials.index)
+    return tables.as_table("movements", pd.concat([trials.assign(session=work.session.id), of_paths], axis=1))
+
+
+def _hand(study: Study, loaded: Recording) -> Samples | None:
+    """The best that is known of where the hand was: the reference, else what was displayed, else the tracker."""
+    tracked = loaded.samples[study.tracker] if study.tracker is not None else None
+    return next((one for one in (loaded.reference, loaded.display, tracked) if one is not None and len(one)), None)
+
+
+def _of_path(study: Study, path: movements.Path, before: FloatArray, target: FloatArray) -> Row:
+    """What a trial's path says: the straight way is from where the hand was, the task's way from target to target."""
+    line = np.array(study.task.path_mm if study.task is not None else ())
+    place = dict(zip("xyz", zip(before, target, strict=True), strict=True))
+    axes: list[str] = [axis for axis in study.axes if np.isfinite(place[axis][1])]
+    on_line = len(line) > 0 and {"x", "y"} <= set(axes)
+    if on_line:
+        axes = ["x", "y"]
+    hand = path.position_mm[:, [study.axes.index(axis) for axis in axes]]
+    begin, aim = (np.array([place[axis][end] for axis in axes]) for end in (0, 1))
+    begin = begin if np.isfinite(begin).all() else hand[0]
+    way = movements.route(line, begin, aim) if on_line else np.vstack([begin, aim])
+    return {
+        "path_length_mm": movements.length_mm(path.position_mm),
+        "shortest_mm": movements.length_mm(way if on_line else path.position_mm[[0, -1]]),
+        "overshoot_mm": movements.overshoot_mm(hand, way),
+        "corrections": movements.corrections(path),
+    }

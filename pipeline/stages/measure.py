@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import orders, study_tables, tables
+from pipeline import movements, orders, study_tables, tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.stage import Outcome, Work
 from pipeline.study import Exclusion, Study
-from pipeline.trials import selections_by_trial
+from pipeline.trials import selections_by_trial, with_movements
 
 Row = dict[str, Any]
 CELL = ["participant", "condition"]
@@ -26,12 +26,13 @@ def run(work: Work) -> Outcome:
     """The study's trials, measures and exclusions; PipelineError for a bad table."""
     study = work.study
     exclusions: list[Row] = []
-    trials, selections = _trials(work)
+    (trials, selections), moved = _trials(work), _movements(work)
     tabled = _measures_table(work)
     values = pd.concat(
         [
             _selection_values(study, trials),
             _completion_values(work, exclusions),
+            *_movement_values(moved),
             *_rated_values(work),
             *_tabled_values(work, tabled),
         ]
@@ -42,10 +43,9 @@ def run(work: Work) -> Outcome:
         _check_exclusion(excluded, known)
         values = values[~_matches(excluded, values)]
         if excluded.measure is None:
-            trials = trials[~_matches(excluded, trials)]
-            selections = selections[~_matches(excluded, selections)]
+            trials, selections, moved = (rows[~_matches(excluded, rows)] for rows in (trials, selections, moved))
         exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
-    exclusions += _incomplete_trials(trials)
+    exclusions += _incomplete_trials(trials, moved)
     values = _finite(values, exclusions)
     measures = _with_totals(study, _cells(values, CELL), CELL)
     exclusions += _gaps(work, measures)
@@ -108,6 +108,22 @@ def _trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
     return tables.as_table("trials", tabled), tables.as_table("selections", selected)
 
 
+def _movements(work: Work) -> pd.DataFrame:
+    """The movements of all sessions, or of trials.csv in the order of their starts, and whose they are."""
+    people = pd.DataFrame([session.ids for session in work.sessions], columns=[*CELL, "session"])
+    logged = tables.read("movements", work.entries["assess"]).merge(people.astype("string"), on="session")
+    path = _path(work, "trials")
+    if path is None:
+        return logged
+    table = study_tables.read_trials(path, work.study.conditions).sort_values("start_s", kind="stable")
+    table["left_s"] = table["selection_s"]
+    for axis in "xyz":
+        table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
+    cells = [with_movements(rows) for _, rows in table.groupby([*CELL, "session"], sort=True)]
+    told = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
+    return pd.concat([tables.as_table("movements", told), told[CELL].astype("string")], axis=1)
+
+
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
     """Rows of one measure: participant, condition, session, factors, period, measure, value, and where it stands."""
     return pd.DataFrame(
@@ -137,6 +153,27 @@ def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
         in_px = parts[0].assign(measure="selection_mse_px2")
         parts.append(in_px.assign(value=in_px["value"] * study.display.px_per_mm**2))
     return pd.concat(parts)
+
+
+def _movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """Throughput, a row a sequence of a session, and what the hand's path says, a row a trial."""
+    rows = [
+        (*cell, throughput)
+        for cell, trials in moved.groupby([*CELL, "session"], dropna=False, sort=True)
+        for throughput in movements.throughputs(
+            *(trials[name].to_numpy(np.float64) for name in ("amplitude_mm", "moved_mm", "along_mm", "duration_s"))
+        )
+    ]
+    sequences = pd.DataFrame(rows, columns=[*CELL, "session", "throughput"])
+    yield _values(sequences, "throughput_bits_s", "throughput", "the trials")
+    covered = moved["path_length_mm"].where(moved["path_length_mm"] > 0)
+    for_measures = moved.assign(efficiency=moved["shortest_mm"] / covered)
+    for measure, column in (
+        ("path_efficiency", "efficiency"),
+        ("overshoot_mm", "overshoot_mm"),
+        ("corrections", "corrections"),
+    ):
+        yield _values(for_measures[for_measures[column].notna()], measure, column, "the trials")
 
 
 def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
@@ -254,17 +291,19 @@ def _check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
         raise PipelineError(f"study.yaml: exclusions: nothing in the data fits {named}; there is nothing to exclude")
 
 
-def _incomplete_trials(trials: pd.DataFrame) -> list[Row]:
-    """Trials without a measurable selection, or without a duration, counted by session or cell."""
+def _incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
+    """Trials without a measurable selection, a duration or a path of the hand, counted by session or cell."""
     recorded = trials[trials["estimator"] == "recorded"]
+    timed = moved[moved["duration_s"].notna()]
     rows = []
     cell: Any
-    for measure, column, what in (
-        ("selection_mse_mm2", "squared_error_mm2", "trials without a measurable selection"),
-        ("trial_time_s", "duration_s", "trials without a duration"),
+    for measure, column, what, all_trials in (
+        ("selection_mse_mm2", "squared_error_mm2", "trials without a measurable selection", recorded),
+        ("trial_time_s", "duration_s", "trials without a duration", recorded),
+        ("path_efficiency", "path_length_mm", "trials without a path of the hand", timed),
     ):
-        missing = recorded[recorded[column].isna()]
-        if len(missing) == len(recorded):
+        missing = all_trials[all_trials[column].isna()]
+        if len(missing) == len(all_trials):
             continue  # a study that does not measure this at all
         for cell, found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
             participant, condition, session = cell
