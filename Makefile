@@ -6,7 +6,7 @@ STUDY ?= studies/feng2016
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate power plan test lint bench lock clean
+.PHONY: help report check replay simulate explore power plan test lint bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -25,6 +25,9 @@ replay: .venv/installed ## variants of the estimators, ranked: STUDY=… ARGS="-
 
 simulate: .venv/installed ## write the logs of a simulated STUDY anew
 	@$(steadyhand) simulate "$(STUDY)" $(ARGS)
+
+explore: .venv/installed ## a better tracker or a better filter? a simulated STUDY under many trackers
+	@$(steadyhand) explore "$(STUDY)" $(ARGS)
 
 power: .venv/installed ## how many participants? ARGS="--effect 0.5"
 	@$(steadyhand) power $(ARGS)
