@@ -94,7 +94,9 @@ def explore(
         try:
             future.result()
         except WorkerLostError as lost:
-            raise PipelineError(f"explore: a process was lost ({lost}); run it again, perhaps with fewer --jobs") from None
+            raise PipelineError(
+                f"explore: a process was lost ({lost}); run it again, perhaps with fewer --jobs"
+            ) from None
         done()
     placed = [(tracker, estimator) for tracker, estimator in points for _ in range(grid.repeats)]
     return [

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import matplotlib.cm
 import matplotlib.colors
 import matplotlib.patches
+import matplotlib.ticker
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
@@ -61,6 +63,7 @@ def surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -
     bar = figure.colorbar(matplotlib.cm.ScalarMappable(scale, _COLOURS), ax=grid.ravel().tolist(), aspect=30)
     bar.set_label(surface.label)
     if surface.logarithmic:
+        bar.ax.yaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
         bar.ax.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
         bar.ax.yaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
     return figure
@@ -101,7 +104,7 @@ def _panel(
     for side in axes.spines.values():
         side.set_visible(False)
     if own is not None:
-        corner = wide.columns.get_loc(own.latency_s), wide.index.get_loc(own.noise_sd_mm)
+        corner = list(wide.columns).index(own.latency_s), list(wide.index).index(own.noise_sd_mm)
         axes.add_patch(
             matplotlib.patches.Rectangle(corner, 1, 1, fill=False, edgecolor=_OWN, linewidth=2.2, clip_on=False)
         )

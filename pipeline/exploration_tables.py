@@ -100,8 +100,9 @@ def differences(people: pd.DataFrame, alpha: float) -> list[Row]:
         for measure in MEASURES:
             for second in others:
                 row = dict(zip(Tracker._fields, tracker, strict=True)) | {"measure": measure}
-                pair = [_values(sessions, estimator, measure) for estimator in (first, second)]
-                rows.append(row | {"first": first, "second": second} | _difference(*pair, alpha))
+                row |= {"first": first, "second": second}
+                of_first, of_second = (_values(sessions, estimator, measure) for estimator in (first, second))
+                rows.append(row | _difference(of_first, of_second, alpha))
     return rows
 
 

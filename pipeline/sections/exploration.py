@@ -68,7 +68,7 @@ def pays_sentence(pays: Pays, estimator: str) -> Sequence[str]:
     if by_filter is not None:
         parts.append(f"{by_filter.estimator} in place of {estimator} {_change(pays, by_filter)}")
     if by_tracker is not None:
-        parts.append(f"a tracker of {_tracker(by_tracker.tracker)} under {estimator} {_change(pays, by_tracker)}")
+        parts.append(f"{_better(by_tracker.tracker, now.tracker)} under {estimator} {_change(pays, by_tracker)}")
     if by_filter is not None and pays.enough is not None and pays.verdict != "filter":
         parts.append(f"{_better(pays.enough.tracker, now.tracker)} would already do as much as the filter")
     start = f"from {_figure(pays, now)} with {estimator} at {_tracker(now.tracker)}"
@@ -130,7 +130,9 @@ def _steps(explored: Explored) -> Table:
             shown.append((f"filter: {row['estimator']}", row))
         elif row["estimator"] == first and tracker.at_least(own) and _respects(tracker, own) == 1:
             shown.append((f"tracker: {_better(tracker, own)}", row))
-    best = min((row for row in rows if _of(row).at_least(own)), key=lambda row: row["selection_rmse_mm"] or float("inf"))
+    best = min(
+        (row for row in rows if _of(row).at_least(own)), key=lambda row: row["selection_rmse_mm"] or float("inf")
+    )
     shown.append((f"least error of all: {best['estimator']} at {_tracker(_of(best))}", best))
     cells = tuple((name, *_outcome(row), *(_less(row, here, column) for column in _COLUMNS)) for name, row in shown)
     titles = ("Step", "Error, RMSE (mm)", "Time (s)", "Error less by", "Time less by")
@@ -199,9 +201,7 @@ def _more(rows: Sequence[Row]) -> str:
     return f" The first {_ROWS_MAX} of {len(rows)}; all are in results.json." if len(rows) > _ROWS_MAX else ""
 
 
-def _draw(
-    explored: Explored, table: pd.DataFrame, panels: str, surface: Surface, path: Path, caption: str
-) -> Figure:
+def _draw(explored: Explored, table: pd.DataFrame, panels: str, surface: Surface, path: Path, caption: str) -> Figure:
     figures.draw(exploration_figures.surfaces, path, table, panels, surface, explored.own)
     alt = f"Heat maps of {surface.label} over latency and noise; the values stand in the table that follows."
     return Figure(f"figure-{path.stem}", path.name, caption, alt)
@@ -211,15 +211,17 @@ def _needed(explored: Explored, drawn: Path) -> Iterator[Block]:
     table = explored.found["explore_differences"]
     yield Paragraph(
         (
-            f"So many participants, each with both estimators, would show the difference with a power of {POWER:.0%} in"
-            f" a two-sided paired t test at the study's alpha of {explored.study.alpha:g} (noncentral t), if the"
+            "So many participants, each with both estimators, would show the difference with a power of"
+            f" {percent(POWER, 0)} in a two-sided paired t test at the study's alpha of {explored.study.alpha:g} (noncentral t), if the"
             " difference between real people were as between simulated ones.",
         )
     )
     for measure in MEASURES:
-        rows = table[table["measure"] == measure]
-        named = rows.assign(pair=rows["first"] + " or " + rows["second"])
-        caption = f"Participants needed to show a difference in {_NAMES[measure]}. {_OUTLINED} Grey: more than {MOST}, or"
+        of_measure = table[table["measure"] == measure]
+        named = of_measure.assign(pair=of_measure["first"] + " or " + of_measure["second"])
+        caption = (
+            f"Participants needed to show a difference in {_NAMES[measure]}. {_OUTLINED} Grey: more than {MOST}, or"
+        )
         caption += " no difference."
         yield _draw(explored, named, "pair", PARTICIPANTS, drawn / f"participants-{measure}.svg", caption)
     rows = explored.rows("explore_differences")
@@ -257,15 +259,16 @@ def _people(row: Row) -> str:
 def _how(explored: Explored) -> Paragraph:
     settings = explored.study.simulation
     assert settings is not None  # noqa: S101 - there were people
-    rows = explored.rows("explore")
-    people = f"{counted(explored.participants, 'person', 'people')} in each of {counted(explored.repeats, 'small study', 'small studies')}"
+    people = counted(explored.participants, "person", "people")
+    studies = counted(explored.repeats, "small study", "small studies")
     return Paragraph(
         (
-            f"{counted(len(rows), 'point')}, a tracker and an estimator each; {people}, drawn from seed {settings.seed}"
-            " and the traits of study.yaml. They are the same people at every point. With one estimator their luck is"
-            " the same with every tracker, so that trackers are compared with little noise; with another estimator it"
-            " is another, as in two sessions of one person, or too few participants would seem enough. Each tracker's"
-            " latency, noise and rate are stated to the estimators as well, as a lab would. Every number of this report"
-            " stands in results.json; the tables are beside it as CSV and Parquet, explore_people with a row a session.",
+            f"{counted(len(explored.found['explore']), 'point')}, a tracker and an estimator each; {people} in each of"
+            f" {studies}, drawn from seed {settings.seed} and the traits of study.yaml. They are the same people at"
+            " every point. With one estimator their luck is the same with every tracker, so that trackers are compared"
+            " with little noise; with another estimator it is another, as in two sessions of one person, or too few"
+            " participants would seem enough. Each tracker's latency, noise and rate are stated to the estimators as"
+            " well, as a lab would. Every number of this report stands in results.json; the tables are beside it as CSV"
+            " and Parquet, explore_people with a row a session.",
         )
     )
