@@ -38,7 +38,7 @@ class Surface:
     empty: str = NOTHING
 
 
-ERROR = Surface("selection_rmse_mm", "Selection error, RMSE (mm)")
+ERROR = Surface("selection_rmse_mm", "Selection error, RMSE (mm)", logarithmic=True)
 TIME = Surface("completion_time_s", "Completion time (s)")
 PARTICIPANTS = Surface("participants_needed", "Participants needed", 0, logarithmic=True, empty=f"> {MOST}")
 
@@ -46,7 +46,7 @@ PARTICIPANTS = Surface("participants_needed", "Participants needed", 0, logarith
 def surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -> Figure:
     """A row of panels for each value of the text column `panels`, a panel in it for each rate; a frame marks `own`.
 
-    All share a scale; a cell without a value is grey.
+    All share a scale; a cell without a value is grey, and one whose row is true in `bracketed` stands in brackets.
     """
     names, rates = list(dict.fromkeys(table[panels])), sorted(table["rate_hz"].unique())
     figure = Figure(figsize=(_WIDTH, 0.75 + 1.75 * len(names)))
@@ -63,7 +63,7 @@ def surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -
     bar = figure.colorbar(matplotlib.cm.ScalarMappable(scale, _COLOURS), ax=grid.ravel().tolist(), aspect=30)
     bar.set_label(surface.label)
     if surface.logarithmic:
-        bar.ax.yaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+        bar.ax.yaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 3, 5, 7)))
         bar.ax.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
         bar.ax.yaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
     return figure
@@ -87,27 +87,41 @@ def _panel(
     axes: Axes, rows: pd.DataFrame, surface: Surface, scale: matplotlib.colors.Normalize, own: Tracker | None
 ) -> None:
     """A cell a tracker, latency to the right and noise upwards, with its value."""
-    wide = rows.pivot_table(
-        index="noise_sd_mm", columns="latency_s", values=surface.column, aggfunc="first", dropna=False
-    ).sort_index()
-    values = wide.to_numpy(np.float64, na_value=np.nan)
+    latencies, noises = sorted(rows["latency_s"].unique()), sorted(rows["noise_sd_mm"].unique())
+    values, bracketed = np.full((len(noises), len(latencies)), np.nan), np.zeros((len(noises), len(latencies)), bool)
+    for row in rows.to_dict("records"):
+        cell = noises.index(row["noise_sd_mm"]), latencies.index(row["latency_s"])
+        value = row[surface.column]
+        values[cell] = np.nan if pd.isna(value) else value
+        bracketed[cell] = row.get("bracketed", False)
+    _cells(axes, values, bracketed, surface, scale)
+    axes.set_xticks(np.arange(len(latencies)) + 0.5, [f"{1000 * one:g}" for one in latencies])
+    axes.set_yticks(np.arange(len(noises)) + 0.5, [f"{one:g}" for one in noises])
+    axes.tick_params(length=0)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    if own is not None:
+        corner = latencies.index(own.latency_s), noises.index(own.noise_sd_mm)
+        axes.add_patch(
+            matplotlib.patches.Rectangle(corner, 1, 1, fill=False, edgecolor=_OWN, linewidth=2.2, clip_on=False)
+        )
+
+
+def _cells(
+    axes: Axes,
+    values: FloatArray,
+    bracketed: npt.NDArray[np.bool_],
+    surface: Surface,
+    scale: matplotlib.colors.Normalize,
+) -> None:
     axes.set_facecolor(_EMPTY)
     axes.pcolormesh(np.ma.masked_invalid(values), cmap=_COLOURS, norm=scale, edgecolors="white", linewidth=0.5)
     size = 8.0 if values.shape[1] <= 3 else 6.5
     for (row, column), value in np.ndenumerate(values):
         text = number(float(value), surface.decimals) if np.isfinite(value) else surface.empty
+        text = f"({text})" if bracketed[row, column] else text
         ink = _ink(_COLOURS(scale(value))) if np.isfinite(value) else "black"
         axes.text(column + 0.5, row + 0.5, text, ha="center", va="center", color=ink, fontsize=size)
-    axes.set_xticks(np.arange(len(wide.columns)) + 0.5, [f"{1000 * one:g}" for one in wide.columns])
-    axes.set_yticks(np.arange(len(wide.index)) + 0.5, [f"{one:g}" for one in wide.index])
-    axes.tick_params(length=0)
-    for side in axes.spines.values():
-        side.set_visible(False)
-    if own is not None:
-        corner = list(wide.columns).index(own.latency_s), list(wide.index).index(own.noise_sd_mm)
-        axes.add_patch(
-            matplotlib.patches.Rectangle(corner, 1, 1, fill=False, edgecolor=_OWN, linewidth=2.2, clip_on=False)
-        )
 
 
 def _ink(colour: tuple[float, float, float, float]) -> str:

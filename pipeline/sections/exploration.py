@@ -68,9 +68,11 @@ def pays_sentence(pays: Pays, estimator: str) -> Sequence[str]:
     if by_filter is not None:
         parts.append(f"{by_filter.estimator} in place of {estimator} {_change(pays, by_filter)}")
     if by_tracker is not None:
-        parts.append(f"{_better(by_tracker.tracker, now.tracker)} under {estimator} {_change(pays, by_tracker)}")
+        parts.append(
+            f"a tracker with {_better(by_tracker.tracker, now.tracker)} under {estimator} {_change(pays, by_tracker)}"
+        )
     if by_filter is not None and pays.enough is not None and pays.verdict != "filter":
-        parts.append(f"{_better(pays.enough.tracker, now.tracker)} would already do as much as the filter")
+        parts.append(f"one with {_better(pays.enough.tracker, now.tracker)} would already do as much as the filter")
     start = f"from {_figure(pays, now)} with {estimator} at {_tracker(now.tracker)}"
     return head, f": {start}, {'; '.join(parts) or 'no other estimator and no better tracker was explored'}."
 
@@ -123,13 +125,12 @@ def _steps(explored: Explored) -> Table:
     own, rows = explored.own, explored.rows("explore")
     first = rows[0]["estimator"]
     here = next(row for row in rows if _of(row) == own and row["estimator"] == first)
-    shown = [("as it is", here)]
-    for row in rows:
-        tracker = _of(row)
-        if tracker == own and row is not here:
-            shown.append((f"filter: {row['estimator']}", row))
-        elif row["estimator"] == first and tracker.at_least(own) and _respects(tracker, own) == 1:
-            shown.append((f"tracker: {_better(tracker, own)}", row))
+    single = [row for row in rows if _of(row).at_least(own) and _respects(_of(row), own) == 1]
+    shown = [
+        ("as it is", here),
+        *((f"filter: {row['estimator']}", row) for row in rows if _of(row) == own and row is not here),
+        *((f"tracker: {_better(_of(row), own)}", row) for row in single if row["estimator"] == first),
+    ]
     best = min(
         (row for row in rows if _of(row).at_least(own)), key=lambda row: row["selection_rmse_mm"] or float("inf")
     )
@@ -167,7 +168,7 @@ def _with_interval(row: Row, name: str, unit: str) -> str:
 def _less(row: Row, here: Row, column: str) -> str:
     if row is here or row[column] is None or not here[column]:
         return NOTHING
-    return percent(1 - row[column] / here[column], 0)
+    return percent(round(1 - row[column] / here[column], 2) + 0.0, 0)  # a zero without a sign
 
 
 def _surfaces(explored: Explored, drawn: Path) -> Iterator[Block]:
@@ -212,17 +213,18 @@ def _needed(explored: Explored, drawn: Path) -> Iterator[Block]:
     yield Paragraph(
         (
             "So many participants, each with both estimators, would show the difference with a power of"
-            f" {percent(POWER, 0)} in a two-sided paired t test at the study's alpha of {explored.study.alpha:g} (noncentral t), if the"
-            " difference between real people were as between simulated ones.",
+            f" {percent(POWER, 0)} in a two-sided paired t test at the study's alpha of {explored.study.alpha:g}"
+            " (noncentral t), if the difference between real people were as between simulated ones.",
         )
     )
     for measure in MEASURES:
         of_measure = table[table["measure"] == measure]
-        named = of_measure.assign(pair=of_measure["first"] + " or " + of_measure["second"])
+        pair = of_measure["first"] + " or " + of_measure["second"]
+        named = of_measure.assign(pair=pair, bracketed=of_measure["mean_difference"] < 0)
         caption = (
-            f"Participants needed to show a difference in {_NAMES[measure]}. {_OUTLINED} Grey: more than {MOST}, or"
+            f"Participants needed to show a difference in {_NAMES[measure]}; in brackets where the first of the two is"
+            f" the better one. {_OUTLINED} Grey: more than {MOST}, or no difference. The table says how rough they are."
         )
-        caption += " no difference."
         yield _draw(explored, named, "pair", PARTICIPANTS, drawn / f"participants-{measure}.svg", caption)
     rows = explored.rows("explore_differences")
     titles = ("Measure", "Pair", "Latency (ms)", "Noise (mm)", "Rate (Hz)", "Difference", "d_z", "Participants")
