@@ -174,6 +174,42 @@ def simulate(
 
 
 @app.command()
+def explore(
+    study: Annotated[Path, typer.Argument(metavar="STUDY", help="A study with a simulation: block of kind selection.")],
+    *,
+    latency: Annotated[
+        str | None,
+        typer.Option(metavar="S,…", help="The tracker's latencies, in s. Default: half, once and twice the study's."),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(metavar="MM,…", help="Its noise SDs, in mm. Default: a quarter, half and all of the study's."),
+    ] = None,
+    rate: Annotated[
+        str | None, typer.Option(metavar="HZ,…", help="Its rates, in Hz. Default: half, once and twice the study's.")
+    ] = None,
+    estimators: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,…",
+            help="The study's estimators, each as what is displayed; the others are compared with the first. Default:"
+            " those that the conditions show.",
+        ),
+    ] = None,
+    participants: Annotated[int, typer.Option(min=2, max=999, help="People in each small study.")] = 12,
+    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Small studies at each point.")] = 2,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write.")] = None,
+    jobs: Jobs = None,
+    executor: ExecutorName = "process",
+) -> None:
+    """A better tracker or a better filter? Simulate small studies over both: error, time and participants needed."""
+    from pipeline.commands import explore as command
+
+    asked = command.Asked(latency, noise, rate, estimators, participants, repeats)
+    command.explore(study, asked, out, jobs, executor)
+
+
+@app.command()
 def inspect(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="A log, or several.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows of the table `quality`.")] = False,

@@ -60,6 +60,20 @@ def write_replay(path: Path, studies: Sequence[Mapping[str, Any]], found: Mappin
     _dump(content | {name: tables.records(name, table) for name, table in found.items()}, path)
 
 
+def write_exploration(
+    path: Path,
+    settings: Mapping[str, Any],
+    found: Mapping[str, pd.DataFrame],
+    pays: Sequence[Mapping[str, Any]],
+) -> None:
+    """The file of an exploration: what was asked of which study, its tables, and what pays for each measure.
+
+    A tracker there is a list: latency in s, noise SD in mm, rate in Hz.
+    """
+    content: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "explored": dict(settings), "what_pays": list(pays)}
+    _dump(content | {name: tables.records(name, table) for name, table in found.items()}, path)
+
+
 def _dump(content: Mapping[str, Any], path: Path) -> None:
     path.write_text(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
 _NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
+_TRACKER = [("latency_s", _FLOAT), ("noise_sd_mm", _FLOAT), ("rate_hz", _FLOAT)]
 _POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
 
 _COMPARISON = [
@@ -306,6 +308,44 @@ TABLES: Mapping[str, pa.Schema] = {
         ("what", _TEXT),
         ("reason", _TEXT),
     ),
+    "explore_people": _schema(  # a row a simulated session; misses are selections outside the target
+        *_TRACKER,
+        ("estimator", _TEXT),
+        ("repeat", _COUNT),
+        ("participant", _TEXT),
+        ("completion_time_s", _FLOAT),
+        ("selection_mse_mm2", _FLOAT),
+        ("selections", _COUNT),
+        ("misses", _COUNT),
+        ("not_selected", _COUNT),
+    ),
+    "explore": _schema(  # n of the people have selected something
+        *_TRACKER,
+        ("estimator", _TEXT),
+        ("people", _COUNT),
+        ("n", _COUNT),
+        *[(f"completion_time{end}_s", _FLOAT) for end in ("", "_low", "_high")],
+        *[(f"selection_rmse{end}_mm", _FLOAT) for end in ("", "_low", "_high")],
+        ("selections", _COUNT),
+        ("misses", _COUNT),
+        ("not_selected", _COUNT),
+    ),
+    "explore_differences": _schema(  # effect_size is d_z; participants are null beyond the most that are looked at
+        *_TRACKER,
+        ("measure", _TEXT),
+        ("first", _TEXT),
+        ("second", _TEXT),
+        ("n", _COUNT),
+        ("mean_difference", _FLOAT),
+        ("ci_low", _FLOAT),
+        ("ci_high", _FLOAT),
+        ("reduction", _FLOAT),
+        ("effect_size", _FLOAT),
+        ("participants_needed", _COUNT),
+        ("participants_low", _COUNT),
+        ("participants_high", _COUNT),
+        ("status", _TEXT),
+    ),
     "printed": _schema(
         ("what", _TEXT),
         ("check", _TEXT),
@@ -407,6 +447,15 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
             column_encoding=encodings,
             store_schema=False,
         )
+
+
+def write_csv(name: str, data: pd.DataFrame, folder: Path) -> None:
+    """The table as `<name>.csv`; text that a spreadsheet would run as a formula gets an apostrophe in front."""
+    table = as_table(name, data)
+    for column in table.columns[[str(kind) == "string" for kind in table.dtypes]]:
+        risky = table[column].str.startswith(_FORMULA).fillna(False).astype(bool)
+        table[column] = table[column].where(~risky, "'" + table[column])
+    table.to_csv(folder / f"{name}.csv", index=False)
 
 
 def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:

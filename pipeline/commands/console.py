@@ -19,7 +19,11 @@ _LABELS = {
     "report": "writing the report",
     "replay": "replaying",
     "simulate": "simulating",
+    "explore": "exploring",
 }
+
+
+_PIECES = {"replay": "sessions by variants", "explore": "small studies"}
 
 
 def tame(text: str) -> str:
@@ -65,8 +69,7 @@ class PlainLines:
             0,
             time.monotonic(),
         )
-        pieces = "sessions by variants" if stage == "replay" else "sessions"
-        warn(f"{self._label} …" if total == 1 else f"{self._label}: {total} {pieces} …")
+        warn(f"{self._label} …" if total == 1 else f"{self._label}: {total} {_PIECES.get(stage, 'sessions')} …")
 
     def advance(self) -> None:
         """Now and then a line."""

@@ -18,7 +18,7 @@ from pipeline.provenance import LIBRARIES, PROVENANCE
 from pipeline.runner.result import Result
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, INGEST, REPLAY
-from pipeline.study import SETTINGS_FILE
+from pipeline.study import SETTINGS_FILE, Study
 
 _RESULTS = "results.json"
 _ARCHIVE = "report.zip"
@@ -73,6 +73,14 @@ def publish_provenance(results: Iterable[Result], folder: Path, command: Sequenc
     """provenance.json of a replay of several studies."""
     studies = {result.name: _read(result) for result in results}
     _write_provenance({**_program(command, (*INGEST, REPLAY)), "studies": studies}, folder / _RESULTS, folder)
+
+
+def publish_exploration(study: Study, folder: Path, command: Sequence[str]) -> None:
+    """provenance.json of an exploration, which reads study.yaml alone."""
+    settings = json.loads(study.model_dump_json(exclude_defaults=True))
+    program = _program(command, ())
+    program["code_sha256"] = {"explore": code_digest("pipeline.exploration")}
+    _write_provenance({**program, "settings": settings}, folder)
 
 
 def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:

@@ -135,17 +135,22 @@ def drivers(outcome: Outcome) -> dict[str, float]:
 
 def repeat(setting: Setting, number: int) -> dict[str, dict[str, float]]:
     """One more study with other people: each condition's mean over participants of each measure. Runs in a worker."""
-    settings = setting.simulation
-    seed = int(digest_of([settings.seed, "repeat", number])[:12], 16)
-    again = setting.study.model_copy(update={"simulation": settings.model_copy(update={"seed": seed})})
-    other, found = Setting(again, setting.where), {}
+    other, found = with_other_people(setting, number), {}
     for condition in setting.study.conditions:
-        outcomes = [simulate(other, participant, condition) for participant in participants(settings)]
+        outcomes = [simulate(other, participant, condition) for participant in participants(other.simulation)]
         found[condition] = {
             "selection_mse_mm2": float(np.nanmean([outcome.selection_mse_mm2 for outcome in outcomes])),
             "completion_time_s": float(np.nanmean([outcome.completion_time_s for outcome in outcomes])),
         }
     return found
+
+
+def with_other_people(setting: Setting, number: int) -> Setting:
+    """The same study with the people of a repeat, numbered from 0."""
+    settings = setting.simulation
+    seed = int(digest_of([settings.seed, "repeat", number])[:12], 16)
+    again = setting.study.model_copy(update={"simulation": settings.model_copy(update={"seed": seed})})
+    return Setting(again, setting.where)
 
 
 def _tables(

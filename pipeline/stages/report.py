@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pandas as pd
-
 from pipeline import results, tables
 from pipeline.document import html, pdf
 from pipeline.document.model import Document
@@ -30,7 +28,6 @@ _FROM_COMPARE = (
     "design_check",
     "simulated_reductions",
 )
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
 
 
 def run(work: Work) -> Outcome:
@@ -39,8 +36,8 @@ def run(work: Work) -> Outcome:
     for folder in ("tables", "figures"):
         (work.out / folder).mkdir()
     for name in _FROM_COMPARE:
-        _write_csv(name, tables.read(name, compared), work)
-    _write_csv("selections", tables.read("selections", work.entry("measure")), work)
+        tables.write_csv(name, tables.read(name, compared), work.out / "tables")
+    tables.write_csv("selections", tables.read("selections", work.entry("measure")), work.out / "tables")
     material = Material(
         work.study_name,
         work.study,
@@ -64,11 +61,3 @@ def run(work: Work) -> Outcome:
     traces.write(material, work.out / traces.PAGE)
     participants.write(material, work.out / participants.FOLDER)
     return Outcome()
-
-
-def _write_csv(name: str, table: pd.DataFrame, work: Work) -> None:
-    """A table as CSV; text that a spreadsheet would run as a formula gets an apostrophe in front."""
-    for column in table.columns[[str(kind) == "string" for kind in table.dtypes]]:
-        risky = table[column].str.startswith(_FORMULA).fillna(False).astype(bool)
-        table[column] = table[column].where(~risky, "'" + table[column])
-    table.to_csv(work.out / "tables" / f"{name}.csv", index=False)

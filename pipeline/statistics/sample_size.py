@@ -64,7 +64,7 @@ def sample_size(design: Design, power: float, studies: int, seed: int, most: int
 
     exact = None
     if closed_form(design, FEWEST) is not None:
-        exact = smallest(lambda n: (closed_form(design, n) or 0.0) >= power, FEWEST, most, FEWEST)
+        exact = fewest(design, power, most)
         if exact is None:
             return None
     start = min(most, exact or _likely_for_ranks(design, power, most))
@@ -80,6 +80,11 @@ def sample_size(design: Design, power: float, studies: int, seed: int, most: int
     numbers = {*_spread(middle, most), middle, max(FEWEST, middle - 1), *found}
     rows = tuple(Row(n, closed_form(design, n), at(n)) for n in sorted(numbers))
     return SampleSize(rows, exact, simulated, corrected)
+
+
+def fewest(design: Design, power: float, most: int, start: int = FEWEST) -> int | None:
+    """The fewest participants by the test's closed form, looked for from `start`; None if `most` are not enough."""
+    return smallest(lambda n: (closed_form(design, n) or 0.0) >= power, FEWEST, most, start)
 
 
 def _likely_for_ranks(design: Design, power: float, most: int) -> int:

@@ -1,0 +1,172 @@
+"""`explore`: a study's simulated participants with better and worse trackers and other estimators, as one report."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.commands import console
+from pipeline.commands.run import executor_of, reports_folder, short
+from pipeline.errors import PipelineError
+from pipeline.simulation_settings import SelectionSimulation
+from pipeline.study import Study, load_study
+
+if TYPE_CHECKING:
+    from pipeline.exploration import Grid
+    from pipeline.sections.exploration import Explored
+    from pipeline.simulation.session import Setting
+
+_PAGE, _PRINT, _RESULTS = "explore.html", "explore.pdf", "results.json"
+_TABLES = ("explore", "explore_differences", "explore_people")
+_VALUES, _RATES = 6, 4  # of an option: what a figure has room for
+_LIMITS = {"--latency": (0.0, 0.9), "--noise": (0.01, 1000.0), "--rate": (1.0, 1000.0)}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options as they were typed; None for what the study decides."""
+
+    latency: str | None
+    noise: str | None
+    rate: str | None
+    estimators: str | None
+    participants: int
+    repeats: int
+
+
+def explore(folder: Path, asked: Asked, out: Path | None, jobs: int | None, where: str) -> None:
+    """Simulate every point and write the report; nothing is written before all is computed."""
+    from pipeline.commands.publish import refuse_study
+
+    study = _study(folder)
+    target = out or reports_folder() / f"{folder.resolve().name}-explore"
+    refuse_study(target)
+    from pipeline import exploration
+    from pipeline.simulation.session import Setting
+
+    setting = Setting(study, str(folder / "study.yaml"))
+    grid = _grid(setting, asked)
+    try:
+        with executor_of(jobs, where) as executor, console.progress() as progress:
+            begin = partial(progress.begin, "explore")
+            rows = exploration.explore(setting, grid, executor, begin, progress.advance)
+            progress.end()
+    except KeyboardInterrupt:
+        raise _StoppedError("interrupted; nothing was written") from None
+    explored = _explored(folder.resolve().name, setting, grid, rows)
+    _write(explored, grid, target)
+    _say(explored)
+    console.say(f"Report: {short(target / _PAGE)}  {short(target / _PRINT)}")
+
+
+class _StoppedError(PipelineError):
+    exit_code = 130  # as a shell says of Ctrl-C
+
+
+def _study(folder: Path) -> Study:
+    study = load_study(folder, to_be_made=True)
+    if not isinstance(study.simulation, SelectionSimulation):
+        found = "none" if study.simulation is None else f"kind: {study.simulation.kind}"
+        raise PipelineError(
+            f"{folder / 'study.yaml'}: explore needs a `simulation:` block of kind: selection, found {found};"
+            " studies/peephole has one to start from"
+        )
+    return study
+
+
+def _grid(setting: Setting, asked: Asked) -> Grid:
+    """What is asked for; else the study's own tracker, better and worse ones, and the estimators it shows."""
+    from pipeline.exploration import Grid, shown_estimators, stated
+
+    own = stated(setting)
+    late = (own.latency_s / 2, own.latency_s, min(2 * own.latency_s, 0.9)) if own.latency_s else (0.0, 0.05, 0.1)
+    return Grid(
+        _numbers("--latency", asked.latency) or late,
+        _numbers("--noise", asked.noise) or (own.noise_sd_mm / 4, own.noise_sd_mm / 2, own.noise_sd_mm),
+        _numbers("--rate", asked.rate) or (own.rate_hz / 2, own.rate_hz, 2 * own.rate_hz),
+        _names("--estimators", asked.estimators) or shown_estimators(setting.study),
+        asked.participants,
+        asked.repeats,
+    )
+
+
+def _numbers(option: str, text: str | None) -> tuple[float, ...]:
+    """`0.05,0.1` from the least to the largest; empty where nothing was asked."""
+    low, high = _LIMITS[option]
+    found = []
+    for piece in _names(option, text, _RATES if option == "--rate" else _VALUES):
+        try:
+            value = float(piece)
+        except ValueError:
+            raise PipelineError(f'{option}: "{piece}" is not a number; give some with commas between them') from None
+        if not low <= value <= high:
+            raise PipelineError(f"{option}: should lie between {low:g} and {high:g}, found {piece}")
+        found.append(value)
+    if len(set(found)) < len(found):
+        raise PipelineError(f"{option}: a value is there twice: {text}")
+    return tuple(sorted(found))
+
+
+def _names(option: str, text: str | None, most: int = _VALUES) -> tuple[str, ...]:
+    if text is None:
+        return ()
+    found = tuple(piece.strip() for piece in text.split(","))
+    if "" in found:
+        raise PipelineError(f'{option}: a value is missing in "{text}"')
+    if len(set(found)) < len(found):
+        raise PipelineError(f"{option}: a value is there twice: {text}")
+    if len(found) > most:
+        raise PipelineError(f"{option}: takes up to {most} values at once, found {len(found)}; explore in several runs")
+    return found
+
+
+def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]]) -> Explored:
+    from pipeline import tables
+    from pipeline.exploration import stated
+    from pipeline.exploration_tables import MEASURES, differences, means, what_pays
+    from pipeline.sections.exploration import Explored
+
+    people, own = tables.frame("explore_people", rows), grid.nearest(stated(setting))
+    found = {
+        "explore": tables.frame("explore", means(people)),
+        "explore_differences": tables.frame("explore_differences", differences(people, setting.study.alpha)),
+        "explore_people": people,
+    }
+    pays = tuple(what_pays(people, own, measure) for measure in MEASURES)
+    return Explored(name, setting.study, found, pays, own, grid.participants, grid.repeats)
+
+
+def _write(explored: Explored, grid: Grid, target: Path) -> None:
+    """The pages, results.json and the tables, each whole or not at all."""
+    from pipeline import results, tables
+    from pipeline.commands.publish import copy, publish_exploration
+    from pipeline.document import html, pdf
+    from pipeline.sections.exploration import document
+
+    study = {"name": explored.name, "title": explored.study.title, "alpha": explored.study.alpha}
+    settings: Mapping[str, Any] = {**study, "own_tracker": explored.own._asdict(), **asdict(grid)}
+    with tempfile.TemporaryDirectory() as written, tempfile.TemporaryDirectory() as drawn:
+        folder, pictures = Path(written), Path(drawn)
+        results.write_exploration(folder / _RESULTS, settings, explored.found, [asdict(one) for one in explored.pays])
+        for name in _TABLES:
+            tables.write(name, explored.found[name], folder)
+            tables.write_csv(name, explored.found[name], folder)
+        shown = document(explored, pictures)
+        html.render(shown, pictures, folder / _PAGE)
+        pdf.render(shown, pictures, folder / _PRINT)
+        for path in sorted(folder.iterdir()):
+            copy(path, target / path.name)
+    publish_exploration(explored.study, target, sys.argv)
+
+
+def _say(explored: Explored) -> None:
+    from pipeline.sections.exploration import pays_sentence
+
+    for pays in explored.pays:
+        console.say("".join(pays_sentence(pays, pays.now.estimator)))
+    console.say("Simulated participants; direction and rough size only.")
