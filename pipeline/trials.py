@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from fusion_core import FloatArray
 from pipeline import movements, tables
+from pipeline.movements import FloatArray
 
 
 def selections_by_trial(events: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
