@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from fusion_core import FloatArray
+FloatArray = npt.NDArray[np.float64]
 
 CUTOFF_HZ = 5.0
 GAP_S = 1.0 / CUTOFF_HZ  # what lies further apart than a period of the fastest motion that is kept is not one path
@@ -92,7 +93,7 @@ def throughputs(
     return np.array(found, dtype=np.float64)
 
 
-def _of_one_amplitude(amplitude_mm: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.intp]]]:
+def _of_one_amplitude(amplitude_mm: FloatArray) -> list[npt.NDArray[np.intp]]:
     """The rows of each sequence: the most amplitudes within 10 % of one, then the most of what is left."""
     order = np.argsort(amplitude_mm, kind="stable")
     found = []

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from fusion_core import FloatArray
 from pipeline import movements, tables
+from pipeline.movements import FloatArray
 
 Row = Mapping[str, Any]
 _TOLD = ["trial", "start_s", "selection_s", "left_s"]

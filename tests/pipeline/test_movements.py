@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import statistics
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +75,24 @@ def test_each_amplitude_has_its_own_throughput() -> None:
     both = np.concatenate([TARGET_X, 1000 + 3 * TARGET_X]), np.concatenate([SELECTED_X, 1000 + 3 * SELECTED_X])
     found = throughputs(in_plane(both[0]), in_plane(both[1]))
     assert found == pytest.approx([THROUGHPUT, THROUGHPUT], abs=1e-5)
+
+
+def test_a_ring_agrees_with_the_definitions_written_out_for_one_trial_after_the_other() -> None:
+    random = np.random.default_rng(7)
+    angle = 2 * np.pi * 5 * np.arange(10) / 9
+    target = 125 * np.column_stack([np.cos(angle), np.sin(angle)])
+    selected = target + random.normal(0, 4, target.shape)
+    duration = random.uniform(0.8, 1.6, 10)
+    deviations, distances = [], []
+    for (ax, ay), (bx, by), (px, py), (qx, qy) in zip(target, target[1:], selected, selected[1:], strict=False):
+        length = math.hypot(bx - ax, by - ay)
+        ux, uy = (bx - ax) / length, (by - ay) / length
+        deviations.append((qx - bx) * ux + (qy - by) * uy)
+        distances.append((qx - px) * ux + (qy - py) * uy)
+    index_bits = math.log2(statistics.mean(distances) / (4.133 * statistics.stdev(deviations)) + 1)
+    found = movements.aimed(target, selected, selected, np.zeros(10))
+    (throughput,) = movements.throughputs(found.amplitude_mm, found.moved_mm, found.along_mm, duration)
+    assert throughput == pytest.approx(index_bits / statistics.mean(duration[1:]), rel=1e-12)
 
 
 def test_amplitudes_within_ten_per_cent_of_one_are_a_sequence() -> None:
@@ -339,6 +360,15 @@ def test_one_trial_has_a_path_and_no_throughput(folder: Folder, steadyhand: Stea
     found = logged(folder, steadyhand, STREAMS, messages)
     assert found["path_efficiency"] == pytest.approx(1, abs=1e-4)
     assert "throughput_bits_s" not in found
+
+
+def test_targets_that_the_log_does_not_name(folder: Folder, steadyhand: Steadyhand) -> None:
+    messages = [
+        m if m.event is None else replace(m, event={k: v for k, v in m.event.items() if "target" not in k})
+        for m in session_messages()
+    ]
+    found = logged(folder, steadyhand, STREAMS + "axes: [x]\n", messages)
+    assert set(found) == {"completion_time_s", "corrections", "path_efficiency", "trial_time_s"}
 
 
 def test_a_log_whose_trials_were_never_ended(folder: Folder, steadyhand: Steadyhand) -> None:
