@@ -51,6 +51,11 @@ class Way:
     estimator: str
     value: float
 
+    def record(self) -> Row:
+        """As an object for JSON; null where nobody selected anything."""
+        value = self.value if np.isfinite(self.value) else None
+        return {**self.tracker._asdict(), "estimator": self.estimator, "value": value}
+
 
 @dataclass(frozen=True)
 class Pays:
@@ -66,6 +71,12 @@ class Pays:
     by_tracker: Way | None
     enough: Way | None
     verdict: Literal["filter", "tracker", "equal", "neither"] | None
+
+    def record(self) -> Row:
+        """As an object for JSON."""
+        ways = {name: getattr(self, name) for name in ("now", "by_filter", "by_tracker", "enough")}
+        shown = {name: way and way.record() for name, way in ways.items()}
+        return {"measure": self.measure, "verdict": self.verdict, **shown}
 
 
 def means(people: pd.DataFrame) -> list[Row]:

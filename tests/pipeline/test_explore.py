@@ -117,6 +117,18 @@ def test_one_estimator_and_one_tracker_leave_nothing_to_weigh(study: Path, comma
     assert "How many participants" not in page
 
 
+def test_where_nobody_selects_anything_the_report_says_so(folder: Folder, command: Command, tmp_path: Path) -> None:
+    hidden = SETTINGS.replace("{targets_mm: [[-100, 500], [100, 500]]}", "{targets_mm: [[-900, 10], [900, 990]]}")
+    study = folder(hidden.replace("longest_s: 20", "longest_s: 10, traits: {dwell_s: {mean: 60, source: none}}"))
+    ran = command(study, *SMALL, "--noise", "500", "--estimators", "raw,kinect_kalman")
+    assert ran.code == 0, ran.err
+    content = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert {row["not_selected"] for row in content["explore"]} == {4}
+    assert {row["completion_time_s"] for row in content["explore"]} == {None}
+    assert {row["status"] for row in content["explore_differences"]} == {"nobody selected anything"}
+    assert [row["now"]["value"] for row in content["what_pays"]] == [None, None]
+
+
 def test_results_do_not_depend_on_what_else_is_explored_or_on_the_order_of_work(study: Path) -> None:
     both = people_of(study, Grid((0.05, 0.1), (8.0,), (30.0,), ("raw", "fusion"), 2, 1))
     assert people_of(study, Grid((0.05, 0.1), (8.0,), (30.0,), ("raw", "fusion"), 2, 1), Backwards()).equals(both)
