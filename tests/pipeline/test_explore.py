@@ -16,6 +16,7 @@ from pypdf import PdfReader
 from scipy import stats
 
 from pipeline import tables
+from pipeline.errors import WorkerLostError
 from pipeline.executors import InThisProcess
 from pipeline.exploration import Grid, explore, stated, with_tracker
 from pipeline.exploration_tables import MEASURES, Tracker, differences, means, what_pays
@@ -207,7 +208,13 @@ def test_equal_estimators_have_no_number_of_participants() -> None:
 
 @pytest.mark.parametrize(
     ("by_filter", "by_tracker", "verdict"),
-    [(3.0, 6.0, "filter"), (6.0, 3.0, "tracker"), (5.0, 5.0, "equal"), (12.0, 11.0, "neither")],
+    [
+        (3.0, 6.0, "filter"),
+        (6.0, 3.0, "tracker"),
+        (5.0, 5.0, "equal"),
+        (12.0, 11.0, "neither"),
+        (12.0, 9.95, "neither"),
+    ],
 )
 def test_what_pays_weighs_the_best_filter_against_the_best_tracker(
     by_filter: float, by_tracker: float, verdict: str
@@ -262,6 +269,16 @@ def test_a_study_without_simulated_participants_is_an_error(folder: Folder, comm
     taskless = re.sub(r"task:.*", "", SETTINGS)
     assert "selection needs a task" in command(folder(taskless, "taskless"), *SMALL).err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_lost_process_is_said(study: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*_: object) -> None:
+        raise WorkerLostError("signal 9")
+
+    monkeypatch.setattr("pipeline.exploration.small_study", lost)
+    ran = command(study, *SMALL)
+    assert ran.code == 2
+    assert "a process was lost (signal 9)" in ran.err
 
 
 def test_ctrl_c_writes_nothing(study: Path, command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
