@@ -113,8 +113,8 @@ def _pays(explored: Explored) -> Iterator[Block]:
             ),
             (
                 "The best of several trackers or filters is partly the best by chance. Two ways, or a way and"
-                " what is, count as told apart where the 95 % interval of their difference, person by person, leaves out"
-                " zero.",
+                " what is, count as told apart where the 95 % interval of their difference, person by person, leaves"
+                " out zero.",
             ),
         ),
     )
