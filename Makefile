@@ -27,6 +27,7 @@ replay: .venv/installed ## variants of the estimators, ranked: STUDY=… ARGS="-
 simulate: .venv/installed ## write the logs of a simulated STUDY anew
 	@$(steadyhand) simulate "$(STUDY)" $(ARGS)
 
+explore: STUDY = studies/peephole
 explore: .venv/installed ## a better tracker or a better filter? a simulated STUDY under many trackers
 	@$(steadyhand) explore "$(STUDY)" $(ARGS)
 

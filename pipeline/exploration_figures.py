@@ -76,7 +76,7 @@ def _short(name: str) -> str:
 
 def _scale(values: FloatArray, surface: Surface) -> matplotlib.colors.Normalize:
     """From the least to the largest value, a little apart where they are one."""
-    known = values[np.isfinite(values)]
+    known = values[np.isfinite(values) & ((values > 0) | (not surface.logarithmic))]
     low, high = (float(known.min()), float(known.max())) if len(known) else (1.0, 2.0)
     if surface.logarithmic:
         return matplotlib.colors.LogNorm(low, max(high, 1.1 * low))
@@ -87,7 +87,7 @@ def _panel(
     axes: Axes, rows: pd.DataFrame, surface: Surface, scale: matplotlib.colors.Normalize, own: Tracker | None
 ) -> None:
     """A cell a tracker, latency to the right and noise upwards, with its value."""
-    latencies, noises = sorted(rows["latency_s"].unique()), sorted(rows["noise_sd_mm"].unique())
+    latencies, noises = (sorted(map(float, rows[name].unique())) for name in ("latency_s", "noise_sd_mm"))
     values, bracketed = np.full((len(noises), len(latencies)), np.nan), np.zeros((len(noises), len(latencies)), bool)
     for row in rows.to_dict("records"):
         cell = noises.index(row["noise_sd_mm"]), latencies.index(row["latency_s"])

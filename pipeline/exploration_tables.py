@@ -51,13 +51,19 @@ class Way:
     estimator: str
     value: float
 
+    def record(self) -> Row:
+        """As an object for JSON; null where nobody selected anything."""
+        value = self.value if np.isfinite(self.value) else None
+        return {**self.tracker._asdict(), "estimator": self.estimator, "value": value}
+
 
 @dataclass(frozen=True)
 class Pays:
     """What changes a measure more from where the study is: the best other filter, or the best better tracker.
 
-    `enough` is the least of the better trackers that does as much as that filter. `verdict` says "equal" where the
-    95 % interval of the difference between the two includes zero, "neither" where no way is better than what is.
+    `enough` is the least of the better trackers that does as much as that filter. `verdict` says "neither" where the
+    better of the two is not clearly better than what is, and "equal" where they do not clearly differ: where the 95 %
+    interval of the difference, person by person, includes zero.
     """
 
     measure: str
@@ -66,6 +72,12 @@ class Pays:
     by_tracker: Way | None
     enough: Way | None
     verdict: Literal["filter", "tracker", "equal", "neither"] | None
+
+    def record(self) -> Row:
+        """As an object for JSON."""
+        ways = {name: getattr(self, name) for name in ("now", "by_filter", "by_tracker", "enough")}
+        shown = {name: way and way.record() for name, way in ways.items()}
+        return {"measure": self.measure, "verdict": self.verdict, **shown}
 
 
 def means(people: pd.DataFrame) -> list[Row]:
@@ -184,10 +196,19 @@ def _verdict(
     by_filter, by_tracker = best
     if by_filter is None or by_tracker is None:
         return None
-    if min(by_filter.value, by_tracker.value) >= here.value:
+    of_filter, of_tracker = (values[way.tracker, way.estimator] for way in (by_filter, by_tracker))
+    better = of_filter if by_filter.value < by_tracker.value else of_tracker
+    if _clearly(better, values[here.tracker, here.estimator]) >= 0:
         return "neither"
-    less = values[by_filter.tracker, by_filter.estimator] - values[by_tracker.tracker, by_tracker.estimator]
-    found = described(less[np.isfinite(less)]) if np.isfinite(less).any() else {}
-    if not found or not ("ci_low" in found and (found["ci_low"] > 0 or found["ci_high"] < 0)):
-        return "equal"
-    return "filter" if found["mean"] < 0 else "tracker"
+    sign = _clearly(of_filter, of_tracker)
+    return "equal" if sign == 0 else "filter" if sign < 0 else "tracker"
+
+
+def _clearly(first: FloatArray, second: FloatArray) -> int:
+    """The sign of first less second, person by person; 0 where its 95 % interval includes zero or there is none."""
+    less = first - second
+    less = less[np.isfinite(less)]
+    if len(less) < 2:
+        return 0
+    found = described(less)
+    return int(found["ci_low"] > 0) - int(found["ci_high"] < 0)

@@ -66,10 +66,7 @@ def write_exploration(
     found: Mapping[str, pd.DataFrame],
     pays: Sequence[Mapping[str, Any]],
 ) -> None:
-    """The file of an exploration: what was asked of which study, its tables, and what pays for each measure.
-
-    A tracker there is a list: latency in s, noise SD in mm, rate in Hz.
-    """
+    """The file of an exploration: what was asked of which study, its tables, and what pays for each measure."""
     content: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "explored": dict(settings), "what_pays": list(pays)}
     _dump(content | {name: tables.records(name, table) for name, table in found.items()}, path)
 

@@ -152,7 +152,7 @@ def _write(explored: Explored, grid: Grid, target: Path) -> None:
     settings: Mapping[str, Any] = {**study, "own_tracker": explored.own._asdict(), **asdict(grid)}
     with tempfile.TemporaryDirectory() as written, tempfile.TemporaryDirectory() as drawn:
         folder, pictures = Path(written), Path(drawn)
-        results.write_exploration(folder / _RESULTS, settings, explored.found, [asdict(one) for one in explored.pays])
+        results.write_exploration(folder / _RESULTS, settings, explored.found, [one.record() for one in explored.pays])
         for name in _TABLES:
             tables.write(name, explored.found[name], folder)
             tables.write_csv(name, explored.found[name], folder)

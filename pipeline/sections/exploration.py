@@ -61,7 +61,7 @@ def pays_sentence(pays: Pays, estimator: str) -> Sequence[str]:
         "filter": f"For {name} a better filter pays more",
         "tracker": f"For {name} a better tracker pays more",
         "equal": f"For {name} a better filter and a better tracker cannot be told apart",
-        "neither": f"For {name} neither a better filter nor a better tracker pays",
+        "neither": f"For {name} neither a better filter nor a better tracker clearly pays",
         None: f"For {name} there is nothing to weigh",
     }[pays.verdict]
     parts = []
@@ -112,8 +112,9 @@ def _pays(explored: Explored) -> Iterator[Block]:
                 " size, and which study to run next; not seconds, millimetres or participants to promise.",
             ),
             (
-                "The best of several trackers or filters is partly the best by chance. Two ways count as told apart"
-                " where the 95 % interval of their difference, person by person, leaves out zero.",
+                "The best of several trackers or filters is partly the best by chance. Two ways, or a way and"
+                " what is, count as told apart where the 95 % interval of their difference, person by person, leaves"
+                " out zero.",
             ),
         ),
     )

@@ -16,6 +16,7 @@ from pypdf import PdfReader
 from scipy import stats
 
 from pipeline import tables
+from pipeline.errors import WorkerLostError
 from pipeline.executors import InThisProcess
 from pipeline.exploration import Grid, explore, stated, with_tracker
 from pipeline.exploration_tables import MEASURES, Tracker, differences, means, what_pays
@@ -117,6 +118,18 @@ def test_one_estimator_and_one_tracker_leave_nothing_to_weigh(study: Path, comma
     assert "How many participants" not in page
 
 
+def test_where_nobody_selects_anything_the_report_says_so(folder: Folder, command: Command, tmp_path: Path) -> None:
+    hidden = SETTINGS.replace("{targets_mm: [[-100, 500], [100, 500]]}", "{targets_mm: [[-900, 10], [900, 990]]}")
+    study = folder(hidden.replace("longest_s: 20", "longest_s: 10, traits: {dwell_s: {mean: 60, source: none}}"))
+    ran = command(study, *SMALL, "--noise", "500", "--estimators", "raw,kinect_kalman")
+    assert ran.code == 0, ran.err
+    content = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert {row["not_selected"] for row in content["explore"]} == {4}
+    assert {row["completion_time_s"] for row in content["explore"]} == {None}
+    assert {row["status"] for row in content["explore_differences"]} == {"nobody selected anything"}
+    assert [row["now"]["value"] for row in content["what_pays"]] == [None, None]
+
+
 def test_results_do_not_depend_on_what_else_is_explored_or_on_the_order_of_work(study: Path) -> None:
     both = people_of(study, Grid((0.05, 0.1), (8.0,), (30.0,), ("raw", "fusion"), 2, 1))
     assert people_of(study, Grid((0.05, 0.1), (8.0,), (30.0,), ("raw", "fusion"), 2, 1), Backwards()).equals(both)
@@ -195,7 +208,13 @@ def test_equal_estimators_have_no_number_of_participants() -> None:
 
 @pytest.mark.parametrize(
     ("by_filter", "by_tracker", "verdict"),
-    [(3.0, 6.0, "filter"), (6.0, 3.0, "tracker"), (5.0, 5.0, "equal"), (12.0, 11.0, "neither")],
+    [
+        (3.0, 6.0, "filter"),
+        (6.0, 3.0, "tracker"),
+        (5.0, 5.0, "equal"),
+        (12.0, 11.0, "neither"),
+        (12.0, 9.95, "neither"),
+    ],
 )
 def test_what_pays_weighs_the_best_filter_against_the_best_tracker(
     by_filter: float, by_tracker: float, verdict: str
@@ -250,6 +269,16 @@ def test_a_study_without_simulated_participants_is_an_error(folder: Folder, comm
     taskless = re.sub(r"task:.*", "", SETTINGS)
     assert "selection needs a task" in command(folder(taskless, "taskless"), *SMALL).err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_lost_process_is_said(study: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*_: object) -> None:
+        raise WorkerLostError("signal 9")
+
+    monkeypatch.setattr("pipeline.exploration.small_study", lost)
+    ran = command(study, *SMALL)
+    assert ran.code == 2
+    assert "a process was lost (signal 9)" in ran.err
 
 
 def test_ctrl_c_writes_nothing(study: Path, command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
