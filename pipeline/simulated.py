@@ -36,8 +36,8 @@ def reductions(settings: SelectionSimulation, conditions: tuple[str, ...], repea
                 "contrast": f"{first} - {second}",
                 "n": len(share),
                 "reduction": float(share.mean()),
-                "low": float(low),
-                "high": float(high),
+                "ci_low": float(low),
+                "ci_high": float(high),
                 **_published(settings, str(measure), (first, second)),
             }
 
@@ -45,5 +45,5 @@ def reductions(settings: SelectionSimulation, conditions: tuple[str, ...], repea
 def _published(settings: SelectionSimulation, measure: str, pair: tuple[str, str]) -> Row:
     for one in settings.published:
         if one.measure == measure and one.conditions == pair:
-            return {"published": one.reduction, "source": one.source}
-    return {"published": None, "source": None}
+            return {"published_reduction": one.reduction, "source": one.source}
+    return {"published_reduction": None, "source": None}

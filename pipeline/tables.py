@@ -174,9 +174,9 @@ TABLES: Mapping[str, pa.Schema] = {
         ("contrast", _TEXT),
         ("n", _COUNT),  # repeated studies
         ("reduction", _FLOAT),
-        ("low", _FLOAT),
-        ("high", _FLOAT),
-        ("published", _FLOAT),
+        ("ci_low", _FLOAT),
+        ("ci_high", _FLOAT),
+        ("published_reduction", _FLOAT),
         ("source", _TEXT),
     ),
     "descriptives": _schema(

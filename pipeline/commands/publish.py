@@ -28,6 +28,7 @@ FORMATS: Mapping[str, tuple[str, ...]] = {
     "json": (_RESULTS,),
     "csv": ("tables/",),
     "svg": ("figures/",),
+    "bib": ("references.bib",),
     "zip": (_ARCHIVE,),
 }
 """What can be asked for: the files, and the folders of files, of each format. The ZIP holds the others asked for."""
@@ -80,7 +81,7 @@ def publish_exploration(study: Study, folder: Path, command: Sequence[str]) -> N
     settings = json.loads(study.model_dump_json(exclude_defaults=True))
     program = _program(command, ())
     program["code_sha256"] = {"explore": code_digest("pipeline.exploration")}
-    _write_provenance({**program, "settings": settings}, folder)
+    _write_provenance({**program, "settings": settings}, folder / _RESULTS, folder)
 
 
 def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:

@@ -78,27 +78,27 @@ def _gains(material: Material, settings: SelectionSimulation) -> list[Block]:
                 measure_label(row["measure"]),
                 row["contrast"],
                 percent(row["reduction"]),
-                f"[{percent(row['low'])}, {percent(row['high'])}]",
-                percent(row["published"]),
+                f"[{percent(row['ci_low'])}, {percent(row['ci_high'])}]",
+                percent(row["published_reduction"]),
                 row["source"] or "",
             )
             for row in rows
         ),
     )
-    texts = tuple((_beside(row),) for row in rows if row["published"] is not None)
+    texts = tuple((_beside(row),) for row in rows if row["published_reduction"] is not None)
     return [*(Paragraph(text) for text in texts), table]
 
 
 def _beside(row: Row) -> str:
     """The published reduction and the simulated ones, in a sentence."""
-    if row["low"] <= row["published"] <= row["high"]:
+    if row["ci_low"] <= row["published_reduction"] <= row["ci_high"]:
         verdict = "lies within what 95 % of the simulated studies give"
     else:
-        side = "less" if row["published"] < row["low"] else "more"
+        side = "less" if row["published_reduction"] < row["ci_low"] else "more"
         verdict = f"is {side} than 95 % of the simulated studies give"
     label = measure_label(row["measure"])
     return (
-        f"{label}: the published reduction of {percent(row['published'])} ({row['source']}) {verdict} "
+        f"{label}: the published reduction of {percent(row['published_reduction'])} ({row['source']}) {verdict} "
         f"({percent(row['reduction'])} on average, {row['contrast']})."
     )
 

@@ -238,8 +238,8 @@ def test_reductions_are_those_of_each_repeated_study() -> None:
     (row,) = reductions(SelectionSimulation.model_validate(simulation), ("kinect", "fusion"), repeats)
     assert row["n"] == 2
     assert row["reduction"] == pytest.approx((0.5 + 0.75) / 2)
-    assert row["low"] == pytest.approx(0.5 + 0.025 * 0.25)
-    assert (row["published"], row["source"], row["contrast"]) == (0.3, "A and B", "kinect - fusion")
+    assert row["ci_low"] == pytest.approx(0.5 + 0.025 * 0.25)
+    assert (row["published_reduction"], row["source"], row["contrast"]) == (0.3, "A and B", "kinect - fusion")
 
 
 def written(folder: Callable[..., Path], content: dict[str, Any]) -> Path:
