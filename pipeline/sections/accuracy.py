@@ -11,7 +11,7 @@ from pipeline.recording import SMOOTHED
 from pipeline.sections.material import Material, Row
 from pipeline.wording import NOTHING, counted, number, percent, seconds
 
-_ROWS_MAX = 120
+_ROWS_MAX = 40
 
 
 SMOOTHED_REMARK = (

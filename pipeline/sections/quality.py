@@ -15,7 +15,7 @@ from pipeline.sections.without_exclusions import without_exclusions
 from pipeline.session_quality import FACTS, LIGHTS, SYMBOLS, Judged, light_of
 from pipeline.wording import NOTHING, counted, listing, measure_label, number
 
-_ROWS_MAX = 120  # a page stays readable; tables/quality.csv has them all
+_ROWS_MAX = 40  # a page stays readable; tables/quality.csv has them all
 
 
 def section(material: Material) -> Section:

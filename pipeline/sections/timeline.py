@@ -7,7 +7,7 @@ from pipeline.document.model import Block
 from pipeline.figures import captions
 from pipeline.sections.material import Material, first_of
 
-_SESSIONS_MAX = 40  # a page holds no more rows
+_SESSIONS_MAX = 24  # a page holds no more rows
 
 
 def blocks(material: Material) -> list[Block]:
