@@ -17,9 +17,9 @@ from numba import njit
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-STEP_S = 0.002  # sensors are read in between; a hand hardly bends in it
+STEP_S = 0.0025  # sensors are read in between; a hand hardly bends in it
 _RING = 1024  # steps of memory, a power of two: more than any delay
-_AVERAGED = 25  # steps over which the seen discrepancy is averaged
+_AVERAGED = 20  # steps over which the seen discrepancy is averaged
 _MUSCLE_S = 0.04  # each of the two filters between motor noise and hand
 _LOOKED_FOR = 100  # points of the path to either side, among which it is found again
 _SEEN_S = 0.15  # of the leaky mean of the seen offset, by which a press is judged
@@ -125,11 +125,20 @@ def hand_at(start_mm: FloatArray, begins_s: float) -> Hand:
 
 
 @njit(cache=True, forceinline=True)
+def _steps(seconds: float) -> int:
+    """The nearest number of steps; `round` would take as long as the rest of a step."""
+    return int(seconds / STEP_S + 0.5)
+
+
+@njit(cache=True, forceinline=True)
 def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
     position, velocity, drive = state[0, axis], state[1, axis], state[2, axis]
     for row in range(3):
-        line = motion.transition[row]
-        state[row, axis] = line[0] * position + line[1] * velocity + line[2] * drive
+        state[row, axis] = (
+            motion.transition[row, 0] * position
+            + motion.transition[row, 1] * velocity
+            + motion.transition[row, 2] * drive
+        )
     state[2, axis] += motion.drive_sd * draw
 
 
@@ -190,8 +199,8 @@ def _follow_goal(person: Person, hand: Hand, to_x: float, to_y: float) -> None:
 def _perceive(person: Person, hand: Hand) -> None:
     """The correction follows the discrepancy between what was seen and what the hand was to do, with what lag adds."""
     step = hand.progress[STEP]
-    delay = round(person.visual_delay_s / STEP_S)
-    earlier = round((person.visual_delay_s + person.expected_lag_s) / STEP_S)
+    delay = _steps(person.visual_delay_s)
+    earlier = _steps(person.visual_delay_s + person.expected_lag_s)
     for axis in range(2):
         apart = hand.seen[(step - delay) & (_RING - 1), axis] - hand.own[(step - earlier) & (_RING - 1), axis]
         hand.summed[axis] += apart - hand.apart[(step - _AVERAGED) & (_RING - 1), axis]
@@ -231,7 +240,7 @@ def _farthest_in_view(person: Person, layout: Layout, along: int, last: int, see
 def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
     """The goal: the target where it is in view, else the farthest point of the path that is."""
     step, target = hand.progress[STEP], hand.progress[TARGET]
-    delay = round(person.visual_delay_s / STEP_S)
+    delay = _steps(person.visual_delay_s)
     seen_x, seen_y = hand.seen[(step - delay) & (_RING - 1), 0], hand.seen[(step - delay) & (_RING - 1), 1]
     target_x, target_y = layout.targets_mm[target, 0], layout.targets_mm[target, 1]
     path, last = layout.path_mm, layout.target_at[target]
@@ -340,7 +349,7 @@ def advance(
     hand.own[step & (_RING - 1), 0], hand.own[step & (_RING - 1), 1] = hand.planned[0, 0], hand.planned[0, 1]
     tapped = False
     if not known:  # the eyes have not met the first display yet
-        hand.progress[_SEES_FROM] = step + 1 + round(person.visual_delay_s / STEP_S)
+        hand.progress[_SEES_FROM] = step + 1 + _steps(person.visual_delay_s)
     if step >= hand.progress[_SEES_FROM]:
         _perceive(person, hand)
         tapped = _decide(person, layout, hand, now)

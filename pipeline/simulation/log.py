@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.formats.mcap import Message, in_order, write
 from pipeline.simulation.hand_steps import FloatArray, IntArray
 from pipeline.simulation.loop_steps import STEP_NS, TAP_S, TAP_X, TAP_Y
+from pipeline.simulation.sensing import gyroscope
 from pipeline.simulation.session import Outcome, Setting, reference_ns
 from pipeline.study import PositionStream, ReferenceStream
 
@@ -41,7 +42,7 @@ def _messages(setting: Setting, outcome: Outcome) -> Iterator[Message]:
     for row, value in enumerate(seen / _MM_PER_M):
         yield _position(tracker, int(frames.time_ns[row]), int(frames.arrival_ns[row]), value)
     force = np.einsum("nij,nj->ni", phone.to_body, _plane(outcome, phone.time_ns) - np.array(imu.gravity_mm_s2))
-    values = np.hstack([(force + phone.error_mm_s2) / _MM_PER_M, phone.turned_rad_s, phone.logged_xyzw])
+    values = np.hstack([(force + phone.error_mm_s2) / _MM_PER_M, gyroscope(phone), phone.logged_xyzw])
     for row, value in enumerate(values):
         arrival = EPOCH_NS + int(phone.arrival_ns[row])
         stamp = arrival if imu.stamp == "arrival" else EPOCH_NS + int(phone.time_ns[row])

@@ -48,7 +48,7 @@ class Session(NamedTuple):
     next: IntArray  # (3,): the next frame, force and instant
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _sense(sensing: Sensing, readings: Readings, session: Session, step: int) -> None:
     """The readings that were measured in the step before `step`, from the hand's motion at its ends."""
     now, trace = step * STEP_NS, session.trace

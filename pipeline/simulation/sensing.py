@@ -34,7 +34,7 @@ class Frames:
 class Phone:
     """The phone's readings: times as above; `force = to_body (a − gravity) + error`, in the body's frame.
 
-    `logged_xyzw` (n, 4) is the orientation the phone believes, `turned_rad_s` (n, 3) what its gyroscope reads.
+    `logged_xyzw` (n, 4) is the orientation the phone believes.
     """
 
     time_ns: IntArray
@@ -42,7 +42,6 @@ class Phone:
     to_body: FloatArray
     error_mm_s2: FloatArray
     logged_xyzw: FloatArray
-    turned_rad_s: FloatArray
 
 
 def frames(stream: PositionStream, instruments: Instruments, length_s: float, draws: Draws) -> Frames:
@@ -67,18 +66,25 @@ def phone(stream: AccelerationStream, instruments: Instruments, length_s: float,
     logged = Rotation.from_rotvec(wrong) * true
     bias = draws("bias").normal(0.0, instruments.imu_bias_sd_mm_s2, 3)
     noise = draws("imu noise").normal(0.0, stream.noise_sd_mm_s2, (count, 3))
-    turned = np.zeros((count, 3))
-    if count > 1:
-        turned[1:] = (true[:-1].inv() * true[1:]).as_rotvec() / np.diff(time_ns)[:, None] * _NS
-        turned[0] = turned[1]
     return Phone(
         time_ns,
         time_ns + round(stream.latency_s * _NS),
         true.inv().as_matrix(),
         noise + bias,
         logged.as_quat(),
-        turned,
     )
+
+
+def gyroscope(held: Phone) -> FloatArray:
+    """What the gyroscope reads (n, 3), in rad/s of the body's frame: the turn since the reading before."""
+    from scipy.spatial.transform import Rotation
+
+    found = np.zeros((len(held.time_ns), 3))
+    if len(found) > 1:
+        turns = held.to_body[:-1] @ held.to_body[1:].transpose(0, 2, 1)
+        found[1:] = Rotation.from_matrix(turns).as_rotvec() / np.diff(held.time_ns)[:, None] * _NS
+        found[0] = found[1]
+    return found
 
 
 def _times(rate_hz: float, instruments: Instruments, length_s: float, draws: Draws, name: str) -> IntArray:

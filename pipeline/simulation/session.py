@@ -23,7 +23,7 @@ from pipeline.simulation_settings import SelectionSimulation
 from pipeline.study import AccelerationStream, PositionStream, Study
 
 _NS = 1e-9
-_USUAL_S = 100.0  # most sessions are done by then; a longer one is run again from its begin with more room
+_USUAL_S = 120.0  # most sessions are done by then; a longer one is run again from its begin with more room
 _TREMOR_HZ, _TREMOR_DAMPING = 8.0, 0.1
 _DRIFT_HZ, _DRIFT_DAMPING = 0.3, 0.7
 
