@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pandas as pd
 from pipeline import figures, tables
 from pipeline.document.model import Figure
 from pipeline.figures import captions
+from pipeline.side_by_side import Job
 from pipeline.study import Session, Study
 from pipeline.wording import listing
 
@@ -32,7 +33,7 @@ ORIGINS = {
 class Material:
     """A study's settings, results and tables. `ingested` and `fused` are a folder a session, in their order.
 
-    `whole` are the folders with tables of the whole study.
+    `whole` are the folders with tables of the whole study; `drawings` gathers the figures that are to be drawn.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Material:
     figures: Path
     inputs: Mapping[str, str]
     whole: tuple[Path, ...]
+    drawings: list[Job] = field(default_factory=list)
 
     def rows(self, table: str) -> list[Row]:
         """The rows of a table of results.json."""
@@ -79,8 +81,8 @@ class Material:
         alt: str,
         *arguments: Any,
     ) -> Figure:
-        """Draw a figure into the report's figures and name it in the text."""
-        figures.draw(function, self.figures / f"{name}.svg", *arguments)
+        """Have a figure drawn into the report's figures, and name it in the text."""
+        self.drawings.append(Job(figures.draw, (function, self.figures / f"{name}.svg", *arguments)))
         return Figure(f"figure-{name}", f"{name}.svg", caption, alt)
 
     def drawn(

@@ -7,6 +7,7 @@ from pipeline.document import html, pdf
 from pipeline.document.model import Document
 from pipeline.sections import SECTIONS, glossary, participants, paste, traces
 from pipeline.sections.material import ORIGINS, Material
+from pipeline.side_by_side import Job, carry_out
 from pipeline.stage import Outcome, Work
 
 _FROM_COMPARE = (
@@ -53,11 +54,11 @@ def run(work: Work) -> Outcome:
     )
     sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
     sections += glossary.of(sections)
+    carry_out([*material.drawings, Job(traces.write, (material, work.out / traces.PAGE))])
     subtitle = f"Study “{work.study_name}”"
     document = Document(work.study.title, subtitle, ORIGINS[work.study.data_origin], sections)
     (work.out / paste.BIBLIOGRAPHY).write_text(paste.bibtex(material), encoding="utf-8")
     html.render(document, work.out / "figures", work.out / "report.html")
     pdf.render(document, work.out / "figures", work.out / "report.pdf")
-    traces.write(material, work.out / traces.PAGE)
     participants.write(material, work.out / participants.FOLDER)
     return Outcome()

@@ -1,0 +1,42 @@
+"""Jobs of two processes: each done once, whoever dies."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pipeline.side_by_side import Job, carry_out
+
+
+def note(folder: Path, number: int) -> None:
+    with (folder / f"{number:02d}").open("a") as file:
+        file.write(f"{number}")
+
+
+def die_elsewhere(folder: Path, number: int, here: int) -> None:
+    if os.getpid() != here:
+        os._exit(1)
+    note(folder, number)
+
+
+def fail(folder: Path) -> None:
+    raise ValueError(f"nothing goes into {folder.name}")
+
+
+@pytest.mark.parametrize("count", [0, 3, 40])
+def test_every_job_is_done_once(tmp_path: Path, count: int) -> None:
+    carry_out([Job(note, (tmp_path, number)) for number in range(count)])
+    assert [path.read_text() for path in sorted(tmp_path.iterdir())] == [str(number) for number in range(count)]
+
+
+def test_what_a_dying_process_leaves_is_done_here(tmp_path: Path) -> None:
+    carry_out([Job(die_elsewhere, (tmp_path, number, os.getpid())) for number in range(20)])
+    assert len(list(tmp_path.iterdir())) == 20
+
+
+@pytest.mark.parametrize("count", [1, 20])
+def test_a_fault_of_a_job_is_raised(tmp_path: Path, count: int) -> None:
+    with pytest.raises(ValueError, match="nothing goes into"):
+        carry_out([Job(fail, (tmp_path,))] * count)
