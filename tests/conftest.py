@@ -13,9 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from pipeline.formats.mcap import Message, in_order, write
 from tests.pipeline.helpers import Steadyhand
+
+# No test is timed: a busy machine, or the first use of a table of all characters, is no fault of what is tested.
+settings.register_profile("steadyhand", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("steadyhand")
 
 EPOCH_NS = 1_700_000_000_000_000_000
 CLONE = Path(__file__).resolve().parents[1]

@@ -46,6 +46,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _compare(study: Path, out: Path, cache: Path, jobs: int, die_at: int | None, most_bytes: int | None) -> None:
     """`steadyhand compare`, killed at a touch of the cache's files, or with a limit to a file's size."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores Ctrl-C for what runs in the background
     touched = 0
 
     def watch(event: str, arguments: tuple[object, ...]) -> None:
