@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
+
 from pipeline import results, tables
 from pipeline.document import html, pdf
 from pipeline.document.model import Document
 from pipeline.sections import SECTIONS, glossary, participants, paste, traces
 from pipeline.sections.material import ORIGINS, Material
-from pipeline.side_by_side import Job, carry_out
+from pipeline.side_by_side import Job, another_process, carry_out
 from pipeline.stage import Outcome, Work
 
 _FROM_COMPARE = (
@@ -30,8 +32,17 @@ _FROM_COMPARE = (
     "simulated_reductions",
 )
 
+_MANY = 8  # sessions: with fewer all is drawn before another process is ready
+
 
 def run(work: Work) -> Outcome:
+    """The report's files; those of a study with many sessions are drawn in two processes."""
+    with another_process(len(work.sessions) >= _MANY, "pipeline.sections") as pool:
+        _write(work, pool)
+    return Outcome()
+
+
+def _write(work: Work, pool: Executor | None) -> None:
     """report.html, traces.html, participants/*.html, report.pdf, references.bib, tables/*.csv and figures/*.svg."""
     compared = work.entry("compare")
     for folder in ("tables", "figures"):
@@ -54,11 +65,10 @@ def run(work: Work) -> Outcome:
     )
     sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
     sections += glossary.of(sections)
-    carry_out([*material.drawings, Job(traces.write, (material, work.out / traces.PAGE))])
+    carry_out([*material.drawings, Job(traces.write, (material, work.out / traces.PAGE))], pool)
     subtitle = f"Study “{work.study_name}”"
     document = Document(work.study.title, subtitle, ORIGINS[work.study.data_origin], sections)
     (work.out / paste.BIBLIOGRAPHY).write_text(paste.bibtex(material), encoding="utf-8")
     html.render(document, work.out / "figures", work.out / "report.html")
     pdf.render(document, work.out / "figures", work.out / "report.pdf")
     participants.write(material, work.out / participants.FOLDER)
-    return Outcome()

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.side_by_side import Job, carry_out
+from pipeline import side_by_side
+from pipeline.side_by_side import Job
 
 
 def note(folder: Path, number: int) -> None:
@@ -25,18 +26,24 @@ def fail(folder: Path) -> None:
     raise ValueError(f"nothing goes into {folder.name}")
 
 
+def done(jobs: list[Job], *, apart: bool) -> None:
+    with side_by_side.another_process(apart, "pathlib") as pool:
+        side_by_side.carry_out(jobs, pool)
+
+
+@pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize("count", [0, 3, 40])
-def test_every_job_is_done_once(tmp_path: Path, count: int) -> None:
-    carry_out([Job(note, (tmp_path, number)) for number in range(count)])
+def test_every_job_is_done_once(tmp_path: Path, count: int, apart: bool) -> None:
+    done([Job(note, (tmp_path, number)) for number in range(count)], apart=apart)
     assert [path.read_text() for path in sorted(tmp_path.iterdir())] == [str(number) for number in range(count)]
 
 
 def test_what_a_dying_process_leaves_is_done_here(tmp_path: Path) -> None:
-    carry_out([Job(die_elsewhere, (tmp_path, number, os.getpid())) for number in range(20)])
+    done([Job(die_elsewhere, (tmp_path, number, os.getpid())) for number in range(20)], apart=True)
     assert len(list(tmp_path.iterdir())) == 20
 
 
-@pytest.mark.parametrize("count", [1, 20])
-def test_a_fault_of_a_job_is_raised(tmp_path: Path, count: int) -> None:
+@pytest.mark.parametrize("apart", [False, True])
+def test_a_fault_of_a_job_is_raised(tmp_path: Path, apart: bool) -> None:
     with pytest.raises(ValueError, match="nothing goes into"):
-        carry_out([Job(fail, (tmp_path,))] * count)
+        done([Job(fail, (tmp_path,))] * 20, apart=apart)
