@@ -98,7 +98,7 @@ def _packed(traces: Traces, step_s: float) -> dict[str, Any]:
         "step_s": step_s,
         "left_out": left_out,
         "series": listed,
-        "data": base64.b64encode(zlib.compress(b"".join(parts), 9)).decode(),
+        "data": base64.b64encode(zlib.compress(b"".join(parts), 6)).decode(),
     }
 
 
