@@ -367,7 +367,7 @@ def paths(
     summary += f" The widest is session {furthest[0]}, {furthest[2]}." if furthest[0] else ""
     people = counted(told["participant"].nunique(), "participant")
     return Said(
-        f"What was displayed on the way past the targets, a panel a participant ({people}): {summary} Look for ways"
+        f"The way of each session in the plane, a panel a participant ({people}): {summary} Look for ways"
         " that leave the others.",
         f"Paths of {people} in the plane: {summary}",
     )
