@@ -5,22 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+from pipeline.settings_types import Finite, Frozen, Positive
+
 NotNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Extent = tuple[Positive, Positive]
 
 
-class _Frozen(BaseModel):
-    """Immutable, and every key is known."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Ring(_Frozen):
+class Ring(Frozen):
     """Targets on a circle, each next to be selected across from the last, as in ISO 9241-411."""
 
     centre_mm: Point
@@ -29,7 +23,7 @@ class Ring(_Frozen):
     target_diameter_mm: Positive = 20.0
 
 
-class Task(_Frozen):
+class Task(Frozen):
     """Where the targets are, in the tracker's x and y, and how much of it the display shows.
 
     `path_mm` leads from target to target; without one a participant goes straight. Without `window_mm` all is in view.
@@ -59,7 +53,7 @@ class Task(_Frozen):
         return self
 
 
-class Trait(_Frozen):
+class Trait(Frozen):
     """A trait's mean over people, how far people differ (coefficient of variation), and who says so."""
 
     mean: NotNegative
@@ -76,7 +70,7 @@ _LAG = "MacKenzie and Ware 1993, pointing under lag; not this study"
 _JUDGED = "judgement"
 
 
-class Traits(_Frozen):
+class Traits(Frozen):
     """A simulated participant's perception, movement and decision; the defaults are those of the literature."""
 
     visual_delay_s: Trait = _trait(0.15, 0.12, f"{_KAMP}: 0.14 s")
@@ -101,7 +95,7 @@ class Traits(_Frozen):
     damping_ratio: Trait = _trait(0.9, 0.0, f"{_JUDGED}; form: Müller 2017 (second_order_lag only)")
 
 
-class Instruments(_Frozen):
+class Instruments(Frozen):
     """How the simulated sensors run; their noise and latency are those that `streams` state."""
 
     tracker_rate_hz: Positive = 30.0
@@ -120,14 +114,14 @@ DRIVERS = ("completion_time_s", "selection_rmse_mm", "corrections_per_target")
 """What a rating may depend on, as measured in the session."""
 
 
-class Scale(_Frozen):
+class Scale(Frozen):
     """A rating: `base` at the `usual` session, and how much it rises for each doubling of a driver."""
 
     base: Finite
     per_doubling: Mapping[Literal["completion_time_s", "selection_rmse_mm", "corrections_per_target"], Finite] = {}
 
 
-class Workload(_Frozen):
+class Workload(Frozen):
     """Ratings from a stated response model: judgement, not a finding."""
 
     questionnaire: str = Field(min_length=1)
@@ -150,7 +144,7 @@ class Workload(_Frozen):
         return self
 
 
-class Published(_Frozen):
+class Published(Frozen):
     """A reduction that a publication reports, from the first condition to the second, to stand beside the simulated."""
 
     source: str = Field(min_length=1)
@@ -159,7 +153,7 @@ class Published(_Frozen):
     reduction: Annotated[float, Field(ge=-100, le=1)]
 
 
-class SelectionSimulation(_Frozen):
+class SelectionSimulation(Frozen):
     """The paper's Experiment 2 with simulated participants, who see the display alone."""
 
     kind: Literal["selection"]
@@ -175,7 +169,7 @@ class SelectionSimulation(_Frozen):
     longest_s: Annotated[float, Field(ge=10, le=3600)] = 240.0
 
 
-class ReachSimulation(_Frozen):
+class ReachSimulation(Frozen):
     """The paper's Experiment 1: still, a minimum-jerk reach along x, still again."""
 
     kind: Literal["reach"]

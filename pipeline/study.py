@@ -14,6 +14,7 @@ import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.errors import PipelineError, did_you_mean
+from pipeline.settings_types import Finite, Frozen, Positive
 from pipeline.simulation_settings import Simulation, Task
 
 SETTINGS_FILE = "study.yaml"
@@ -31,16 +32,8 @@ def identifier(value: object) -> object:
 
 
 Id = Annotated[str, BeforeValidator(identifier), Field(min_length=1)]
-Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
-Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)]
-
-
-class Frozen(BaseModel):
-    """Immutable, and every key is known."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class _Stream(Frozen):

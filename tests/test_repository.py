@@ -11,7 +11,8 @@ import yaml
 
 from fusion_core import ESTIMATORS
 from pipeline import tables
-from pipeline.study import KINDS, Comparison, Display, Frozen, OperatorTerm, QualityLimits, Study, load_study, parse
+from pipeline.settings_types import Frozen
+from pipeline.study import KINDS, Comparison, Display, OperatorTerm, QualityLimits, Study, load_study, parse
 from pipeline.study_tables import MEASURE_REQUIRED, MEASURE_RESERVED, RATING_REQUIRED, TRIAL_OPTIONAL, TRIAL_REQUIRED
 from tests.conftest import CLONE
 

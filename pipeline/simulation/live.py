@@ -14,9 +14,8 @@ from numba import njit
 
 from fusion_core import Estimator, FusionKalman, PositionKalman, Raw, Samples, WindowGP, position_steps, window_gains
 from fusion_core.event_replay import arrive
-from fusion_core.event_steps import JERK_PSD, History, Model, write_expected
+from fusion_core.event_steps import History, Model, expect
 from fusion_core.event_time import EventTime
-from fusion_core.motion import position_step
 from fusion_core.window_gp import Schedule
 from pipeline.simulation.hand_steps import FloatArray, IntArray
 
@@ -152,12 +151,7 @@ def _show_event_time(live: Live, readings: Readings, now: float, shown: FloatArr
     if span[1] == 0:
         shown[:] = np.nan
         return
-    model, history, row = event.model, event.history, span[1] - 1
-    mean, sd = np.empty((1, len(shown))), np.empty((1, len(shown)))
-    of_position, dt = np.zeros(len(model.states)), max(now - history.time[row], 0.0)
-    noise = position_step(model.motion, dt, history.adapted[row, JERK_PSD], of_position)
-    write_expected(model.states, model.axes, history.mean, history.covariance, row, of_position, noise, mean, sd, 0)
-    shown[:] = mean[0]
+    shown[:] = expect(event.model, event.history, span[1] - 1, now)[0]
 
 
 def live(

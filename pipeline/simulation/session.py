@@ -15,7 +15,7 @@ from pipeline.estimators import build_estimator, sensors
 from pipeline.recording import seeded
 from pipeline.simulation import layout as layouts
 from pipeline.simulation import loop_steps, people, sensing
-from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, hand_at
+from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, Sway, hand_at
 from pipeline.simulation.live import Readings, live
 from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
 from pipeline.simulation.motion import minimum_jerk
@@ -51,11 +51,13 @@ class Setting:
     @cached_property
     def streams(self) -> tuple[str, PositionStream, str, AccelerationStream]:
         """The tracker and the phone, with their names."""
-        study, found = self.study, {}
-        for kind, names in (("position", [study.tracker]), ("acceleration", [study.stream_of_kind("acceleration")])):
-            if names[0] is None:
+        study = self.study
+        named = {"position": study.tracker, "acceleration": study.stream_of_kind("acceleration")}
+        found: dict[str, str] = {}
+        for kind, name in named.items():
+            if name is None:
                 raise PipelineError(f"{self.where}: simulation: streams lacks one of kind {kind}")
-            found[kind] = names[0]
+            found[kind] = name
         tracker, imu = study.streams[found["position"]], study.streams[found["acceleration"]]
         assert isinstance(tracker, PositionStream)  # noqa: S101
         assert isinstance(imu, AccelerationStream)  # noqa: S101
@@ -290,13 +292,13 @@ def reference_ns(setting: Setting, length_s: float) -> IntArray:
     return np.rint(np.arange(0.0, length_s, 1.0 / rate_hz) / _NS).astype(np.int64)
 
 
-@lru_cache(maxsize=8)
-def _sways_of(tremor_mm: float, drift_mm: float) -> tuple[Any, Any]:
-    return people.sway(_TREMOR_HZ, _TREMOR_DAMPING, tremor_mm), people.sway(_DRIFT_HZ, _DRIFT_DAMPING, drift_mm)
-
-
-def _sways(settings: SelectionSimulation) -> tuple[Any, Any]:
-    return _sways_of(settings.traits.tremor_mm.mean, settings.traits.drift_mm.mean)
+def _sways(settings: SelectionSimulation) -> tuple[Sway, Sway]:
+    """Tremor and drift."""
+    traits = settings.traits
+    return (
+        people.sway(_TREMOR_HZ, _TREMOR_DAMPING, traits.tremor_mm.mean),
+        people.sway(_DRIFT_HZ, _DRIFT_DAMPING, traits.drift_mm.mean),
+    )
 
 
 def _in_tracker_frame(

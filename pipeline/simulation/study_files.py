@@ -24,6 +24,7 @@ from pipeline.simulation_state import MADE, files_made, made_from
 from pipeline.study import Study, inside
 
 _BEING_MADE = ".being-simulated"
+_PLACEHOLDERS = ("{participant}", "{condition}")
 Begin = Callable[[int], None]
 Done = Callable[[], None]
 
@@ -77,7 +78,7 @@ def participants(settings: SelectionSimulation) -> list[str]:
 def _sessions(setting: Setting, folder: Path) -> list[Session]:
     """Every participant in every condition, in counterbalanced order."""
     study, found = setting.study, []
-    if study.sessions is None or not {"{participant}", "{condition}"} <= set(_placeholders(study.sessions)):
+    if study.sessions is None or not all(part in study.sessions for part in _PLACEHOLDERS):
         raise PipelineError(f"{setting.where}: sessions: needs {{participant}} and {{condition}} for the logs' names")
     names, conditions = participants(setting.simulation), study.conditions
     orders = assigned(len(conditions), len(names)) if len(conditions) > 1 else [(0,)] * len(names)
@@ -88,10 +89,6 @@ def _sessions(setting: Setting, folder: Path) -> list[Session]:
             inside(folder, file, f"{setting.where}: sessions", must_exist=False)
             found.append(Session(participant, condition, place, file))
     return found
-
-
-def _placeholders(pattern: str) -> list[str]:
-    return [part for part in ("{participant}", "{condition}") if part in pattern]
 
 
 def _check(setting: Setting) -> None:
