@@ -18,7 +18,7 @@ LAG_RANGE_S = 0.5
 _LAG_STEP_S = 0.005
 _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
-_ROUND_OFF = 1e-9  # of a cost, what the order of a sum may change
+_FLAT = 1e-6  # of a cost: while the reference is still, any shift fits
 
 
 @dataclass(frozen=True)
@@ -74,58 +74,47 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     interval that reaches ±0.5 s says the data cannot tell; one in which the hand never moves says nothing of the lag
     and does not count.
     """
-    shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
     order = np.argsort(reference.time, kind="stable")
-    distance = lag_steps.squared_distances(
-        np.asarray(time, dtype=np.float64),
-        np.ascontiguousarray(estimate, dtype=np.float64),
-        np.asarray(reference.time[order], dtype=np.float64),
-        np.ascontiguousarray(reference.value[order], dtype=np.float64),
-        shifts,
-        GAP_S,
-    )
-    usable = np.isfinite(distance).all(axis=1)
+    known, value = reference.time[order], reference.value[order]
+    usable = _surrounded(known, time)
     if not usable.any() or np.ptp(time[usable]) < 1.0:
         return NO_INTERVAL
-    distance = distance if usable.all() else distance[usable]
-    summed = distance.sum(axis=0)[None, :]
-    whole = _lowest(shifts, summed)[0]
-    if _flat(summed)[0] or not shifts[0] < whole < shifts[-1]:
+    time, estimate = time[usable], np.ascontiguousarray(estimate[usable], dtype=np.float64)
+    block = min(max(1, round(_BLOCK_S / float(np.median(np.diff(time))))), len(time))
+    shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
+    blocks = lag_steps.block_costs(_segments(known, value), time, estimate, shifts, block)
+    scale = float(blocks.total.max())
+    whole = lag_steps.best(blocks.total, scale)
+    if scale - blocks.total.min() <= _FLAT * scale or not 0 < whole < len(shifts) - 1:
         return NO_INTERVAL
-    block = max(1, round(_BLOCK_S / float(np.median(np.diff(time[usable])))))
-    sums = lag_steps.block_sums(distance, block)
-    picks = random.integers(len(sums), size=(_RESAMPLES, max(1, len(distance) // block)))
-    resampled = lag_steps.resampled(sums, picks)
-    resampled = resampled[~_flat(resampled)]
-    if len(resampled) < _RESAMPLES // 2:
-        return Interval(float(whole), np.nan, np.nan)
-    lows = _lowest(shifts, resampled)
-    low, high = np.percentile(lows, [2.5, 97.5])
-    return Interval(float(whole), float(low), float(high))
+    picks = random.integers(len(blocks.still), size=(_RESAMPLES, max(1, len(time) // block)))
+    found = lag_steps.best_of_resamples(blocks, picks)
+    found = found[np.isfinite(found)]
+    low, high = np.percentile(found, [2.5, 97.5]) if len(found) >= _RESAMPLES // 2 else (np.nan, np.nan)
+    return Interval(*(float(shifts[0] + steps * _LAG_STEP_S) for steps in (whole, low, high)))
 
 
-def _flat(cost: FloatArray) -> BoolArray:
-    """Rows that are the same at every shift but for round-off: while the reference is still, any shift fits."""
-    highest = cost.max(axis=1)
-    flat: BoolArray = highest - cost.min(axis=1) <= 1e-6 * highest
-    return flat
+def _surrounded(known: FloatArray, time: FloatArray) -> BoolArray:
+    """The instants at which the reference, read at the rising `known`, reaches without a gap to every shift."""
+    if len(known) < 2:
+        return np.zeros(len(time), dtype=np.bool_)
+    gaps = np.concatenate([[0], np.cumsum(np.diff(known) > GAP_S)])
+    begin = np.searchsorted(known, time - LAG_RANGE_S, side="right") - 1
+    end = np.searchsorted(known, time + LAG_RANGE_S, side="left")
+    inside = (begin >= 0) & (end < len(known))
+    surrounded: BoolArray = inside & (gaps[begin] == gaps[np.minimum(end, len(known) - 1)])
+    return surrounded
 
 
-def _lowest(shifts: FloatArray, cost: FloatArray) -> FloatArray:
-    """Where each row of `cost` is lowest, refined by a parabola unless that is at an edge.
-
-    Where a stretch of shifts fits equally well but for round-off the first of them is taken.
-    """
-    scale = np.maximum(cost.max(axis=1), np.finfo(float).tiny)
-    at = np.argmax(cost <= (cost.min(axis=1) + _ROUND_OFF * scale)[:, None], axis=1)
-    inside = np.clip(at, 1, len(shifts) - 2)
-    row = np.arange(len(cost))
-    before, here, after = cost[row, inside - 1], cost[row, inside], cost[row, inside + 1]
-    bend = before - 2 * here + after
-    sharp = (at == inside) & (bend > _ROUND_OFF * scale)
-    step = np.divide(before - after, 2 * bend, out=np.zeros_like(bend), where=sharp)
-    lowest: FloatArray = shifts[at] + step * (shifts[1] - shifts[0])
-    return lowest
+def _segments(known: FloatArray, value: FloatArray) -> lag_steps.Segments:
+    """The reference as straight pieces; one that takes no time leads nowhere."""
+    lasting, rise = np.diff(known), np.diff(value.T)
+    slope = np.divide(rise, lasting, out=np.zeros_like(rise), where=lasting > 0)
+    return lag_steps.Segments(
+        np.ascontiguousarray(known, dtype=np.float64),
+        np.ascontiguousarray(value[:-1].T, dtype=np.float64),
+        np.ascontiguousarray(slope, dtype=np.float64),
+    )
 
 
 def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:

@@ -1,6 +1,13 @@
-"""What the search for a lag computes most often, compiled: distances at each shift, and their sums over resamples."""
+"""What the search for a lag computes most often, compiled: costs of blocks at each shift, and the best of resamples.
+
+A resample's cost at a shift is the sum of its blocks' costs there. Shifts stand in groups of eight: a sum of the
+blocks' lowest costs within a group is below any of that group's costs, so that a group whose bound is above a cost
+already found is left out. What is found is what all costs would give.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -8,74 +15,177 @@ from numba import njit
 
 from fusion_core.samples import FloatArray
 
+_GROUP = 8  # shifts: a line of memory
+_ROUND_OFF = 1e-9  # of a cost, what the order of a sum may change
+_STILL = 1e-6  # a block whose costs differ by less than this share is the same at every shift
+
+
+class Segments(NamedTuple):
+    """A reference's straight pieces between readings at `time` (n + 1,) in s: begins and slopes (d, n)."""
+
+    time: FloatArray
+    begin: FloatArray
+    slope: FloatArray
+
+
+class Blocks(NamedTuple):
+    """Costs of blocks of instants that follow each other, from each instant on that has so many."""
+
+    cost: FloatArray  # (groups, blocks, 8) mm²; the last group is filled up with inf
+    bound: FloatArray  # (blocks, groups) mm²: the lowest of each group
+    still: npt.NDArray[np.bool_]  # (blocks,): the cost is the same at every shift but for round-off
+    total: FloatArray  # (shifts,) mm²: of all instants
+
 
 @njit(cache=True)
-def squared_distances(
-    time: FloatArray, estimate: FloatArray, known: FloatArray, value: FloatArray, shifts: FloatArray, gap_s: float
-) -> FloatArray:
-    """‖estimate(t) − reference(t − shift)‖², (n, shifts), by linear interpolation of `value` at the rising `known`.
+def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shifts: FloatArray, block: int) -> Blocks:
+    """Σ‖estimate(t) − reference(t − shift)‖² over every `block` instants, for rising `shifts`.
 
-    NaN outside the reference and in its gaps longer than `gap_s`, but on a reading of it.
+    The reference reaches from time[0] − shifts[-1] to time[-1] − shifts[0]; of `time` (n,) and `estimate` (n, d).
     """
-    found = np.full((len(time), len(shifts)), np.nan)
-    last = len(known) - 1
-    for column in range(len(shifts)):
-        after = 0  # the first reading at or after the instant
-        for row in range(len(time)):
-            wanted = time[row] - shifts[column]
-            while after <= last and known[after] < wanted:
-                after += 1
-            while after > 0 and known[after - 1] >= wanted:
-                after -= 1
-            if after > last or (after == 0 and known[0] != wanted):
-                continue
-            total = 0.0
-            if known[after] == wanted:
-                for axis in range(value.shape[1]):
-                    total += (estimate[row, axis] - value[after, axis]) ** 2
-            else:
-                apart = known[after] - known[after - 1]
-                if apart > gap_s:
-                    continue
-                for axis in range(value.shape[1]):
-                    slope = (value[after, axis] - value[after - 1, axis]) / apart
-                    there = slope * (wanted - known[after - 1]) + value[after - 1, axis]
-                    total += (estimate[row, axis] - there) ** 2
-            found[row, column] = total
-    return found
+    count, groups = len(shifts), (len(shifts) + _GROUP - 1) // _GROUP
+    blocks = len(time) - block + 1
+    cost = np.full((groups, blocks, _GROUP), np.inf)
+    bound, still, total = np.empty((blocks, groups)), np.empty(blocks, np.bool_), np.zeros(count)
+    recent, newest, running = np.zeros((block, count)), np.empty(count), np.zeros(count)
+    quadratic, begin = np.empty((3, len(segments.time))), 0
+    quadratic[2] = 0.0
+    for axis in range(len(segments.slope)):
+        quadratic[2, :-1] += segments.slope[axis] ** 2
+    for row in range(len(time)):
+        while begin < len(segments.time) - 2 and segments.time[begin + 1] <= time[row] - shifts[-1]:
+            begin += 1
+        _squared_distances(segments, begin, time[row], estimate[row], shifts, quadratic, newest)
+        oldest = recent[row % block]
+        for shift in range(count):
+            running[shift] += newest[shift] - oldest[shift]
+            total[shift] += newest[shift]
+            oldest[shift] = newest[shift]
+        if row >= block - 1:
+            still[row - block + 1] = _into_groups(running, cost[:, row - block + 1], bound[row - block + 1])
+    return Blocks(cost, bound, still, total)
 
 
 @njit(cache=True)
-def block_sums(distance: FloatArray, block: int) -> FloatArray:
-    """Sums of `block` rows of (n, shifts), from each row on that has so many, (n − block + 1, shifts)."""
-    rows, shifts = distance.shape
-    cumulative, sums = np.zeros((rows + 1, shifts)), np.empty((rows - block + 1, shifts))
-    for row in range(rows):
-        before, after, own = cumulative[row], cumulative[row + 1], distance[row]
-        for column in range(shifts):
-            after[column] = before[column] + own[column]
-        begin = row + 1 - block
-        if begin >= 0:
-            first, part = cumulative[begin], sums[begin]
-            for column in range(shifts):
-                part[column] = after[column] - first[column]
-    return sums
+def _squared_distances(
+    segments: Segments,
+    begin: int,
+    time: float,
+    estimate: FloatArray,
+    shifts: FloatArray,
+    quadratic: FloatArray,
+    found: FloatArray,
+) -> None:
+    """One instant's squared distance at each shift, from segment `begin` on: in each a quadratic of time."""
+    last, end = len(segments.time) - 2, begin
+    while end < last and segments.time[end + 1] <= time - shifts[0]:
+        end += 1
+    constant, linear = quadratic[0, begin : end + 1], quadratic[1, begin : end + 1]
+    constant[:], linear[:] = 0.0, 0.0
+    for axis in range(len(estimate)):
+        start, slope = segments.begin[axis, begin : end + 1], segments.slope[axis, begin : end + 1]
+        here = estimate[axis]
+        for segment in range(len(start)):
+            apart = here - start[segment]
+            constant[segment] += apart * apart
+            linear[segment] -= 2.0 * apart * slope[segment]
+    shift = len(shifts) - 1
+    wanted = time - shifts[shift]
+    for segment in range(begin, end + 1):
+        until = segments.time[segment + 1] if segment < end else np.inf
+        while wanted < until:
+            since = wanted - segments.time[segment]
+            found[shift] = quadratic[0, segment] + since * (quadratic[1, segment] + since * quadratic[2, segment])
+            shift -= 1
+            if shift < 0:
+                return
+            wanted = time - shifts[shift]
 
 
 @njit(cache=True)
-def resampled(sums: FloatArray, picks: npt.NDArray[np.int64]) -> FloatArray:
-    """Σ of the rows of `sums` (n, shifts) that each row of `picks` (resamples, k) names, (resamples, shifts)."""
-    found = np.zeros((len(picks), sums.shape[1]))
-    count = picks.shape[1]
-    fours = count - count % 4
+def _into_groups(running: FloatArray, cost: FloatArray, bound: FloatArray) -> bool:
+    """One block's costs into its groups and their bounds; whether they are all the same but for round-off."""
+    lowest, highest = np.inf, -np.inf
+    for group in range(len(bound)):
+        least = np.inf
+        for column in range(min(_GROUP, len(running) - group * _GROUP)):
+            own = running[group * _GROUP + column]
+            cost[group, column] = own
+            least, highest = min(least, own), max(highest, own)
+        bound[group], lowest = least, min(lowest, least)
+    return highest - lowest <= _STILL * highest
+
+
+@njit(cache=True)
+def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArray:
+    """The best shift, in steps from the first, of the blocks that each row of `picks` (resamples, k) names.
+
+    NaN where every one of them is still: any shift fits then.
+    """
+    groups, count = len(blocks.cost), len(blocks.total)
+    scale = blocks.total.max()
+    found, bound, cost = np.full(len(picks), np.nan), np.empty(groups), np.empty(groups * _GROUP)
     for row in range(len(picks)):
-        total, own = found[row], picks[row]
-        for at in range(0, fours, 4):  # four at once: the sum is loaded and stored a quarter as often
-            a, b, c, d = sums[own[at]], sums[own[at + 1]], sums[own[at + 2]], sums[own[at + 3]]
-            for column in range(len(total)):
-                total[column] += (a[column] + b[column]) + (c[column] + d[column])
-        for at in range(fours, count):
-            part = sums[own[at]]
-            for column in range(len(total)):
-                total[column] += part[column]
+        own = picks[row]
+        if np.all(blocks.still[own]):
+            continue
+        _summed(blocks.bound, own, bound)
+        cost[:] = np.inf
+        group = int(np.argmin(bound))
+        least = _costs_of(blocks, group, own, cost)
+        bound[group] = np.inf
+        for group in range(groups):
+            if bound[group] <= least + _ROUND_OFF * scale:
+                least = min(least, _costs_of(blocks, group, own, cost))
+                bound[group] = np.inf
+        at = _first_of_lowest(cost, count, scale)
+        for group in ((at - 1) // _GROUP, (at + 1) // _GROUP):
+            if 0 <= group < groups and bound[group] < np.inf:
+                _costs_of(blocks, group, own, cost)
+        found[row] = best(cost[:count], scale)
     return found
+
+
+@njit(cache=True)
+def _summed(rows: FloatArray, picks: npt.NDArray[np.int64], total: FloatArray) -> None:
+    """Σ of the rows that `picks` names."""
+    total[:] = 0.0
+    fours = len(picks) - len(picks) % 4
+    for at in range(0, fours, 4):  # four at once: the sum is loaded and stored a quarter as often
+        a, b, c, d = rows[picks[at]], rows[picks[at + 1]], rows[picks[at + 2]], rows[picks[at + 3]]
+        for column in range(len(total)):
+            total[column] += (a[column] + b[column]) + (c[column] + d[column])
+    for at in range(fours, len(picks)):
+        part = rows[picks[at]]
+        for column in range(len(total)):
+            total[column] += part[column]
+
+
+@njit(cache=True)
+def _costs_of(blocks: Blocks, group: int, picks: npt.NDArray[np.int64], cost: FloatArray) -> float:
+    """A resample's costs at one group of shifts, and the lowest of them."""
+    own = cost[group * _GROUP : (group + 1) * _GROUP]
+    _summed(blocks.cost[group], picks, own)
+    return float(own.min())
+
+
+@njit(cache=True)
+def _first_of_lowest(cost: FloatArray, count: int, scale: float) -> int:
+    """Where a stretch of shifts fits equally well but for round-off: the first of them."""
+    enough = cost[:count].min() + _ROUND_OFF * scale
+    at = 0
+    while cost[at] > enough:
+        at += 1
+    return at
+
+
+@njit(cache=True)
+def best(cost: FloatArray, scale: float) -> float:
+    """The shift of the lowest cost, in steps from the first, refined by a parabola unless it is at an edge."""
+    at = _first_of_lowest(cost, len(cost), scale)
+    if 0 < at < len(cost) - 1:
+        before, here, after = cost[at - 1], cost[at], cost[at + 1]
+        bend = before - 2.0 * here + after
+        if bend > _ROUND_OFF * scale:
+            return float(at + (before - after) / (2.0 * bend))
+    return float(at)

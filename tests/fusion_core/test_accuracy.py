@@ -53,6 +53,47 @@ def test_lag_of_a_hand_that_never_moves_is_not_claimed() -> None:
         assert np.isnan(found.value)
 
 
+def plain_lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.random.Generator) -> FloatArray:
+    """The lag and its interval by the definition: every cost of every resample."""
+    shifts = np.linspace(-0.5, 0.5, 201)
+    costs, kept = [], []
+    for now, shown in zip(time, estimate, strict=True):
+        truth = accuracy.interpolate(reference, now - shifts)
+        if np.isfinite(truth).all():
+            costs.append(np.sum((shown - truth) ** 2, axis=1))
+            kept.append(now)
+    block = round(0.5 / float(np.median(np.diff(kept))))
+    blocks = np.array([np.sum(costs[first : first + block], axis=0) for first in range(len(costs) - block + 1)])
+    picks = random.integers(len(blocks), size=(1000, len(costs) // block))
+    lows = []
+    for cost in (np.sum(costs, axis=0), *(blocks[row].sum(axis=0) for row in picks)):
+        at = int(np.argmin(cost))
+        if 0 < at < 200:
+            before, here, after = cost[at - 1 : at + 2]
+            lows.append(shifts[at] + 0.005 * (before - after) / (2 * (before - 2 * here + after)))
+        else:
+            lows.append(shifts[at])
+    return np.array([lows[0], *np.percentile(lows[1:], [2.5, 97.5])])
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.0475, -0.31, 0.49])
+@pytest.mark.parametrize("speed", [1.0, 0.02])
+def test_lag_is_what_all_costs_give(late_s: float, speed: float) -> None:
+    """Fast and slow hands: of these many shifts fit nearly as well as the best, also beyond the range."""
+    random = np.random.default_rng(8)
+    known = np.cumsum(random.uniform(0.004, 0.02, 700)) - 1.0
+    known[300:] += 0.2  # a gap
+    time = np.arange(0, 6, 1 / 60) + random.uniform(0, 0.002, 360)
+    estimate = moving(speed * (time - late_s)) + random.normal(0, 3, (360, 2))
+    reference = of(known, moving(speed * known))
+    found = accuracy.lag(time, estimate, reference, np.random.default_rng(9))
+    expected = plain_lag(time, estimate, reference, np.random.default_rng(9))
+    if not -0.5 < expected[0] < 0.5:
+        assert np.isnan(found.value)
+    else:
+        np.testing.assert_allclose([found.value, found.low, found.high], expected, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("ahead_s", [0.11, -0.05])
 def test_lead_by_cross_correlation_is_positive_ahead_of_the_tracker(ahead_s: float) -> None:
     """The tracker is held between frames, so it is half a frame later than its newest one on average."""
