@@ -1,9 +1,10 @@
 """Estimates of many windows one after the other, compiled: what a window has in common with the one before is kept.
 
-Covariances of readings among themselves do not depend on "now". A window that only gained readings at its end goes on
-with the Cholesky factor it has; where its first readings changed, the covariances that stay are moved and the factor is
-begun again. With the factor L, of covariances k with "now", of c, what each reads of a constant, and of values v, the
-estimate is (L⁻¹k)·(L⁻¹v), so that weights are never needed: eqs. (19) to (24) as in `window_gains`.
+Covariances of readings among themselves do not depend on "now": each is computed once, when the later of the two comes
+into the window. A window that only gained readings at its end goes on with the Cholesky factor it has; where its first
+readings changed the factor is begun again. With the factor L, of covariances k with "now", of c, what each reads of a
+constant, and of values v, the estimate is (L⁻¹k)·(L⁻¹v), so that weights are never needed: eqs. (19) to (24) as in
+`window_gains`.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fusion_core.kernels import IntArray
+from fusion_core.kernels import IntArray, covariance
 from fusion_core.samples import FloatArray
-from fusion_core.window_gains import CONSTANT, WINDOW, ZERO, Prior, covariance, covariance_with_now, gains
+from fusion_core.window_gains import CONSTANT, WINDOW, ZERO, Prior, gains
 
 
 class Streams(NamedTuple):
@@ -30,27 +31,34 @@ class Streams(NamedTuple):
 
 
 class _Held(NamedTuple):
-    """Room for one window's readings, rows in the order of positions and then others, with what is known of them."""
+    """Room for what is known of the readings in a window.
 
+    Covariances stand by slots, which a reading keeps while it is in the window: positions in the first `positions` of
+    them, by turns, and others in the rest. All else stands by rows: positions and then others, by time.
+    """
+
+    positions: int
+    among: FloatArray  # (m, m) by slot
+    slot: IntArray  # (m,)
     time: FloatArray  # (m,)
-    sensor: IntArray  # (m,)
-    centred: FloatArray  # (m, d): values less what they read of the origin
-    among: FloatArray  # (m, m): covariances, the lower triangle
-    factor: FloatArray  # (m, m): Cholesky's, the lower triangle, with reciprocals on its diagonal
+    centred: FloatArray  # (d, m): values less what they read of the origin
     constant: FloatArray  # (m,): what each reads of a hand that stays at 1 mm
+    factor: FloatArray  # (m, m): Cholesky's, transposed: the upper triangle, with reciprocals on its diagonal
     of_constant: FloatArray  # (m,): L⁻¹c
     of_values: FloatArray  # (d, m): L⁻¹v
 
 
 @njit(cache=True)
-def _room(most: int, dimension: int) -> _Held:
+def _room(positions: int, others: int, dimension: int) -> _Held:
+    most = positions + others
     return _Held(
-        np.empty(most),
+        positions,
+        np.empty((most, most)),
         np.empty(most, np.int64),
-        np.empty((most, dimension)),
-        np.empty((most, most)),
-        np.empty((most, most)),
         np.empty(most),
+        np.empty((dimension, most)),
+        np.empty(most),
+        np.empty((most, most)),
         np.empty(most),
         np.empty((dimension, most)),
     )
@@ -67,36 +75,41 @@ def estimates(
     sd: FloatArray,
 ) -> None:
     """Fills the rows `wanted` of mean and sd (n, d); `window_spans` (4, n) are those of `window_steps.spans`."""
-    most, dimension = 0, mean.shape[1]
+    most, most_others, dimension = 0, 0, mean.shape[1]
     for index in wanted:
         first, last, begin, end = window_spans[:, index]
-        most = max(most, last - first + end - begin)
-    held, moved = _room(most, dimension), np.empty((most, most))
-    with_now, of_now, origin = np.empty(most), np.empty(most), np.zeros(dimension)
+        most, most_others = max(most, last - first), max(most_others, end - begin)
+    held = _room(most, most_others, dimension)
+    with_now, origin = np.empty(most + most_others), np.zeros(dimension)
     known = np.zeros(4, np.int64)  # the span whose covariances are held
     factored = 0  # rows of the factor that stand
     for index in wanted:
         span = window_spans[:, index]
-        size = span[1] - span[0] + span[3] - span[2]
-        before = known[1] - known[0] + known[3] - known[2]
-        if not (span[0] == known[0] and span[1] == known[1] and span[2] == known[2] and span[3] >= known[3]):
+        positions = span[1] - span[0]
+        size = positions + span[3] - span[2]
+        if not _goes_on(known, span):
+            known[:] = 0
+        if span[0] != known[0] or span[1] != known[1] or span[2] != known[2]:
+            factored = 0
             if prior.mean != ZERO:
                 origin[:] = streams.frames[span[1] - 1]
-            _move(held.among, moved, known, span)
-            _take_in(prior, streams, held, span, 0, size, origin)
-            before = factored = 0
-        else:
-            _take_in(prior, streams, held, span, before, size, origin)
-            held.among[before:size, :size] = np.nan
-        _complete(prior, held, size, before)
+        _take_in(prior, streams, held, span, factored, size, origin)
+        _compare(prior, streams, held, known, span)
         known[:] = span
         factored = _factor(held, factored, size)
-        covariance_with_now(prior, held.time[:size] - times[index], held.sensor[:size], with_now)
+        _compare_with_now(prior, streams, held, positions, times[index], with_now[:size])
         if factored < size:
-            _by_weights(prior, held, size, times[index], origin, mean[index], sd[index])
+            _by_weights(prior, streams, held, positions, size, times[index], origin, mean[index], sd[index])
+            known[:] = 0
         else:
-            _substitute(held.factor, with_now, of_now, size)
-            _conclude(prior, held, of_now[:size], span[1] - span[0], origin, mean[index], sd[index])
+            _solve(held.factor, with_now[:size], size)
+            _conclude(prior, held, with_now[:size], positions, origin, mean[index], sd[index])
+
+
+@njit(cache=True)
+def _goes_on(known: IntArray, span: IntArray) -> bool:
+    """Has a window only lost readings at its begin, and gained some at its end? Not so where times go back."""
+    return bool(span[0] >= known[0] and span[1] >= known[1] and span[2] >= known[2] and span[3] >= known[3])
 
 
 @njit(cache=True)
@@ -104,51 +117,164 @@ def _take_in(
     prior: Prior, streams: Streams, held: _Held, span: IntArray, begin: int, end: int, origin: FloatArray
 ) -> None:
     """The readings of a window into the rows begin:end."""
-    positions = span[1] - span[0]
+    first, since, positions = span[0], span[2], span[1] - span[0]
+    middle = max(begin, min(positions, end))
+    _copy(held, begin, middle, first, streams.frame_time, streams.frames, prior.constant[streams.tracker], origin)
+    _copy(
+        held,
+        middle,
+        end,
+        since - positions,
+        streams.other_time,
+        streams.others,
+        prior.constant[streams.other],
+        origin,
+    )
+    _place(held.slot[begin:middle], first + begin, 0, held.positions)
+    _place(held.slot[middle:end], since + middle - positions, held.positions, len(held.among) - held.positions)
+
+
+@njit(cache=True)
+def _copy(
+    held: _Held,
+    begin: int,
+    end: int,
+    apart: int,
+    time: FloatArray,
+    value: FloatArray,
+    constant: float,
+    origin: FloatArray,
+) -> None:
+    """A sensor's readings into the rows begin:end, each of which is `apart` from its own."""
+    times, centred, constants = held.time, held.centred, held.constant
     for row in range(begin, end):
-        if row < positions:
-            sensor, at = streams.tracker, span[0] + row
-            held.time[row], value = streams.frame_time[at], streams.frames[at]
-        else:
-            sensor, at = streams.other, span[2] + row - positions
-            held.time[row], value = streams.other_time[at], streams.others[at]
-        held.sensor[row], held.constant[row] = sensor, prior.constant[sensor]
+        times[row], constants[row] = time[row + apart], constant
         for axis in range(len(origin)):
-            held.centred[row, axis] = value[axis] - prior.constant[sensor] * origin[axis]
+            centred[axis, row] = value[row + apart, axis] - constant * origin[axis]
 
 
 @njit(cache=True)
-def _move(among: FloatArray, moved: FloatArray, known: IntArray, span: IntArray) -> None:
-    """The covariances of one span to the places they have in another; NaN where there were none."""
-    positions, before = span[1] - span[0], known[1] - known[0]
+def _place(slot: IntArray, at: int, begin: int, count: int) -> None:
+    """The slots of consecutive readings from `at` on, which take turns in `count` slots from `begin` on."""
+    turn = at % count if count else 0
+    for row in range(len(slot)):
+        slot[row] = begin + turn
+        turn = turn + 1 if turn + 1 < count else 0
+
+
+@njit(cache=True)
+def _compare(prior: Prior, streams: Streams, held: _Held, known: IntArray, span: IntArray) -> None:
+    """Covariances of the readings that come into the window, with all that are in it."""
+    inverse_scale, begins, shift, polynomial, shared = prior.covariances
+    among, slot, time, noise = held.among, held.slot, held.time, prior.noise_variance
+    tracker, other, positions = streams.tracker, streams.other, span[1] - span[0]
     size = positions + span[3] - span[2]
-    place = np.full(size, -1)
-    for row in range(size):
-        if row < positions:
-            at = span[0] + row
-            if known[0] <= at < known[1]:
-                place[row] = at - known[0]
-        else:
-            at = span[2] + row - positions
-            if known[2] <= at < known[3]:
-                place[row] = before + at - known[2]
-    for row in range(size):
-        for column in range(row + 1):
-            there = place[row] >= 0 and place[column] >= 0
-            moved[row, column] = among[place[row], place[column]] if there else np.nan
-    among[:size, :size] = moved[:size, :size]
+    there, there_others = max(known[1] - span[0], 0), positions + max(known[3] - span[2], 0)
+    for row in range(there, size):
+        if positions <= row < there_others:
+            continue
+        own, place, since = tracker if row < positions else other, slot[row], time[row]
+        for column in range(positions):
+            found = covariance(inverse_scale, begins, shift, polynomial, shared, own, tracker, since - time[column])
+            among[place, slot[column]] = among[slot[column], place] = found
+        for column in range(positions, size):
+            found = covariance(inverse_scale, begins, shift, polynomial, shared, own, other, since - time[column])
+            among[place, slot[column]] = among[slot[column], place] = found
+        among[place, place] += noise[own]
 
 
 @njit(cache=True)
-def _complete(prior: Prior, held: _Held, size: int, begin: int) -> None:
-    """The covariances that are not known yet, in the rows from `begin` on."""
+def _compare_with_now(
+    prior: Prior, streams: Streams, held: _Held, positions: int, now: float, with_now: FloatArray
+) -> None:
+    """Covariances of the readings of a window with the position now."""
+    inverse_scale, begins, shift, polynomial, shared = prior.covariances
+    time, position = held.time, len(prior.noise_variance)
+    for row in range(len(with_now)):
+        own = streams.tracker if row < positions else streams.other
+        with_now[row] = covariance(inverse_scale, begins, shift, polynomial, shared, own, position, time[row] - now)
+
+
+@njit(cache=True)
+def _factor(held: _Held, begin: int, size: int) -> int:
+    """Rows begin:size of the factor, and of what follows from it; how many stand, fewer where round-off left none."""
+    if begin == 0:
+        return _factor_anew(held, size)
+    factor, among, slot = held.factor, held.among, held.slot
+    column = np.empty(size)
     for row in range(begin, size):
-        for column in range(row + 1):
-            if np.isnan(held.among[row, column]):
-                apart = held.time[row] - held.time[column]
-                held.among[row, column] = covariance(prior, held.sensor[row], held.sensor[column], apart)
-                if row == column:
-                    held.among[row, row] += prior.noise_variance[held.sensor[row]]
+        for before in range(row):
+            column[before] = among[slot[row], slot[before]]
+        _solve(factor, column[:row], row)
+        rest = among[slot[row], slot[row]] - _dot(column[:row], column[:row])
+        if not rest > 0.0:
+            return row
+        factor[:row, row] = column[:row]
+        factor[row, row] = inverse = 1.0 / np.sqrt(rest)
+        held.of_constant[row] = (held.constant[row] - _dot(column[:row], held.of_constant[:row])) * inverse
+        for axis in range(len(held.of_values)):
+            explained = _dot(column[:row], held.of_values[axis, :row])
+            held.of_values[axis, row] = (held.centred[axis, row] - explained) * inverse
+    return size
+
+
+@njit(cache=True, fastmath={"contract"})
+def _factor_anew(held: _Held, size: int) -> int:
+    """All rows of the factor; as `_factor`."""
+    factor, among, slot = held.factor, held.among, held.slot
+    whole = np.empty(size)
+    for row in range(size):
+        own, covariances = whole[row:], among[slot[row]]
+        for column in range(len(own)):
+            own[column] = covariances[slot[row + column]]
+        fours = row - row % 4
+        for at in range(0, fours, 4):  # four rows at once: a sum is loaded and stored a quarter as often
+            a, b, c, d = (
+                factor[at, row:size],
+                factor[at + 1, row:size],
+                factor[at + 2, row:size],
+                factor[at + 3, row:size],
+            )
+            of_a, of_b, of_c, of_d = a[0], b[0], c[0], d[0]
+            for column in range(len(own)):
+                own[column] -= (of_a * a[column] + of_b * b[column]) + (of_c * c[column] + of_d * d[column])
+        for at in range(fours, row):
+            part = factor[at, row:size]
+            of_part = part[0]
+            for column in range(len(own)):
+                own[column] -= of_part * part[column]
+        if not own[0] > 0.0:
+            return row
+        found, inverse = factor[row, row:size], 1.0 / np.sqrt(own[0])
+        for column in range(len(own)):
+            found[column] = own[column] * inverse
+        found[0] = inverse
+    held.of_constant[:size] = held.constant[:size]
+    _solve(factor, held.of_constant[:size], size)
+    for axis in range(len(held.of_values)):
+        held.of_values[axis, :size] = held.centred[axis, :size]
+        _solve(factor, held.of_values[axis, :size], size)
+    return size
+
+
+@njit(cache=True, fastmath={"contract"})
+def _solve(factor: FloatArray, right: FloatArray, size: int) -> None:
+    """L⁻¹ of a right-hand side, in its place."""
+    fours = size - size % 4
+    for at in range(0, fours, 4):
+        a, b, c, d = factor[at, at:size], factor[at + 1, at:size], factor[at + 2, at:size], factor[at + 3, at:size]
+        own = right[at:size]
+        own[0] *= a[0]
+        own[1] = (own[1] - a[1] * own[0]) * b[1]
+        own[2] = (own[2] - a[2] * own[0] - b[2] * own[1]) * c[2]
+        own[3] = (own[3] - a[3] * own[0] - b[3] * own[1] - c[3] * own[2]) * d[3]
+        of_a, of_b, of_c, of_d = own[0], own[1], own[2], own[3]
+        for row in range(4, len(own)):
+            own[row] -= (of_a * a[row] + of_b * b[row]) + (of_c * c[row] + of_d * d[row])
+    for at in range(fours, size):
+        right[at] *= factor[at, at]
+        for row in range(at + 1, size):
+            right[row] -= factor[at, row] * right[at]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})  # or sums of products take a step each
@@ -157,33 +283,6 @@ def _dot(first: FloatArray, second: FloatArray) -> float:
     for index in range(len(first)):
         total += first[index] * second[index]
     return total
-
-
-@njit(cache=True)
-def _factor(held: _Held, begin: int, size: int) -> int:
-    """Rows begin:size of the factor, and of what follows from it; how many stand, fewer where round-off left none."""
-    factor = held.factor
-    for row in range(begin, size):
-        own = factor[row]
-        for column in range(row):
-            rest = held.among[row, column] - _dot(own[:column], factor[column, :column])
-            own[column] = rest * factor[column, column]
-        rest = held.among[row, row] - _dot(own[:row], own[:row])
-        if not rest > 0.0:
-            return row
-        own[row] = 1.0 / np.sqrt(rest)
-        held.of_constant[row] = (held.constant[row] - _dot(own[:row], held.of_constant[:row])) * own[row]
-        for axis in range(len(held.of_values)):
-            explained = _dot(own[:row], held.of_values[axis, :row])
-            held.of_values[axis, row] = (held.centred[row, axis] - explained) * own[row]
-    return size
-
-
-@njit(cache=True)
-def _substitute(factor: FloatArray, right: FloatArray, solution: FloatArray, size: int) -> None:
-    """L⁻¹ of a right-hand side."""
-    for row in range(size):
-        solution[row] = (right[row] - _dot(factor[row, :row], solution[:row])) * factor[row, row]
 
 
 @njit(cache=True)
@@ -204,20 +303,26 @@ def _conclude(
         if prior.mean == CONSTANT:
             total += share * _dot(of_constant, held.of_values[axis, :size])
         elif prior.mean == WINDOW:
-            total += missing * float(np.mean(held.centred[:positions, axis]))
-        mean[axis], sd[axis] = origin[axis] + total, np.sqrt(variance)
+            total += missing * float(np.mean(held.centred[axis, :positions]))
+        mean[axis], sd[axis] = origin[axis] + total, np.sqrt(max(variance, 0.0))  # round-off may leave less
 
 
 @njit(cache=True)
 def _by_weights(
-    prior: Prior, held: _Held, size: int, now: float, origin: FloatArray, mean: FloatArray, sd: FloatArray
+    prior: Prior,
+    streams: Streams,
+    held: _Held,
+    positions: int,
+    size: int,
+    now: float,
+    origin: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
 ) -> None:
     """One window's estimate where there is no factor."""
-    time = np.empty((1, size))
-    time[0] = held.time[:size]
-    weights, variance = gains(prior, time, np.array([now]), held.sensor[:size])
+    time, sensor = np.empty((1, size)), np.full(size, streams.other)
+    time[0], sensor[:positions] = held.time[:size], streams.tracker
+    weights, variance = gains(prior, time, np.array([now]), sensor)
     for axis in range(len(mean)):
-        total = 0.0
-        for row in range(size):
-            total += weights[0, row] * held.centred[row, axis]
-        mean[axis], sd[axis] = origin[axis] + total, np.sqrt(variance[0])
+        mean[axis] = origin[axis] + np.sum(weights[0] * held.centred[axis, :size])
+        sd[axis] = np.sqrt(variance[0])

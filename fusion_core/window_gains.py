@@ -8,26 +8,21 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from fusion_core.kernels import IntArray, squared_exponential
+from fusion_core.kernels import Covariances, IntArray, covariance
 from fusion_core.samples import FloatArray
 
 ZERO, CONSTANT, WINDOW = 0, 1, 2  # the mean of the prior
 
 
 class Prior(NamedTuple):
-    """What is known before any reading; arrays are by sensor or by term, in the order of the estimator's sensors."""
+    """What is known before any reading; arrays are by sensor, in the order of the estimator's."""
 
     signal_variance_mm2: float
-    inverse_scale_s2: float
     mean: int
-    noise_variance: FloatArray  # (sensors,)
-    bias_variance: FloatArray  # (sensors,): what its readings share
-    constant: FloatArray  # (sensors,): what each reads of a hand that stays at 1 mm
-    is_tracker: npt.NDArray[np.bool_]  # (sensors,)
-    begins: IntArray  # (sensors + 1,): a sensor's terms are begins[s] : begins[s + 1]
-    weight: FloatArray  # (terms,)
-    derivative: IntArray  # (terms,)
-    at_s: FloatArray  # (terms,)
+    covariances: Covariances
+    noise_variance: FloatArray
+    constant: FloatArray  # what each reads of a hand that stays at 1 mm
+    is_tracker: npt.NDArray[np.bool_]
 
 
 @njit(cache=True)
@@ -43,8 +38,7 @@ def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> 
     for row in range(size):
         constant[row] = prior.constant[sensor[row]]
     for index in range(count):
-        _covariances(prior, time[index], sensor, among)
-        covariance_with_now(prior, time[index] - now[index], sensor, with_now)
+        _covariances(prior, time[index], now[index], sensor, among, with_now)
         _solve(among, with_now, constant, weights[index], of_constant)
         explained, missing, precision, positions = 0.0, 1.0, 0.0, 0
         for row in range(size):
@@ -61,58 +55,32 @@ def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> 
             for row in range(size):
                 if prior.is_tracker[sensor[row]]:
                     weights[index, row] += missing / positions
+        variance[index] = max(variance[index], 0.0)  # round-off may leave less
     return weights, variance
 
 
 @njit(cache=True)
-def _covariances(prior: Prior, time: FloatArray, sensor: IntArray, among: FloatArray) -> None:
-    """Readings among themselves, the lower triangle."""
+def _covariances(
+    prior: Prior, time: FloatArray, now: float, sensor: IntArray, among: FloatArray, with_now: FloatArray
+) -> None:
+    """Readings among themselves, the lower triangle, and with the position now."""
+    inverse_scale, begins, shift, polynomial, shared = prior.covariances
+    noise, position = prior.noise_variance, len(prior.noise_variance)
     for row in range(len(time)):
+        own, at = sensor[row], time[row]
         for column in range(row + 1):
-            among[row, column] = covariance(prior, sensor[row], sensor[column], time[row] - time[column])
-        among[row, row] += prior.noise_variance[sensor[row]]
-
-
-@njit(cache=True)
-def covariance_with_now(prior: Prior, lag: FloatArray, sensor: IntArray, with_now: FloatArray) -> None:
-    """Readings `lag` (m,) before now, of sensors (m,), with the position now, into the first m of `with_now`."""
-    for row in range(len(lag)):
-        total = 0.0
-        for term in range(prior.begins[sensor[row]], prior.begins[sensor[row] + 1]):
-            apart = lag[row] + prior.at_s[term]
-            total += prior.weight[term] * squared_exponential(
-                apart, prior.derivative[term], 0, prior.signal_variance_mm2, prior.inverse_scale_s2
+            among[row, column] = covariance(
+                inverse_scale, begins, shift, polynomial, shared, own, sensor[column], at - time[column]
             )
-        with_now[row] = total
-
-
-@njit(cache=True)
-def covariance(prior: Prior, own: int, other: int, lag: float) -> float:
-    """A reading of one sensor with one of another, or its own, `lag` s before it; without the noise."""
-    total = 0.0
-    for term in range(prior.begins[own], prior.begins[own + 1]):
-        for its in range(prior.begins[other], prior.begins[other + 1]):
-            total += (
-                prior.weight[term]
-                * prior.weight[its]
-                * squared_exponential(
-                    lag + prior.at_s[term] - prior.at_s[its],
-                    prior.derivative[term],
-                    prior.derivative[its],
-                    prior.signal_variance_mm2,
-                    prior.inverse_scale_s2,
-                )
-            )
-    if own == other:
-        total += prior.bias_variance[own]
-    return total
+        among[row, row] += noise[own]
+        with_now[row] = covariance(inverse_scale, begins, shift, polynomial, shared, own, position, at - now)
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})  # or sums of products take a step each
 def _solve(
     among: FloatArray, first: FloatArray, second: FloatArray, of_first: FloatArray, of_second: FloatArray
 ) -> None:
-    """Solutions for two right-hand sides by Cholesky's factor; by elimination where round-off leaves none."""
+    """Solutions for two right-hand sides by Cholesky's factor; by least squares where round-off leaves none."""
     size = len(first)
     factor = among.copy()
     for row in range(size):
@@ -127,7 +95,7 @@ def _solve(
                 factor[row, row] = np.sqrt(rest)
             else:
                 whole = np.tril(among) + np.tril(among, -1).T
-                of_first[:], of_second[:] = np.linalg.solve(whole, first), np.linalg.solve(whole, second)
+                of_first[:], of_second[:] = np.linalg.lstsq(whole, first)[0], np.linalg.lstsq(whole, second)[0]
                 return
     for right, solution in ((first, of_first), (second, of_second)):
         for row in range(size):

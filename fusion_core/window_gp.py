@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from fusion_core import window_batch, window_gains, window_steps
+from fusion_core import kernels, window_batch, window_gains, window_steps
 from fusion_core.checks import require_not_negative, require_one_of, require_positive
 from fusion_core.estimator import replay_loop, require_reading, require_readings, unknown
 from fusion_core.kernels import IntArray
@@ -123,21 +123,19 @@ class WindowGP:
 
     @cached_property
     def _prior(self) -> window_gains.Prior:
-        terms = [self._terms(name) for name in self.sensors]
-        flat = [term for own in terms for term in own]
         accelerations = np.array([sensor.order == _ACCELERATION for sensor in self.sensors.values()])
         return window_gains.Prior(
             float(self.signal_variance_mm2),
-            float(self.inverse_scale_s2),
             _MEANS[self.mean],
+            kernels.covariances(
+                [self._terms(name) for name in self.sensors],
+                self.signal_variance_mm2,
+                self.inverse_scale_s2,
+                np.where(accelerations, self.bias_sd_mm_s2**2, 0.0).tolist(),
+            ),
             noise_variance=np.array([sensor.noise_sd**2 for sensor in self.sensors.values()], np.float64),
-            bias_variance=np.where(accelerations, self.bias_sd_mm_s2**2, 0.0),
             constant=np.array([self._constant[name] for name in self.sensors], np.float64),
             is_tracker=np.array([name == self._tracker for name in self.sensors]),
-            begins=np.cumsum([0, *map(len, terms)]),
-            weight=np.array([term.weight for term in flat], np.float64),
-            derivative=np.array([term.derivative for term in flat], np.int64),
-            at_s=np.array([term.at_s for term in flat], np.float64),
         )
 
     def start(self) -> Window:

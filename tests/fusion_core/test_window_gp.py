@@ -7,6 +7,7 @@ import pytest
 from scipy.special import eval_hermite
 
 from fusion_core import Samples, Sensor, Term, WindowGP
+from fusion_core.estimator import replay_loop
 
 TRACKER = Sensor("position", 8.0, 0.1, 1)
 IMU = Sensor("acceleration", 100.0, 0.0, 1)
@@ -261,3 +262,38 @@ def test_two_trackers_are_better_than_one() -> None:
 def test_a_sensor_later_than_the_horizon_is_an_error() -> None:
     with pytest.raises(ValueError, match=r"horizon_s must cover .* tracker is 3.0 s late, horizon_s is 2.0"):
         WindowGP({"tracker": Sensor("position", 8.0, 3.0, 1)})
+
+
+def test_readings_that_say_the_same_leave_no_factor_and_still_an_estimate() -> None:
+    """Twelve readings within 12 ms, exact to a nanometre: round-off leaves their covariances no Cholesky factor."""
+    frames = 0.001 * np.arange(12)
+    covariances = 5.66e4 * np.exp(-4.19 * (frames[:, None] - frames) ** 2) + 1e-12 * np.eye(12)
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(covariances)
+    value = 40.0 + 3.0 * frames[:, None]
+    gp = WindowGP({"tracker": Sensor("position", 1e-6, 0.0, 1)}, window=12)
+    samples, times = {"tracker": Samples(frames, frames, value)}, np.repeat(frames, 2)
+    for track in (gp.replay(samples, times), replay_loop(gp, samples, times)):
+        np.testing.assert_allclose(track.mean[:, 0], np.repeat(value[:, 0], 2), rtol=0, atol=1e-3)
+        assert (track.sd < 0.01).all()
+
+
+@pytest.mark.parametrize("mean", ["zero", "constant", "window"])
+@pytest.mark.parametrize("derivative", ["exact", "finite_difference"])
+def test_a_batch_is_its_windows_one_by_one(mean: str, derivative: str) -> None:
+    """Also where instants are left out, repeated or go back, and the tracker pauses for longer than the horizon."""
+    random = np.random.default_rng(11)
+    frames = np.cumsum(random.uniform(0.02, 0.05, 90))
+    frames[50:] += 1.2
+    forces = np.cumsum(random.uniform(0.005, 0.02, 450))
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, 800.0 + random.normal(0, 50, (90, 1))),
+        "imu": Samples(forces, forces, random.normal(0, 500, (450, 1))),
+    }
+    times = np.sort(random.choice(forces, 150))
+    times = np.concatenate([times, times[40:60], [0.0], times[100:]])
+    gp = WindowGP(BOTH, mean=mean, derivative=derivative, bias_sd_mm_s2=50.0, horizon_s=0.8)  # type: ignore[arg-type]
+    batch, loop = gp.replay(samples, times), replay_loop(gp, samples, times)
+    np.testing.assert_allclose(batch.mean, loop.mean, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(batch.sd, loop.sd, rtol=0, atol=1e-6)
+    assert np.isnan(batch.mean[170]).all()
