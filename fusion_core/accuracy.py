@@ -123,13 +123,16 @@ def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArra
     Returns shifts in samples, −(n−1) … n−1, and at each the mean of first[t]·second[t + shift] over the overlap:
     the peak sits at a positive shift where `first` is ahead of `second` (paper, Fig. 9).
     """
-    from scipy.signal import correlate
+    from scipy import fft
 
     n = len(first)
-    a, b = first - first.mean(axis=0), second - second.mean(axis=0)
-    total = sum(correlate(b[:, axis], a[:, axis], mode="full") for axis in range(a.shape[1]))
+    length = fft.next_fast_len(2 * n - 1, real=True)
+    a, b = (fft.rfft((one - one.mean(axis=0)).T, length) for one in (first, second))
+    circular = fft.irfft(
+        np.sum(a.conj() * b, axis=0), length
+    )  # of all axes; shifts below 0 at its end
     shifts = np.arange(-(n - 1), n)
-    return shifts, np.asarray(total / (n - np.abs(shifts)), dtype=np.float64)
+    return shifts, np.asarray(circular[shifts] / (n - np.abs(shifts)), dtype=np.float64)
 
 
 def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: Samples) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -43,11 +43,20 @@ class OnDask(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Compute on some worker, if its code is the same as here and it sees the folders."""
-        folders = [arg.folder if isinstance(arg, Work) else arg for arg in args if isinstance(arg, Work | Path)]
+        folders = sorted(set(_folders(args)))
         asked = self._client.submit(_guarded, self._code, folders, fn, args, kwargs, pure=False)
         future = _Asked(asked)
         asked.add_done_callback(future.take)
         return future
+
+
+def _folders(args: Iterable[Any]) -> Iterator[Path]:
+    """Those that are named in a call, at any depth: a worker must see them."""
+    for arg in args:
+        if isinstance(arg, list | tuple):
+            yield from _folders(arg)
+        elif isinstance(arg, Work | Path):
+            yield arg.folder if isinstance(arg, Work) else arg
 
 
 class _Asked(Future[Any]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
 _NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them
+_SMALL = 512  # rows
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
 _TRACKER = [("latency_s", _FLOAT), ("noise_sd_mm", _FLOAT), ("rate_hz", _FLOAT)]
 _POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
@@ -431,20 +433,21 @@ def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
 
 
 def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
-    """The table as Parquet, `<name>.parquet`."""
+    """The table as Parquet, `<name>.parquet`; a small one plain, since unpacking it would take most of its reading."""
     if isinstance(data, pd.DataFrame):
         data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name], preserve_index=False)
     floats = [column.name for column in TABLES[name] if column.type == _FLOAT]
     times = [column.name for column in TABLES[name] if column.name.endswith("_ns")]
     encodings = dict.fromkeys(floats, "BYTE_STREAM_SPLIT") | dict.fromkeys(times, "DELTA_BINARY_PACKED")
     plain = [column.name for column in TABLES[name] if column.name not in encodings]
+    small = len(data) <= _SMALL
     with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
         pq.write_table(
             data.replace_schema_metadata(None),
             file,
-            compression="zstd",
-            use_dictionary=plain,
-            column_encoding=encodings,
+            compression="none" if small else "zstd",
+            use_dictionary=False if small else plain,
+            column_encoding=None if small else encodings,
             store_schema=False,
         )
 
@@ -470,9 +473,9 @@ def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
     parts = []
     for folder in [folders] if isinstance(folders, Path) else folders:
         path = folder / f"{name}.parquet"
-        if path.is_file():
-            with pq.ParquetFile(path) as file:
-                parts.append(file.read(use_threads=False))
+        with suppress(FileNotFoundError):
+            content = pa.BufferReader(path.read_bytes())  # a file object of its own takes longer than a small table
+            parts.append(pq.ParquetFile(content).read(use_threads=False))
     return pa.concat_tables(parts) if parts else TABLES[name].empty_table()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
@@ -11,6 +12,14 @@ from pathlib import Path
 from pipeline.cache import Cache, Entry, digest_of
 from pipeline.errors import PipelineError, SessionError
 from pipeline.stage import Outcome, Stage, Work
+
+Piece = tuple[Work, str]
+"""A piece of work, and the key of its result."""
+
+
+def compute_all(stage: Stage, pieces: Sequence[Piece], cache_root: Path) -> list[Entry]:
+    """Several pieces of work one after the other, in one process."""
+    return [compute(stage, work, key, cache_root) for work, key in pieces]
 
 
 def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 
 from pipeline.cache import Cache, Entry
 from pipeline.errors import PipelineError, WorkerLostError
-from pipeline.runner.compute import compute, keep_unusable
+from pipeline.runner.compute import Piece, compute, compute_all, keep_unusable
 from pipeline.runner.means import Means
 from pipeline.runner.result import Result
 from pipeline.stage import Stage, Work
-from pipeline.study import Session
 
-_Missing = tuple[Session, Work, str]  # with the key of the result
-_AHEAD = 256  # pieces of work handed to the executor before they are needed: more than a cluster has processes
+_AHEAD = 256  # groups of pieces handed to the executor before they are needed: more than a cluster has processes
+_TOGETHER = 8  # pieces of one session in a group, whose recording is then loaded once
+_ENOUGH = 64  # groups to go round, before any is larger than one piece
 
 
-def entries_of(stage: Stage, result: Result, works: Sequence[tuple[Work, str]], means: Means) -> list[Entry]:
+def entries_of(stage: Stage, result: Result, works: Sequence[Piece], means: Means) -> list[Entry]:
     """The entry of each piece of work with its key, each key computed once, where the cache has none."""
     found: dict[str, Entry] = {}
-    missing: dict[str, _Missing] = {}
+    missing: dict[str, Piece] = {}
     for work, key in works:
         if key in found or key in missing:
             continue
         entry = _look_up(stage, key, work.session.id, result, means.cache)
         if entry is None:
-            missing[key] = (work.session, work, key)
+            missing[key] = work, key
         else:
             found[key] = entry
     result.computed[stage.name] = len(missing)
@@ -62,49 +62,63 @@ def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache)
     return entry
 
 
-def _computed(stage: Stage, missing: Sequence[_Missing], means: Means) -> Iterator[tuple[str, Entry]]:
+def _computed(stage: Stage, missing: Sequence[Piece], means: Means) -> Iterator[tuple[str, Entry]]:
     """Entries by their keys, as they are done.
 
-    A session whose worker died is tried once more after the others, by itself: it may have been another's doing, or
-    the machine's. If it is lost again, it is set aside, and tried again in the next run.
+    A piece whose worker died is tried once more after the others, by itself: it may have been another's doing, or the
+    machine's. If it is lost again, its session is set aside, and tried again in the next run.
     """
-    lost: list[_Missing] = []
-    waiting: dict[Future[Entry], _Missing] = {}
+    lost: list[Piece] = []
+    waiting: dict[Future[list[Entry]], list[Piece]] = {}
     try:
-        for done in _as_completed(stage, missing, means, waiting):
+        for done in _as_completed(stage, _groups(missing), means, waiting):
             try:
-                yield waiting[done][2], _at_hand(done.result())
+                for (_, key), entry in zip(waiting[done], done.result(), strict=True):
+                    yield key, _at_hand(entry)
             except WorkerLostError:
-                lost.append(waiting[done])
+                lost += waiting[done]
     finally:
         for future in waiting:
             future.cancel()
-    for _, work, key in lost:
+    for work, key in lost:
+        found = means.cache.get(stage.name, key)  # one of its group may have killed the worker after this was done
         try:
-            entry = means.executor.submit(compute, stage, work, key, means.cache.root).result()
+            entry = found or means.executor.submit(compute, stage, work, key, means.cache.root).result()
         except WorkerLostError as error:
             reason = f"the process that computed {stage.name} died twice ({error}); its memory may not have sufficed"
             entry = keep_unusable(means.cache, stage, key, reason)
         yield key, _at_hand(entry)
 
 
+def _groups(missing: Sequence[Piece]) -> Iterator[list[Piece]]:
+    """What is computed in one go: a few pieces of one session, once there are many."""
+    size = min(max(len(missing) // _ENOUGH, 1), _TOGETHER)
+    group: list[Piece] = []
+    for piece in missing:
+        if group and (len(group) == size or piece[0].session.id != group[0][0].session.id):
+            yield group
+            group = []
+        group.append(piece)
+    yield group
+
+
 def _as_completed(
-    stage: Stage, missing: Sequence[_Missing], means: Means, waiting: dict[Future[Entry], _Missing]
-) -> Iterator[Future[Entry]]:
+    stage: Stage, groups: Iterable[list[Piece]], means: Means, waiting: dict[Future[list[Entry]], list[Piece]]
+) -> Iterator[Future[list[Entry]]]:
     """Submit all, some at a time, each in `waiting` until it is taken; futures as they are done.
 
     Of a future that is done nothing is kept: of ten thousand sessions they would be most of what this process holds.
     """
-    for one in missing:
-        future = means.executor.submit(compute, stage, *one[1:], means.cache.root)
-        waiting[future] = one
+    for group in groups:
+        future = means.executor.submit(compute_all, stage, group, means.cache.root)
+        waiting[future] = group
         if len(waiting) >= _AHEAD or future.done():
             yield from _done(waiting)
     while waiting:
         yield from _done(waiting)
 
 
-def _done(waiting: dict[Future[Entry], _Missing]) -> Iterator[Future[Entry]]:
+def _done(waiting: dict[Future[list[Entry]], list[Piece]]) -> Iterator[Future[list[Entry]]]:
     """Those that are done, at least one; each is out of `waiting` once it has been taken."""
     for future in wait(waiting, return_when=FIRST_COMPLETED).done:
         yield future
