@@ -128,9 +128,7 @@ def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArra
     n = len(first)
     length = fft.next_fast_len(2 * n - 1, real=True)
     a, b = (fft.rfft((one - one.mean(axis=0)).T, length) for one in (first, second))
-    circular = fft.irfft(
-        np.sum(a.conj() * b, axis=0), length
-    )  # of all axes; shifts below 0 at its end
+    circular = fft.irfft(np.sum(a.conj() * b, axis=0), length)  # of all axes; shifts below 0 at its end
     shifts = np.arange(-(n - 1), n)
     return shifts, np.asarray(circular[shifts] / (n - np.abs(shifts)), dtype=np.float64)
 

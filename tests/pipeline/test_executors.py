@@ -22,9 +22,10 @@ from pipeline.errors import PipelineError, WorkerLostError
 from pipeline.executors import Processes
 from pipeline.runner.means import Means
 from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date
+from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.stage import Stage
-from pipeline.stages import COMPARE
+from pipeline.stages import COMPARE, REPLAY
+from pipeline.study import Study, parse, read_yaml
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.dying import POISONED
 from tests.pipeline.helpers import run
@@ -80,6 +81,29 @@ def test_a_process_that_was_killed_is_replaced(study: Path, tmp_path: Path) -> N
         result = bring_up_to_date(study, fusing_with("once"), means)
         assert (study / "died").exists()
         assert result.set_aside == []
+
+
+def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where there are many variants, a process computes those of a session in one go."""
+    monkeypatch.setattr("pipeline.runner.entries._ENOUGH", 1)
+    settings = [
+        parse(Study, {**read_yaml(study / "study.yaml"), "estimators": {name: {"type": "raw"}}}, study)
+        for name in ("first", "held", "last")
+    ]
+    stage = replace(REPLAY, function="tests.pipeline.dying:of_one_variant")
+    with Processes(2) as executor:
+        means = Means(Cache(tmp_path / "cache"), executor, PlainLines())
+        result = bring_up_to_date(study, COMPARE[:1], means)
+        found = over_settings(result, stage, settings, result.sessions, means)
+        again = over_settings(result, stage, settings, result.sessions, means)
+    bad = [(i, j) for i, entries in enumerate(found) for j, entry in enumerate(entries) if entry.said["set_aside"]]
+    assert bad == [([session.id for session in result.sessions].index(POISONED), 1)]
+    assert [[entry.content for entry in entries] for entries in again] == [
+        [entry.content for entry in entries] for entries in found
+    ]
+    assert result.computed["replay"] == 1  # it is tried again
 
 
 @contextmanager
