@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,28 +36,30 @@ LISTS = (
 
 def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
     """The file; `details` of a comparison as an object, what does not apply as null."""
-    content: dict[str, Any] = {
-        "schema_version": SCHEMA_VERSION,
-        "study": {
-            "name": name,
-            "title": study.title,
-            "data_origin": study.data_origin,
-            "conditions": list(study.conditions),
-            "alpha": study.alpha,
-            "participants": dict(people),
-        },
+    head = {
+        "name": name,
+        "title": study.title,
+        "data_origin": study.data_origin,
+        "conditions": list(study.conditions),
+        "alpha": study.alpha,
+        "participants": dict(people),
     }
-    for table in LISTS:
-        content[table] = tables.records(table, found[table]) if table in found else []
-    for row in (*content["comparisons"], *content["comparisons_all_data"]):
-        row["details"] = None if row["details"] is None else json.loads(row["details"])
-    _dump(content, path)
+    rows: dict[str, Iterable[Mapping[str, Any]]] = {
+        table: tables.records(table, found[table]) if table in found else () for table in LISTS
+    }
+    for table in ("comparisons", "comparisons_all_data"):
+        rows[table] = map(_with_details, rows[table])
+    _dump(path, {"study": head}, rows)
+
+
+def _with_details(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {**row, "details": None if row["details"] is None else json.loads(row["details"])}
 
 
 def write_replay(path: Path, studies: Sequence[Mapping[str, Any]], found: Mapping[str, pd.DataFrame]) -> None:
     """The file of a replay: what is known of its studies, and its tables."""
-    content: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "studies": [dict(study) for study in studies]}
-    _dump(content | {name: tables.records(name, table) for name, table in found.items()}, path)
+    lists: dict[str, Iterable[Mapping[str, Any]]] = {"studies": studies}
+    _dump(path, {}, lists | {name: tables.records(name, table) for name, table in found.items()})
 
 
 def write_exploration(
@@ -67,12 +69,23 @@ def write_exploration(
     pays: Sequence[Mapping[str, Any]],
 ) -> None:
     """The file of an exploration: what was asked of which study, its tables, and what pays for each measure."""
-    content: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "explored": dict(settings), "what_pays": list(pays)}
-    _dump(content | {name: tables.records(name, table) for name, table in found.items()}, path)
+    lists: dict[str, Iterable[Mapping[str, Any]]] = {"what_pays": pays}
+    _dump(path, {"explored": settings}, lists | {name: tables.records(name, table) for name, table in found.items()})
 
 
-def _dump(content: Mapping[str, Any], path: Path) -> None:
-    path.write_text(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+def _dump(path: Path, head: Mapping[str, Any], lists: Mapping[str, Iterable[Mapping[str, Any]]]) -> None:
+    """One object, written as it is made, for an archive's rows are many: each stands on a line of its own."""
+    as_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+    with path.open("w", encoding="utf-8") as file:
+        file.write(f'{{\n "schema_version": {SCHEMA_VERSION}')
+        for key, value in head.items():
+            file.write(f",\n {as_json(key)}: {as_json(dict(value))}")
+        for name, rows in lists.items():
+            file.write(f",\n {as_json(name)}: [")
+            for place, row in enumerate(rows):
+                file.write(f"{',' if place else ''}\n  {as_json(dict(row))}")
+            file.write("\n ]")
+        file.write("\n}\n")
 
 
 def read(path: Path) -> dict[str, Any]:

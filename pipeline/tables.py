@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ _TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
 _NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them
 _SMALL = 512  # rows
+_PARTS = 256  # tables read before they are made one: each takes more than the few rows that are in it
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
 _TRACKER = [("latency_s", _FLOAT), ("noise_sd_mm", _FLOAT), ("rate_hz", _FLOAT)]
 _POSITION = [(f"{axis}_mm", _FLOAT) for axis in "xyz"]
@@ -470,13 +471,16 @@ def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
 
 def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
     """As `read`, as it is in the files."""
-    parts = []
+    whole, parts = [], []
     for folder in [folders] if isinstance(folders, Path) else folders:
         path = folder / f"{name}.parquet"
         with suppress(FileNotFoundError):
             content = pa.BufferReader(path.read_bytes())  # a file object of its own takes longer than a small table
             parts.append(pq.ParquetFile(content).read(use_threads=False))
-    return pa.concat_tables(parts) if parts else TABLES[name].empty_table()
+        if len(parts) == _PARTS:
+            whole.append(pa.concat_tables(parts).combine_chunks())
+            parts = []
+    return pa.concat_tables([*whole, *parts]) if whole or parts else TABLES[name].empty_table()
 
 
 Columns = Mapping[str, np.ndarray[Any, Any]]
@@ -490,12 +494,10 @@ def of_stream(table: pa.Table, stream: str) -> Columns:
     return {name: rows[name].to_numpy() for name in names}
 
 
-def records(name: str, data: pd.DataFrame) -> list[dict[str, Any]]:
+def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Rows as plain objects for JSON: null for what does not apply, `details` and `factors` as they are stored."""
-    rows: list[dict[str, Any]] = []
     for row in as_table(name, data).itertuples(index=False):
-        rows.append({key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)})
-    return rows
+        yield {key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)}
 
 
 def _plain(value: Any) -> Any:

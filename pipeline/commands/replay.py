@@ -177,7 +177,7 @@ def _write(gathered: _Gathered, folder: Path) -> None:
         for name in files:
             copy(Path(written) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
-    _say(tables.records("replay_means", found["replay_means"]))
+    _say(list(tables.records("replay_means", found["replay_means"])))
     console.say(f"Report: {short(folder / _PAGE)}  {short(folder / _PRINT)}")
 
 

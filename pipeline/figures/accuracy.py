@@ -127,8 +127,10 @@ def calibration(table: pd.DataFrame) -> Figure:
     for index, (axes, estimator) in enumerate(zip(every, names, strict=True)):
         rows = table[table["estimator"] == estimator]
         axes.plot(grid, 100 * (2 * stats.norm.cdf(grid) - 1), color=BLACK, linewidth=1, linestyle=(0, (4, 2)))
-        if rows["session"].nunique() > 1:
-            axes.plot(*_one_line(rows), color=GREY, rasterized=len(rows) > MARKS_MAX, **_FAINT)
+        if rows["session"].nunique() > LINES_MAX:
+            axes.fill_between(*nine_of_ten(rows), color=GREY, linewidth=0, alpha=0.35)
+        elif rows["session"].nunique() > 1:
+            axes.plot(*_one_line(rows), color=GREY, **_FAINT)
         k, share = shares(rows)
         look: dict[str, Any] = {"color": colour(index), "marker": marker(index), "markersize": 4}
         axes.plot(k, 100 * share, **look)
@@ -137,7 +139,10 @@ def calibration(table: pd.DataFrame) -> Figure:
             axes.set_ylabel("Within k SD (%)")
     every[0].plot([], [], color=BLACK, linewidth=1, linestyle=(0, (4, 2)), label="normal")
     every[0].plot([], [], color=colour(0), marker=marker(0), markersize=4, label="all sessions")
-    every[0].plot([], [], color=GREY, label="one session", **_FAINT)
+    if table["session"].nunique() > LINES_MAX:
+        every[0].fill_between([], [], [], color=GREY, linewidth=0, alpha=0.35, label="nine of ten sessions")
+    else:
+        every[0].plot([], [], color=GREY, label="one session", **_FAINT)
     legend(figure, figure.axes, 3)
     every[0].set_ylim(0, 102)
     every[0].set_xlim(left=0)
@@ -149,11 +154,26 @@ def calibration(table: pd.DataFrame) -> Figure:
 _FAINT: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.5}
 
 
+LINES_MAX = 60  # sessions, each with a line of its own
+
+
+def _by_session(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
+    """k (k,), and each session's share in percent (k, sessions)."""
+    whole = rows.pivot(index="percent_of_sd", columns="session", values=["within", "n"]).astype("float64")
+    return whole.index.to_numpy(np.float64) / 100, 100 * (whole["within"] / whole["n"]).to_numpy()
+
+
+def nine_of_ten(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """k, and the 5 and 95 percentiles of the sessions' shares in percent."""
+    k, share = _by_session(rows)
+    low, high = np.nanpercentile(share, [5, 95], axis=1)
+    return k, low, high
+
+
 def _one_line(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
     """Each session's k and share in percent, NaN between sessions: one line draws faster than many."""
-    whole = rows.pivot(index="percent_of_sd", columns="session", values=["within", "n"]).astype("float64")
-    share = 100 * (whole["within"] / whole["n"]).to_numpy()
-    k = np.broadcast_to(whole.index.to_numpy(np.float64)[:, None] / 100, share.shape)
+    found, share = _by_session(rows)
+    k = np.broadcast_to(found[:, None], share.shape)
     parted = [np.vstack([part, np.full(part.shape[1], np.nan)]).T.ravel() for part in (k, share)]
     return parted[0], parted[1]
 

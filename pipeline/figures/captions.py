@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from pipeline.figures.accuracy import shares
+from pipeline.figures.accuracy import LINES_MAX, shares
 from pipeline.figures.canvas import XY, Plane, Task, ellipse_95, offsets_mm, targets_of, way
 from pipeline.figures.sensors import errors_in, peak_s
 from pipeline.figures.style import FloatArray, finite, mean_and_interval
@@ -291,10 +291,12 @@ def calibration(table: pd.DataFrame) -> Said:
         at = int(np.argmin(np.abs(k - 1.96)))
         parts.append(f"{name} {percent(float(share[at]), 0)}")
     told = f"Within {1.96} SD, where a normal has 95 %: {_listed(parts, ', ')}."
-    n = counted(table["session"].nunique(), "session")
+    sessions = table["session"].nunique()
+    n = counted(sessions, "session")
+    single = "band: nine of ten sessions" if sessions > LINES_MAX else "thin lines single sessions"
     return Said(
-        f"Is the stated SD honest? The share of errors within k stated SDs over {n} (pooled; thin lines single"
-        f" sessions), beside the normal's (dashed). Below it errors are larger than stated, above it smaller. {told}",
+        f"Is the stated SD honest? The share of errors within k stated SDs over {n} (pooled; {single}), beside the"
+        f" normal's (dashed). Below it errors are larger than stated, above it smaller. {told}",
         f"Share of errors within k stated SDs by estimator, {n}. {told}",
     )
 

@@ -39,7 +39,7 @@ class Explored:
 
     def rows(self, table: str) -> list[dict[str, Any]]:
         """A table as plain rows."""
-        return tables.records(table, self.found[table])
+        return list(tables.records(table, self.found[table]))
 
 
 def document(explored: Explored, drawn: Path) -> Document:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import pandas as pd
 
 from pipeline import tables
 from pipeline.document import html
@@ -73,9 +75,35 @@ def section(material: Material) -> Section | None:
 
 def write(material: Material, folder: Path) -> None:
     """A page a participant, where there are many."""
-    for name, person in _people(material).items():
-        folder.mkdir(exist_ok=True)
-        html.render(_document(material, person), folder, folder / name)
+    people = _people(material)
+    if not people:
+        return
+    folder.mkdir()
+    values = dict(iter(material.measures.groupby("participant")))
+    sessions, rows = _by_person(material)
+    for name, person in people.items():
+        sections = (
+            Section("measures", "Measures", (_measures(material, values.get(person, material.measures[:0])),)),
+            *_sessions(sessions.get(person, {}), rows.get(person, {})),
+        )
+        html.render(_document(material, person, sections), folder, folder / name)
+
+
+def _by_person(material: Material) -> tuple[dict[str, dict[str, int]], dict[str, dict[str, list[Row]]]]:
+    """Each participant's sessions, with their places among all, and rows of the tables that are shown."""
+    sessions: dict[str, dict[str, int]] = {}
+    whose: dict[str, str] = {}
+    for place, session in enumerate(material.sessions, 1):
+        if session.participant is not None:
+            sessions.setdefault(session.participant, {})[session.id] = place
+            whose[session.id] = session.participant
+    rows: dict[str, dict[str, list[Row]]] = {}
+    for name in _SHOWN:
+        for row in material.rows(name):
+            person = whose.get(row["session"], row.get("participant"))
+            if person is not None:
+                rows.setdefault(person, {}).setdefault(name, []).append(row)
+    return sessions, rows
 
 
 def _people(material: Material) -> dict[str, str]:
@@ -88,20 +116,14 @@ def _people(material: Material) -> dict[str, str]:
     return {f"{index:04d}.html": person for index, person in enumerate(sorted(known), 1)}
 
 
-def _document(material: Material, person: str) -> Document:
-    sections = [
-        Section("measures", "Measures", (_measures(material, person),)),
-        *_sessions(material, person),
-    ]
+def _document(material: Material, person: str, sections: tuple[Section, ...]) -> Document:
     back = Link("Back to the report", "../report.html")
-    origin = ORIGINS[material.study.data_origin]
-    return Document(f"Participant {person}", material.study.title, origin, tuple(sections), back)
+    return Document(f"Participant {person}", material.study.title, ORIGINS[material.study.data_origin], sections, back)
 
 
-def _measures(material: Material, person: str) -> Table:
-    """Every measure, a column a condition."""
+def _measures(material: Material, mine: pd.DataFrame) -> Table:
+    """Every measure of a participant's, a column a condition."""
     conditions = material.study.conditions
-    mine = material.measures[material.measures["participant"] == person]
     cells = []
     for measure in dict.fromkeys(mine["measure"]):
         (values,) = tables.participant_means(mine, str(measure), conditions).to_numpy("float64")
@@ -114,19 +136,12 @@ def _measures(material: Material, person: str) -> Table:
     )
 
 
-def _sessions(material: Material, person: str) -> Iterator[Section]:
-    mine = {session.id: index for index, session in enumerate(material.sessions, 1) if session.participant == person}
+def _sessions(mine: Mapping[str, int], rows: Mapping[str, list[Row]]) -> Iterator[Section]:
+    """A participant's sessions, by their places, and the rows of each table."""
     blocks: list[Block] = []
     if mine:
         blocks.append(Pages("Traces", tuple(Link(f"Traces of {one}", f"../{TRACES}#{at}") for one, at in mine.items())))
-    for name in _SHOWN:
-        rows = [
-            row
-            for row in material.rows(name)
-            if row["session"] in mine or (name == "exclusions" and row["participant"] == person)
-        ]
-        if rows:
-            blocks.append(_table(name, rows))
+    blocks += [_table(name, rows[name]) for name in _SHOWN if name in rows]
     if blocks:
         yield Section("sessions", "Sessions and gaps", tuple(blocks))
 

@@ -63,7 +63,7 @@ def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: P
 
 
 def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Iterator[Block]:
-    every = tables.records("replay_means", found["replay_means"])
+    every = list(tables.records("replay_means", found["replay_means"]))
     yield Paragraph(
         (
             "Every variant was run over the same raw streams and asked, at the arrival of each acceleration, where the"
@@ -147,7 +147,7 @@ def _with_interval(row: Row, figure: str) -> str:
 
 
 def _left_out(excluded: pd.DataFrame) -> Table | None:
-    rows = tables.records("replay_exclusions", excluded)
+    rows = list(tables.records("replay_exclusions", excluded))
     if not rows:
         return None
     more = f" The first {_ROWS_MAX} of {len(rows)}; all are in results.json." if len(rows) > _ROWS_MAX else ""

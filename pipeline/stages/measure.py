@@ -179,9 +179,8 @@ def _movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
 def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
     """From session_start to the last selection, a row a session that has both; what does not fit is listed."""
     rows = []
-    sessions = {session.id: session for session in work.sessions}
-    for session_id, happened in _events_by_session(work):
-        session = sessions[session_id]
+    for session, folder in sorted(zip(work.sessions, work.entries["ingest"], strict=True), key=lambda one: one[0].id):
+        happened = tables.read_arrow("events", folder).to_pylist()
         who: Row = session.ids
         begins, selections = (
             [event["time_ns"] for event in happened if event["type"] == kind] for kind in ("session_start", "selection")
@@ -199,15 +198,6 @@ def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
                 rows.append((session.participant, session.condition, session.id, seconds))
     found = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
     return _values(found, "completion_time_s", "seconds", "the events")
-
-
-def _events_by_session(work: Work) -> list[tuple[str, list[Row]]]:
-    """Each session's events, in the order of their ids."""
-    found: dict[str, list[Row]] = {}
-    for folder in work.entries["ingest"]:
-        for event in tables.read_arrow("events", folder).to_pylist():
-            found.setdefault(event["session"], []).append(event)
-    return sorted(found.items())
 
 
 def _rated_values(work: Work) -> Iterator[pd.DataFrame]:

@@ -66,7 +66,7 @@ def test_the_tables_are_those_of_the_command_and_of_its_cache(study: Path, stead
     assert {path.name for path in steadyhand.cache.rglob("??/*")} == kept
     found = steadyhand.results()
     for name in results.LISTS:
-        rows = stored.records(name, tables[name])
+        rows = list(stored.records(name, tables[name]))
         for row in rows:
             if "details" in row and row["details"] is not None:
                 row["details"] = json.loads(row["details"])

@@ -260,7 +260,7 @@ def test_a_selection_at_the_very_moment_of_the_next_start_stays_with_its_trial()
     ]
     rows = [{"session": "s", "type": kind, "trial": trial, "time_ns": at} for kind, trial, at in kinds]
     for order in (rows, rows[::-1]):
-        _, selections = selections_by_trial(tables.records("events", tables.frame("events", order)))
+        _, selections = selections_by_trial(list(tables.records("events", tables.frame("events", order))))
         found = sorted((selection["time_ns"], selection["trial"], place) for selection, place in selections)
         assert [place for *_, place in found] == [0, -1, 1]
 

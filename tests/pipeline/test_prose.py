@@ -143,9 +143,11 @@ def a_study(
     rows, _ = rows_of(study, measures, tables.frame("observations", [{**cell, "n": 1} for cell in cells]))
     for row in rows:
         row["details"] = json.loads(row["details"]) if row["details"] else None
-    complete = tables.records("comparisons", tables.frame("comparisons", [{**row, "details": None} for row in rows]))
+    complete = list(
+        tables.records("comparisons", tables.frame("comparisons", [{**row, "details": None} for row in rows]))
+    )
     found = [{**whole, "details": row["details"]} for whole, row in zip(complete, rows, strict=True)]
-    described = tables.records("descriptives", tables.frame("descriptives", descriptives(study, measures)))
+    described = list(tables.records("descriptives", tables.frame("descriptives", descriptives(study, measures))))
     return found, told_of(conditions, study.alpha, described)
 
 

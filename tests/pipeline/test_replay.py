@@ -157,7 +157,7 @@ def test_the_report_ranks_and_says_everything(study: Path, steadyhand: Steadyhan
     assert "replay.pdf" in ran.out
     for name in ("accuracy", "replay_trials", "replay_means", "replay_exclusions"):
         assert (steadyhand.out / f"{name}.parquet").is_file()
-    whole = tables.records("accuracy", tables.read("accuracy", steadyhand.out))
+    whole = list(tables.records("accuracy", tables.read("accuracy", steadyhand.out)))
     assert whole == found["accuracy"]
 
 

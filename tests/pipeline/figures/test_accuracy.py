@@ -12,7 +12,7 @@ from scipy import stats
 
 from pipeline import figures, tables
 from pipeline.figures import captions
-from pipeline.figures.accuracy import shares
+from pipeline.figures.accuracy import nine_of_ten, shares
 from tests.pipeline.figures.drawn import pictures, saved, texts
 
 
@@ -95,8 +95,14 @@ def test_calibration_pools_instants_and_not_shares(tmp_path: Path) -> None:
     assert "where a normal has 95 %: gp 60 %, raw 60 %" in captions.calibration(table).caption
 
 
-def test_the_lines_of_many_sessions_are_pixels(tmp_path: Path) -> None:
-    rows = [row for n in range(1500) for row in counts("gp", f"s{n}", {100: n % 100, 196: 100}, 100)]
-    path = saved(figures.calibration(tables.frame("calibration", rows)), tmp_path)
-    assert pictures(path) == 1
+def test_many_sessions_are_a_band_of_nine_in_ten(tmp_path: Path) -> None:
+    rows = [row for n in range(1001) for row in counts("gp", f"s{n}", {100: n % 101, 196: 100}, 100)]
+    table = tables.frame("calibration", rows)
+    k, low, high = nine_of_ten(table)
+    np.testing.assert_allclose(k, [1.0, 1.96])
+    np.testing.assert_allclose(low, np.percentile([n % 101 for n in range(1001)], 5) * np.array([1, 0]) + [0, 100])
+    np.testing.assert_allclose(high, np.percentile([n % 101 for n in range(1001)], 95) * np.array([1, 0]) + [0, 100])
+    path = saved(figures.calibration(table), tmp_path)
+    assert "nine of ten sessions" in texts(figures.calibration(table), tmp_path)
+    assert "band: nine of ten sessions" in captions.calibration(table).caption
     assert path.stat().st_size < 200_000
