@@ -9,7 +9,6 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline import tables
 from pipeline.document import html
 from pipeline.document.model import Block, Document, Link, Pages, Paragraph, Section, Table, columns
 from pipeline.sections.material import ORIGINS, Material, Row
@@ -79,11 +78,11 @@ def write(material: Material, folder: Path) -> None:
     if not people:
         return
     folder.mkdir()
-    values = dict(iter(material.measures.groupby("participant")))
+    values = {name: material.participant_means(name) for name in dict.fromkeys(material.measures["measure"])}
     sessions, rows = _by_person(material)
     for name, person in people.items():
         sections = (
-            Section("measures", "Measures", (_measures(material, values.get(person, material.measures[:0])),)),
+            Section("measures", "Measures", (_measures(material.study.conditions, values, person),)),
             *_sessions(sessions.get(person, {}), rows.get(person, {})),
         )
         html.render(_document(material, person, sections), folder, folder / name)
@@ -121,13 +120,13 @@ def _document(material: Material, person: str, sections: tuple[Section, ...]) ->
     return Document(f"Participant {person}", material.study.title, ORIGINS[material.study.data_origin], sections, back)
 
 
-def _measures(material: Material, mine: pd.DataFrame) -> Table:
+def _measures(conditions: Sequence[str], values: Mapping[str, pd.DataFrame], person: str) -> Table:
     """Every measure of a participant's, a column a condition."""
-    conditions = material.study.conditions
-    cells = []
-    for measure in dict.fromkeys(mine["measure"]):
-        (values,) = tables.participant_means(mine, str(measure), conditions).to_numpy("float64")
-        cells.append((measure_label(str(measure)), *(number(float(value)) for value in values)))
+    cells = [
+        (measure_label(measure), *map(number, of_all.loc[person].tolist()))
+        for measure, of_all in values.items()
+        if person in of_all.index
+    ]
     return Table(
         "table-measures",
         "The participant's own values, means over everything but the condition.",
