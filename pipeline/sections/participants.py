@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pipeline.document import html
@@ -123,7 +124,7 @@ def _document(material: Material, person: str, sections: tuple[Section, ...]) ->
 def _measures(conditions: Sequence[str], values: Mapping[str, pd.DataFrame], person: str) -> Table:
     """Every measure of a participant's, a column a condition."""
     cells = [
-        (measure_label(measure), *map(number, of_all.loc[person].tolist()))
+        (measure_label(measure), *map(number, of_all.loc[[person]].to_numpy(np.float64)[0].tolist()))
         for measure, of_all in values.items()
         if person in of_all.index
     ]
