@@ -16,6 +16,8 @@ import pyarrow.parquet as pq
 if TYPE_CHECKING:
     from fusion_core.samples import Samples
 
+pa.set_memory_pool(pa.system_memory_pool())  # small tables by the thousand: the usual pool keeps what they leave
+
 _TEXT, _FLOAT, _TIME, _COUNT = pa.string(), pa.float64(), pa.int64(), pa.int64()
 _NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them

@@ -38,7 +38,7 @@ def run(work: Work) -> Outcome:
         ]
     ).reset_index(drop=True)
     _check_sources(values)
-    known, everything = _known(work, values, trials), values
+    known, everything = _known(work, values, trials) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
         _check_exclusion(excluded, known)
         values = values[~_matches(excluded, values)]
