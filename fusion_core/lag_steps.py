@@ -45,7 +45,8 @@ def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shif
     """
     count, groups = len(shifts), (len(shifts) + _GROUP - 1) // _GROUP
     blocks = len(time) - block + 1
-    cost = np.full((groups, blocks, _GROUP), np.inf)
+    cost = np.empty((groups, blocks, _GROUP))
+    cost[-1] = np.inf
     bound, still, total = np.empty((blocks, groups)), np.empty(blocks, np.bool_), np.zeros(count)
     recent, newest, running = np.zeros((block, count)), np.empty(count), np.zeros(count)
     quadratic, begin = np.empty((3, len(segments.time))), 0

@@ -16,17 +16,17 @@ from pipeline.study import Session, Study
 
 @dataclass(frozen=True)
 class Seen:
-    """What a stage sees of a study's settings, and what they and its code add to a key: the same for every session."""
+    """What a stage sees of a study's settings, and a digest of them and its code: the same in every session's key."""
 
     stage: Stage
     study: Study
-    settings: Any
-    code: str
+    digest: str
 
 
 def seen_by(stage: Stage, study: Study) -> Seen:
     """The study as the stage may see it."""
-    return Seen(stage, _declared(study, stage), _settings(study, stage), code_digest(stage.module))
+    digest = digest_of([stage.name, code_digest(stage.module), _settings(study, stage)])
+    return Seen(stage, _declared(study, stage), digest)
 
 
 def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
@@ -55,9 +55,7 @@ def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> tup
     )
     key = digest_of(
         [
-            stage.name,
-            seen.code,
-            seen.settings,
+            seen.digest,
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],
             inputs,

@@ -149,11 +149,10 @@ def two_processes(study: Path, root: Path) -> None:
     taken = {}
     for count in (1, 2):
         with Processes(count) as executor:
-            for began in (None, time.perf_counter()):
-                named = f"{count}-{'warm' if began else 'cold'}"
-                bring_up_to_date(study, COMPARE[:3], Means(Cache(root / named), executor, PlainLines()))
-                if began:
-                    taken[count] = time.perf_counter() - began
+            for named in ("cold", "warm"):
+                began = time.perf_counter()
+                bring_up_to_date(study, COMPARE[:3], Means(Cache(root / f"{count}-{named}"), executor, PlainLines()))
+                taken[count] = time.perf_counter() - began
     print(f"  one process {taken[1]:.1f} s, two {taken[2]:.1f} s: {taken[1] / taken[2]:.2f} x")
 
 
@@ -260,7 +259,7 @@ def measure(sessions: int, seconds: float = 60.0, light: bool = False) -> None:
             small = write_archive(root / "small", min(SMALL, sessions), seconds)
             reading(small, root / "read")
             two_processes(small, root)
-            cluster(small, root)
+            cluster(study, root)
 
 
 if __name__ == "__main__":
