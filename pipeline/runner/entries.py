@@ -17,11 +17,16 @@ _TOGETHER = 8  # pieces of one session in a group, whose recording is then loade
 _ENOUGH = 64  # groups to go round, before any is larger than one piece
 
 
-def entries_of(stage: Stage, result: Result, works: Sequence[Piece], means: Means) -> list[Entry]:
-    """The entry of each piece of work with its key, each key computed once, where the cache has none."""
+def entries_of(stage: Stage, result: Result, works: Iterable[Piece], means: Means) -> list[Entry]:
+    """The entry of each piece of work with its key, each key computed once, where the cache has none.
+
+    Of the pieces only those that are to be computed are kept meanwhile.
+    """
     found: dict[str, Entry] = {}
     missing: dict[str, Piece] = {}
+    keys = []
     for work, key in works:
+        keys.append(key)
         if key in found or key in missing:
             continue
         entry = _look_up(stage, key, work.session.id, result, means.cache)
@@ -37,7 +42,7 @@ def entries_of(stage: Stage, result: Result, works: Sequence[Piece], means: Mean
             found[key] = entry
             means.progress.advance()
         means.progress.end()
-    return [found[key] for _, key in works]
+    return [found[key] for key in keys]
 
 
 def entry_of_study(stage: Stage, result: Result, work: Work, key: str, means: Means) -> Entry:

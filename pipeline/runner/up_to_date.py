@@ -44,7 +44,7 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
 def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> dict[str, Entry]:
     """The stage's entry for each session, computed where the cache has none."""
     seen = seen_by(stage, result.study)
-    found = entries_of(stage, result, [work_and_key(seen, result, [session]) for session in sessions], means)
+    found = entries_of(stage, result, (work_and_key(seen, result, [session]) for session in sessions), means)
     return {session.id: entry for session, entry in zip(sessions, found, strict=True)}
 
 
@@ -54,7 +54,7 @@ def over_settings(
     """A stage's entry for each of several settings of a study, by session: a list a session, in the settings' order."""
     began = time.monotonic()
     of_settings = [(seen_by(stage, study), replace(result, study=study)) for study in settings]
-    works = [work_and_key(seen, one, [session]) for session in sessions for seen, one in of_settings]
+    works = (work_and_key(seen, one, [session]) for session in sessions for seen, one in of_settings)
     entries = entries_of(stage, result, works, means)
     result.seconds += time.monotonic() - began
     return [entries[at : at + len(settings)] for at in range(0, len(entries), len(settings))]
