@@ -66,7 +66,7 @@ def coverage_95(estimate: FloatArray, sd: FloatArray, reference: FloatArray) -> 
 
 
 def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.random.Generator) -> Interval:
-    """The shift in s within ±0.5 s that minimises Σ‖estimate(t) − reference(t − lag)‖², positive = late.
+    """The shift in s within ±0.5 s that minimises Σ‖estimate(t) − reference(t − lag)‖², positive = late; times rise.
 
     Sub-sample by a parabola through the smallest squared distance and its neighbours; the 95 % interval is the
     2.5 and 97.5 percentile of 1000 resamples of moving blocks of 0.5 s. NaN with less than 1 s of usable track, or

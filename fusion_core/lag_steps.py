@@ -41,7 +41,7 @@ class Blocks(NamedTuple):
 def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shifts: FloatArray, block: int) -> Blocks:
     """Σ‖estimate(t) − reference(t − shift)‖² over every `block` instants, for rising `shifts`.
 
-    The reference reaches from time[0] − shifts[-1] to time[-1] − shifts[0]; of `time` (n,) and `estimate` (n, d).
+    Of rising `time` (n,) and `estimate` (n, d); the reference reaches to every shift of each instant.
     """
     count, groups = len(shifts), (len(shifts) + _GROUP - 1) // _GROUP
     blocks = len(time) - block + 1

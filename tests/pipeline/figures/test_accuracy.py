@@ -109,8 +109,8 @@ def test_many_sessions_are_a_band_of_nine_in_ten(tmp_path: Path) -> None:
 
 
 def test_errors_that_are_far_apart_have_powers_of_ten_beneath_them(tmp_path: Path) -> None:
-    far = figures.lag_and_error(accuracy(one=([5.0, 5.5], [0.1, 0.1]), two=([900.0, 1000.0], [0.1, 0.1])))
+    far = figures.lag_and_error(accuracy(one=([5.0] * 3, [0.1] * 3), two=([900.0] * 3, [0.1] * 3)))
     assert {"10", "100", "1000"} <= set(texts(far, tmp_path))
     assert not {"200", "500"} & set(texts(far, tmp_path))
-    near = figures.lag_and_error(accuracy(one=([5.0, 5.5], [0.1, 0.1]), two=([90.0, 100.0], [0.1, 0.1])))
+    near = figures.lag_and_error(accuracy(one=([5.0] * 3, [0.1] * 3), two=([90.0] * 3, [0.1] * 3)))
     assert {"10", "50", "100"} <= set(texts(near, tmp_path))
