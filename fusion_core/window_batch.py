@@ -94,10 +94,10 @@ def estimates(
             if prior.mean != ZERO:
                 origin[:] = streams.frames[span[1] - 1]
         _take_in(prior, streams, held, span, factored, size, origin)
-        _compare(prior, streams, held, known, span)
+        _covariances(prior, streams, held, known, span)
         known[:] = span
         factored = _factor(held, factored, size)
-        _compare_with_now(prior, streams, held, positions, times[index], with_now[:size])
+        _covariances_with_now(prior, streams, held, positions, times[index], with_now[:size])
         if factored < size:
             _by_weights(prior, streams, held, positions, size, times[index], origin, mean[index], sd[index])
             known[:] = 0
@@ -163,7 +163,7 @@ def _place(slot: IntArray, at: int, begin: int, count: int) -> None:
 
 
 @njit(cache=True)
-def _compare(prior: Prior, streams: Streams, held: _Held, known: IntArray, span: IntArray) -> None:
+def _covariances(prior: Prior, streams: Streams, held: _Held, known: IntArray, span: IntArray) -> None:
     """Covariances of the readings that come into the window, with all that are in it."""
     inverse_scale, begins, shift, polynomial, shared = prior.covariances
     among, slot, time, noise = held.among, held.slot, held.time, prior.noise_variance
@@ -184,7 +184,7 @@ def _compare(prior: Prior, streams: Streams, held: _Held, known: IntArray, span:
 
 
 @njit(cache=True)
-def _compare_with_now(
+def _covariances_with_now(
     prior: Prior, streams: Streams, held: _Held, positions: int, now: float, with_now: FloatArray
 ) -> None:
     """Covariances of the readings of a window with the position now."""
