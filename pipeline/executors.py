@@ -63,13 +63,25 @@ class Processes(Executor):
         self._threads.shutdown(wait=wait, cancel_futures=True)
 
 
+def in_a_process_of_its_own(fn: Callable[..., Any], *args: Any) -> Any:
+    """What the call gives; the process, which may start others, ends with it, and gives all its memory back.
+
+    Raises WorkerLostError where it dies.
+    """
+    process = _Process(may_start_others=True)
+    try:
+        return process.call(fn, args, {})
+    finally:
+        process.stop()
+
+
 class _Process:
     """A process that computes what comes through a pipe. Where the other end closes, it ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, may_start_others: bool = False) -> None:
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
-        self._process = context.Process(target=_serve, args=(there,), daemon=True)
+        self._process = context.Process(target=_serve, args=(there,), daemon=not may_start_others)
         self._process.start()
         there.close()
         self.alive = True

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from pathlib import Path
 
 from pipeline.cache import Cache, Entry
 from pipeline.errors import PipelineError, WorkerLostError
+from pipeline.executors import InThisProcess, in_a_process_of_its_own
 from pipeline.runner.compute import Piece, compute, compute_all, keep_unusable
 from pipeline.runner.means import Means
 from pipeline.runner.result import Result
@@ -14,6 +16,7 @@ from pipeline.stage import Stage, Work
 
 _AHEAD = 256  # groups of pieces handed to the executor before they are needed: more than a cluster has processes
 _TOGETHER = 8  # pieces of one session in a group, whose recording is then loaded once
+_ARCHIVE = 1000  # sessions
 _ENOUGH = 64  # groups to go round, before any is larger than one piece
 
 
@@ -46,15 +49,33 @@ def entries_of(stage: Stage, result: Result, works: Iterable[Piece], means: Mean
 
 
 def entry_of_study(stage: Stage, result: Result, work: Work, key: str, means: Means) -> Entry:
-    """The entry of a stage of scope "study", computed in this process where the cache has none."""
+    """The entry of a stage of scope "study", computed here where the cache has none.
+
+    Of an archive in a process of its own: all its tables are joined then, and this process need not go on holding
+    what that leaves.
+    """
     entry = _look_up(stage, key, "", result, means.cache)
     result.computed[stage.name] = int(entry is None)
     if entry is None:
         means.progress.begin(stage.name, 1)
-        entry = compute(stage, work, key, means.cache.root)
+        if len(work.sessions) < _ARCHIVE or isinstance(means.executor, InThisProcess):
+            entry = compute(stage, work, key, means.cache.root)
+        else:
+            entry = _apart(stage, work, key, means.cache.root)
         means.progress.advance()
         means.progress.end()
     return entry
+
+
+def _apart(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
+    try:
+        found: Entry = in_a_process_of_its_own(compute, stage, work, key, cache_root)
+    except WorkerLostError as error:
+        raise PipelineError(
+            f"the process that computed {stage.name} died ({error}); its memory may not have sufficed; what was"
+            " computed before is kept, run it again to go on"
+        ) from None
+    return found
 
 
 def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache) -> Entry | None:

@@ -24,7 +24,7 @@ from pipeline.runner.means import Means
 from pipeline.runner.result import Result
 from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.stage import Stage
-from pipeline.stages import COMPARE, REPLAY
+from pipeline.stages import COMPARE, REPLAY, STAGES
 from pipeline.study import Study, parse, read_yaml
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.dying import POISONED
@@ -104,6 +104,22 @@ def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(
         [entry.content for entry in entries] for entries in found
     ]
     assert result.computed["replay"] == 1  # it is tried again
+
+
+def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the same bytes, report and all; what a process that died of it costs is said."""
+    with executor_of(1, "inline") as executor:
+        here = bring_up_to_date(study, STAGES, Means(Cache(tmp_path / "here"), executor, PlainLines()))
+    monkeypatch.setattr("pipeline.runner.entries._ARCHIVE", 1)
+    with Processes(1) as executor:
+        means = Means(Cache(tmp_path / "apart"), executor, PlainLines())
+        apart = bring_up_to_date(study, STAGES, means)
+        assert contents(apart) == contents(here)
+        dying = replace(COMPARE[3], function="tests.pipeline.dying:of_a_study")
+        with pytest.raises(PipelineError, match=r"the process that computed measure died \(signal 9\); its memory"):
+            bring_up_to_date(study, (*COMPARE[:3], dying), means)
 
 
 @contextmanager
