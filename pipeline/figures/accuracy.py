@@ -128,13 +128,14 @@ def calibration(table: pd.DataFrame) -> Figure:
     names = list(dict.fromkeys(table["estimator"]))
     figure, every, across = multiples(len(names), 1.75, a_row=3)
     grid = np.linspace(0, table["percent_of_sd"].max() / 100, 100)
+    many = table["session"].nunique() > LINES_MAX
     for index, (axes, estimator) in enumerate(zip(every, names, strict=True)):
         rows = table[table["estimator"] == estimator]
         axes.plot(grid, 100 * (2 * stats.norm.cdf(grid) - 1), color=BLACK, linewidth=1, linestyle=(0, (4, 2)))
-        if rows["session"].nunique() > LINES_MAX:
-            axes.fill_between(*nine_of_ten(rows), color=GREY, linewidth=0, alpha=0.35)
+        if many:
+            axes.fill_between(*nine_of_ten(rows), **_BAND)
         elif rows["session"].nunique() > 1:
-            axes.plot(*_one_line(rows), color=GREY, **_FAINT)
+            axes.plot(*_one_line(rows), **_FAINT)
         k, share = shares(rows)
         look: dict[str, Any] = {"color": colour(index), "marker": marker(index), "markersize": 4}
         axes.plot(k, 100 * share, **look)
@@ -143,10 +144,10 @@ def calibration(table: pd.DataFrame) -> Figure:
             axes.set_ylabel("Within k SD (%)")
     every[0].plot([], [], color=BLACK, linewidth=1, linestyle=(0, (4, 2)), label="normal")
     every[0].plot([], [], color=colour(0), marker=marker(0), markersize=4, label="all sessions")
-    if table["session"].nunique() > LINES_MAX:
-        every[0].fill_between([], [], [], color=GREY, linewidth=0, alpha=0.35, label="nine of ten sessions")
+    if many:
+        every[0].fill_between([], [], [], label="nine of ten sessions", **_BAND)
     else:
-        every[0].plot([], [], color=GREY, label="one session", **_FAINT)
+        every[0].plot([], [], label="one session", **_FAINT)
     legend(figure, figure.axes, 3)
     every[0].set_ylim(0, 102)
     every[0].set_xlim(left=0)
@@ -155,9 +156,8 @@ def calibration(table: pd.DataFrame) -> Figure:
     return figure
 
 
-_FAINT: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.5}
-
-
+_FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.5}
+_BAND: dict[str, Any] = {"color": GREY, "linewidth": 0, "alpha": 0.35}
 LINES_MAX = 60  # sessions, each with a line of its own
 
 
