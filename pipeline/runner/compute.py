@@ -11,8 +11,10 @@ from pathlib import Path
 
 from pipeline.cache import Cache, Entry, digest_of
 from pipeline.errors import PipelineError, SessionError
-from pipeline.runner.work import Piece
 from pipeline.stage import Outcome, Stage, Work
+
+Piece = tuple[Work, str]
+"""A piece of work, and the key of its result."""
 
 
 def compute_all(stage: Stage, pieces: Sequence[Piece], cache_root: Path) -> list[Entry]:

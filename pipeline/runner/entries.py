@@ -9,10 +9,9 @@ from pathlib import Path
 from pipeline.cache import Cache, Entry
 from pipeline.errors import PipelineError, WorkerLostError
 from pipeline.executors import InThisProcess, in_a_process_of_its_own
-from pipeline.runner.compute import compute, compute_all, keep_unusable
+from pipeline.runner.compute import Piece, compute, compute_all, keep_unusable
 from pipeline.runner.means import Means
 from pipeline.runner.result import Result
-from pipeline.runner.work import Piece
 from pipeline.stage import Stage, Work
 
 _AHEAD = 256  # groups of pieces handed to the executor before they are needed: more than a cluster has processes

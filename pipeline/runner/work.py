@@ -13,9 +13,6 @@ from pipeline.runner.result import Result
 from pipeline.stage import Stage, Work
 from pipeline.study import Session, Study
 
-Piece = tuple[Work, str]
-"""A piece of work, and the key of its result."""
-
 
 @dataclass(frozen=True)
 class Seen:
@@ -32,7 +29,7 @@ def seen_by(stage: Stage, study: Study) -> Seen:
     return Seen(stage, _declared(study, stage), digest)
 
 
-def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> Piece:
+def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
     """A piece of work without its folder, and the key of its result."""
     stage = seen.stage
     read = {name: _entries_for(result.entries[name], sessions) for name in stage.reads}
