@@ -13,7 +13,7 @@ import pandas as pd
 from pipeline import tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.result import FloatArray
-from pipeline.study import Comparison, Study
+from pipeline.study.settings import Comparison, Study
 
 Row = dict[str, Any]
 

@@ -27,7 +27,7 @@ from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import FloatArray, Result
-from pipeline.study import Study
+from pipeline.study.settings import Study
 from pipeline.wording import measure_order
 
 Row = dict[str, Any]

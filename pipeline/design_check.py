@@ -18,7 +18,7 @@ from pipeline.statistics import OK
 from pipeline.statistics.crossover import crossover
 from pipeline.statistics.mixed import mixed_model
 from pipeline.statistics.result import Result
-from pipeline.study import Comparison, Session, Study
+from pipeline.study.settings import Comparison, Session, Study
 from pipeline.wording import counted, listing, p_phrase, statistic
 
 Row = dict[str, Any]

@@ -12,7 +12,7 @@ import pandas as pd
 from fusion_core import FloatArray, Samples, accuracy
 from pipeline import tables
 from pipeline.recording import Recording, Shown
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
 _SETTLED_S = 1.0

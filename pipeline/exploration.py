@@ -14,7 +14,7 @@ from pipeline.errors import PipelineError, WorkerLostError, did_you_mean
 from pipeline.exploration_tables import Tracker
 from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.study_files import participants, with_other_people
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 Row = dict[str, Any]
 

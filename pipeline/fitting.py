@@ -14,7 +14,7 @@ from fusion_core.likelihood import Fitted, foretold, foretold_by, maximise
 from pipeline.errors import PipelineError
 from pipeline.estimators import build_estimator, sensors
 from pipeline.recording import Recording
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 _IMU_PRIOR = 0.7  # SD of the logarithm: a factor of two. Smooth motion alone cannot tell an accelerometer's noise
 _FREE = float("inf")

@@ -18,7 +18,7 @@ from pipeline.runner.means import Means
 from pipeline.runner.result import Result
 from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stages import COMPARE
-from pipeline.study import Session, Study
+from pipeline.study.settings import Session, Study
 
 STAGE_OF: Mapping[str, str] = {
     **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),

@@ -10,7 +10,7 @@ import pandas as pd
 
 from pipeline import tables
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study import Session, identifier
+from pipeline.study.settings import Session, identifier
 
 Row = dict[str, Any]
 

@@ -12,10 +12,10 @@ import pandas as pd
 
 from pipeline import tables
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.publication import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
 from pipeline.statistics.forensics.audit import audit
 from pipeline.statistics.forensics.phrases import label
-from pipeline.statistics.forensics.rounded import Rounded
+from pipeline.study.printed import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
+from pipeline.study.rounded import Rounded
 
 Row = dict[str, Any]
 _STATISTIC_NAMES = {"t": "t", "F": "F", "chi2": "chi2", "W": "W+"}

@@ -17,7 +17,7 @@ from fusion_core.calibration import Body
 from pipeline import tables
 from pipeline.estimators import build_estimator, sensor, sensors
 from pipeline.phone import Phone, aligned, phone
-from pipeline.study import (
+from pipeline.study.settings import (
     AccelerationStream,
     DisplayStream,
     LinearStream,

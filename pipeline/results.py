@@ -13,7 +13,7 @@ import pandas as pd
 from pipeline import tables
 from pipeline.differences import OF_A_REPLAY, OF_A_STUDY
 from pipeline.errors import PipelineError
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 SCHEMA_VERSION = 1
 LISTS = (

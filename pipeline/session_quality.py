@@ -8,7 +8,7 @@ from decimal import Decimal
 from statistics import median
 from typing import Any, Literal
 
-from pipeline.study import QualityLimits, Study
+from pipeline.study.settings import QualityLimits, Study
 from pipeline.wording import number, percent
 
 Row = Mapping[str, Any]

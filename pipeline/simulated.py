@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.simulation_settings import SelectionSimulation
+from pipeline.study.simulation import SelectionSimulation
 
 Row = dict[str, Any]
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from pipeline.cache import code_digest, digest_of
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 MADE = "simulated.json"
 """What the last run made, and from what: beside study.yaml."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pipeline.study import Session, Study
+from pipeline.study.settings import Session, Study
 
 
 @dataclass(frozen=True)

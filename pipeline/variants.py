@@ -10,7 +10,7 @@ from typing import Any
 
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.estimators import build_estimator
-from pipeline.study import Estimator, Estimators, Study, known, parse, read_values, read_yaml
+from pipeline.study.settings import Estimator, Estimators, Study, known, parse, read_values, read_yaml
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,15 @@ import yaml
 
 from fusion_core import ESTIMATORS
 from pipeline import tables
-from pipeline.settings_types import Frozen
-from pipeline.study import KINDS, Comparison, Display, OperatorTerm, QualityLimits, Study, load_study, parse
-from pipeline.study_tables import MEASURE_REQUIRED, MEASURE_RESERVED, RATING_REQUIRED, TRIAL_OPTIONAL, TRIAL_REQUIRED
+from pipeline.study.csv_tables import (
+    MEASURE_REQUIRED,
+    MEASURE_RESERVED,
+    RATING_REQUIRED,
+    TRIAL_OPTIONAL,
+    TRIAL_REQUIRED,
+)
+from pipeline.study.fields import Frozen
+from pipeline.study.settings import KINDS, Comparison, Display, OperatorTerm, QualityLimits, Study, load_study, parse
 from tests.conftest import CLONE
 
 REFERENCE = (CLONE / "studies" / "README.md").read_text(encoding="utf-8")

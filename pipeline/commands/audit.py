@@ -10,9 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from pipeline.commands import console
-from pipeline.publication import load_publication
 from pipeline.statistics.forensics.audit import audit as findings_of
 from pipeline.statistics.forensics.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
+from pipeline.study.printed import load_publication
 from pipeline.wording import counted, listing
 
 CONTRADICTED = 3  # the exit code, as of numbers that moved

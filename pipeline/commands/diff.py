@@ -15,7 +15,7 @@ from pipeline.commands.check import MOVED
 from pipeline.differences import ABSENT, Change, Differences, Identified
 from pipeline.errors import PipelineError
 from pipeline.explanation import Explanation, Made
-from pipeline.study import SETTINGS_FILE
+from pipeline.study.settings import SETTINGS_FILE
 from pipeline.wording import counted
 
 _RESULTS = "results.json"

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from pipeline.commands import console
 from pipeline.commands.run import executor_of, reports_folder, short
 from pipeline.errors import PipelineError
-from pipeline.simulation_settings import SelectionSimulation
-from pipeline.study import Study, load_study
+from pipeline.study.settings import Study, load_study
+from pipeline.study.simulation import SelectionSimulation
 
 if TYPE_CHECKING:
     from pipeline.exploration import Grid

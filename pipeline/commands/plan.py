@@ -11,7 +11,7 @@ from pathlib import Path
 from pipeline.commands import console
 from pipeline.counterbalancing import Order, assigned, balance, williams_design
 from pipeline.errors import PipelineError
-from pipeline.study import identifier, load_study
+from pipeline.study.settings import identifier, load_study
 from pipeline.wording import counted
 
 _NAMED_AS = "name them as study.yaml does, as in: steadyhand plan kinect fusion --participants 12"

@@ -18,7 +18,7 @@ from pipeline.provenance import LIBRARIES, PROVENANCE
 from pipeline.runner.result import Result
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, INGEST, REPLAY
-from pipeline.study import SETTINGS_FILE, Study
+from pipeline.study.settings import SETTINGS_FILE, Study
 
 _RESULTS = "results.json"
 _ARCHIVE = "report.zip"

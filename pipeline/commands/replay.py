@@ -25,7 +25,7 @@ from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.sections.replay import document
 from pipeline.stage import Stage
 from pipeline.stages import INGEST, REPLAY
-from pipeline.study import Session, load_study
+from pipeline.study.settings import Session, load_study
 from pipeline.variants import Variant, read_changes, read_estimators, variants
 from pipeline.wording import interval, number, seconds
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from pipeline.commands import console
 from pipeline.commands.run import PROCESS, executor_of
 from pipeline.errors import PipelineError
-from pipeline.simulation_settings import ReachSimulation
 from pipeline.simulation_state import is_made
-from pipeline.study import Study, load_study
+from pipeline.study.settings import Study, load_study
+from pipeline.study.simulation import ReachSimulation
 
 
 def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: bool = False) -> None:
@@ -35,7 +35,7 @@ def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: boo
 
 def _reach(folder: Path, study: Study, if_needed: bool) -> None:
     """The paper's Experiment 1, whose logs are small and come with the study."""
-    from pipeline.study import find_sessions
+    from pipeline.study.settings import find_sessions
 
     if if_needed and find_sessions(folder, study).sessions:
         return

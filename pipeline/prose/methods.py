@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from pipeline.estimators import build_estimator
-from pipeline.study import Comparison, Sensing, Study
+from pipeline.study.settings import Comparison, Sensing, Study
 from pipeline.wording import adjustment, counted, listing, number, subject, unit_of
 
 Row = Mapping[str, Any]

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 Row = Mapping[str, Any]
 

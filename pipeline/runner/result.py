@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.cache import Entry
-from pipeline.study import Session, Study
+from pipeline.study.settings import Session, Study
 
 
 @dataclass

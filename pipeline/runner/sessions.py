@@ -11,7 +11,7 @@ from pipeline.digests import remembered
 from pipeline.errors import PipelineError
 from pipeline.runner.result import Result
 from pipeline.stage import Outcome
-from pipeline.study import TABLE_FIELDS, Session, Study, find_sessions, load_study
+from pipeline.study.settings import TABLE_FIELDS, Session, Study, find_sessions, load_study
 
 
 def found_in(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:

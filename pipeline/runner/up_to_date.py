@@ -15,7 +15,7 @@ from pipeline.runner.result import Result
 from pipeline.runner.sessions import found_in, require_something, still_usable
 from pipeline.runner.work import seen_by, work_and_key
 from pipeline.stage import Stage
-from pipeline.study import Session, Study
+from pipeline.study.settings import Session, Study
 
 
 def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Result:

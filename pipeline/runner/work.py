@@ -11,7 +11,7 @@ from typing import Any
 from pipeline.cache import Entry, code_digest, digest_of
 from pipeline.runner.result import Result
 from pipeline.stage import Stage, Work
-from pipeline.study import Session, Study
+from pipeline.study.settings import Session, Study
 
 
 @dataclass(frozen=True)

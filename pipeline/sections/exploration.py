@@ -14,7 +14,7 @@ from pipeline.document.model import Block, Document, Figure, Notice, Paragraph, 
 from pipeline.exploration_figures import ERROR, PARTICIPANTS, TIME, Surface
 from pipeline.exploration_tables import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.sections.provenance import libraries
-from pipeline.study import Study
+from pipeline.study.settings import Study
 from pipeline.wording import NOTHING, counted, interval, listing, number, percent, reduction_phrase, short_label
 
 Row = Mapping[str, Any]

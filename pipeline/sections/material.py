@@ -15,7 +15,7 @@ from pipeline import figures, tables
 from pipeline.document.model import Figure
 from pipeline.figures import captions
 from pipeline.side_by_side import Job
-from pipeline.study import Session, Study
+from pipeline.study.settings import Session, Study
 from pipeline.wording import listing
 
 Row = Mapping[str, Any]

@@ -5,7 +5,18 @@ from __future__ import annotations
 import pandas as pd
 
 from pipeline import figures
-from pipeline.document.model import Block, Figure, KeyFigure, KeyFigures, Link, Notice, Paragraph, Section, Strong, Text
+from pipeline.document.model import (
+    Block,
+    Figure,
+    KeyFigure,
+    KeyFigures,
+    Link,
+    Notice,
+    Paragraph,
+    Section,
+    Strong,
+    Text,
+)
 from pipeline.sections import traces
 from pipeline.sections.cautions import cautions
 from pipeline.sections.material import ORIGINS, Material, Row

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipeline.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table
 from pipeline.sections.material import Material, Row
-from pipeline.simulation_settings import SelectionSimulation, Trait
+from pipeline.study.simulation import SelectionSimulation, Trait
 from pipeline.wording import counted, measure_label, number, percent
 
 _MODELS = {

@@ -11,7 +11,7 @@ from pipeline import recording, tables
 from pipeline.document import traces
 from pipeline.document.traces import Kind, Series, Traces
 from pipeline.sections.material import ORIGINS, Material
-from pipeline.study import Session
+from pipeline.study.settings import Session
 
 PAGE = "traces.html"
 _KINDS: dict[str, Kind] = {"position": "tracker", "display": "display", "reference": "reference"}

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.errors import PipelineError
 from pipeline.simulation.hand_steps import FloatArray, Layout
-from pipeline.simulation_settings import Ring, Task
+from pipeline.study.simulation import Ring, Task
 
 _POINT_APART_MM = 1.0
 _ON_PATH_MM = 5.0  # a target further from the path than this is not on it

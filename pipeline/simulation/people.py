@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.recording import seeded
 from pipeline.simulation.hand_steps import INTERMITTENT, SECOND_ORDER_LAG, STEP_S, Person, Sway
-from pipeline.simulation_settings import SelectionSimulation, Trait
+from pipeline.study.simulation import SelectionSimulation, Trait
 
 _MODELS = {"intermittent": INTERMITTENT, "second_order_lag": SECOND_ORDER_LAG}
 _LONGEST_DELAY_S = 0.9  # less than the memory of the compiled steps

@@ -14,8 +14,8 @@ from pipeline.formats.log import Content
 from pipeline.formats.mcap import Message, in_order, write
 from pipeline.recording import seeded
 from pipeline.simulation.motion import minimum_jerk
-from pipeline.simulation_settings import ReachSimulation
-from pipeline.study import AccelerationStream, PositionStream, ReferenceStream, Study, inside
+from pipeline.study.settings import AccelerationStream, PositionStream, ReferenceStream, Study, inside
+from pipeline.study.simulation import ReachSimulation
 
 _EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
 _MM_PER_M = 1000.0

@@ -19,9 +19,9 @@ from pipeline.errors import PipelineError
 from pipeline.simulation.log import write_log
 from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.workload import ratings
-from pipeline.simulation_settings import SelectionSimulation
 from pipeline.simulation_state import MADE, files_made, made_from
-from pipeline.study import Study, inside
+from pipeline.study.settings import Study, inside
+from pipeline.study.simulation import SelectionSimulation
 
 _BEING_MADE = ".being-simulated"
 _PLACEHOLDERS = ("{participant}", "{condition}")

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.recording import seeded
-from pipeline.simulation_settings import Workload
+from pipeline.study.simulation import Workload
 
 
 def ratings(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.stage import Stage
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 STAGES: tuple[Stage, ...] = (
     Stage(

@@ -16,7 +16,7 @@ from pipeline.estimators import sensors
 from pipeline.phone import described
 from pipeline.recording import Recording, Shown
 from pipeline.stage import Outcome, Work
-from pipeline.study import Study
+from pipeline.study.settings import Study
 from pipeline.trials import coordinates, selections_by_trial, told, with_movements
 
 _UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}

@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import results, study_tables, tables
+from pipeline import results, tables
 from pipeline.comparisons import compared, everything_asked
 from pipeline.design_check import findings
 from pipeline.errors import PipelineError
 from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
 from pipeline.simulated import reductions
-from pipeline.simulation_settings import SelectionSimulation
 from pipeline.stage import Outcome, Work
 from pipeline.stages.measure import ALL_DATA
 from pipeline.statistics.descriptive import described
-from pipeline.study import Study
+from pipeline.study import csv_tables as study_tables
+from pipeline.study.settings import Study
+from pipeline.study.simulation import SelectionSimulation
 from pipeline.wording import measure_order
 
 Row = dict[str, Any]

@@ -7,7 +7,7 @@ import pyarrow as pa
 from pipeline import recording, tables
 from pipeline.recording import Shown
 from pipeline.stage import Outcome, Work
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 
 def run(work: Work) -> Outcome:

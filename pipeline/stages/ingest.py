@@ -15,7 +15,7 @@ from pipeline.formats import read_log
 from pipeline.formats.log import Log, Readings, Wanted
 from pipeline.quality import clock_went_back, quality_row
 from pipeline.stage import Outcome, Work
-from pipeline.study import Session, Stream, Study
+from pipeline.study.settings import Session, Stream, Study
 
 Row = dict[str, Any]
 MM_PER_M = 1000.0

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import movements, orders, study_tables, tables
+from pipeline import movements, orders, tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.stage import Outcome, Work
-from pipeline.study import Exclusion, Study
+from pipeline.study import csv_tables as study_tables
+from pipeline.study.settings import Exclusion, Study
 from pipeline.trials import selections_by_trial, with_movements
 
 Row = dict[str, Any]

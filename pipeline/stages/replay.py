@@ -9,7 +9,7 @@ from pipeline import recording, tables
 from pipeline.recording import Recording
 from pipeline.stage import Outcome, Work
 from pipeline.stages.assess import accuracy_row, trial_rows
-from pipeline.study import Study
+from pipeline.study.settings import Study
 
 _Held = tuple[Recording, tuple[str, Samples] | None]
 _last: dict[tuple[Path, str], _Held] = {}

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from pipeline import publication
 from pipeline.errors import PipelineError
-from pipeline.publication import load_publication
-from pipeline.settings_types import Frozen
 from pipeline.statistics.forensics.audit import audit
 from pipeline.statistics.forensics.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
+from pipeline.study import printed as publication
+from pipeline.study.fields import Frozen
+from pipeline.study.printed import load_publication
 from tests.conftest import CLONE
 from tests.pipeline.helpers import Steadyhand, run
 

@@ -16,7 +16,7 @@ from pipeline import recording, tables
 from pipeline.estimators import build_estimator
 from pipeline.stage import Work
 from pipeline.stages import ingest
-from pipeline.study import find_sessions, load_study
+from pipeline.study.settings import find_sessions, load_study
 from tests.conftest import CLONE, real
 from tests.pipeline.helpers import Steadyhand
 

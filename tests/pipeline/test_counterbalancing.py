@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.counterbalancing import assigned, balance, williams_design
-from pipeline.study_tables import read_participants
+from pipeline.study.csv_tables import read_participants
 from tests.pipeline.helpers import Ran, run
 
 CONDITIONS = st.integers(2, 12)

@@ -25,7 +25,7 @@ from pipeline.runner.result import Result
 from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, REPLAY, STAGES
-from pipeline.study import Study, parse, read_yaml
+from pipeline.study.settings import Study, parse, read_yaml
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.dying import POISONED
 from tests.pipeline.helpers import run

@@ -21,7 +21,7 @@ from pipeline.executors import InThisProcess
 from pipeline.exploration import Grid, explore, stated, with_tracker
 from pipeline.exploration_tables import MEASURES, Tracker, differences, means, what_pays
 from pipeline.simulation.session import Setting
-from pipeline.study import load_study
+from pipeline.study.settings import load_study
 from tests.conftest import CLONE
 from tests.pipeline.helpers import Ran, run
 

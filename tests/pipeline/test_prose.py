@@ -20,7 +20,7 @@ from pipeline.prose.references import bibliography, escaped, used
 from pipeline.prose.sentences import Told, sentence, told_of
 from pipeline.sections.comparisons import anchor
 from pipeline.stages.compare import descriptives
-from pipeline.study import Study
+from pipeline.study.settings import Study
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.hostile import HOSTILE
 from tests.pipeline.reference import TASKS, compared, expected, study_of, the

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.session_quality import LIGHTS, Judged, judged, light_of, limits_text
-from pipeline.study import QualityLimits, Study
+from pipeline.study.settings import QualityLimits, Study
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.test_report import checked

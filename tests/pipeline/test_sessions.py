@@ -16,7 +16,7 @@ from pipeline.estimators import build_estimator
 from pipeline.formats.mcap import Message
 from pipeline.stage import Work
 from pipeline.stages import ingest
-from pipeline.study import find_sessions, load_study
+from pipeline.study.settings import find_sessions, load_study
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 

@@ -21,7 +21,7 @@ from pipeline.document import traces
 from pipeline.document.traces import Series, Traces
 from pipeline.stage import Work
 from pipeline.stages import ingest
-from pipeline.study import Session, load_study
+from pipeline.study.settings import Session, load_study
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 

@@ -8,10 +8,10 @@ from functools import reduce
 from math import ceil, floor
 from operator import add
 
-from pipeline.publication import Measure, Parts, Publication, Reduction, Share, Total
 from pipeline.statistics.forensics.cells import described
 from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.printed import Measure, Parts, Publication, Reduction, Share, Total
+from pipeline.study.rounded import Interval, Rounded
 
 _FIGURES = {"mean": "mean", "median": "median", "sd": "SD", "rmse": "RMSE", "participants": "mean"}
 _ONE = Interval(Fraction(1), Fraction(1))

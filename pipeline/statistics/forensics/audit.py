@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from pipeline.publication import Measure, PrintedTest, Publication
 from pipeline.statistics.forensics.arithmetic import count_finding, reduction_findings, share_finding, total_finding
 from pipeline.statistics.forensics.cells import cell_findings
 from pipeline.statistics.forensics.claims import claim_findings, family_findings
@@ -15,6 +14,7 @@ from pipeline.statistics.forensics.from_means import statistic_findings
 from pipeline.statistics.forensics.phrases import label, written_p
 from pipeline.statistics.forensics.recomputed import p_finding
 from pipeline.statistics.forensics.wilcoxon import wilcoxon_finding
+from pipeline.study.printed import Measure, PrintedTest, Publication
 
 
 def audit(publication: Publication) -> list[Finding]:

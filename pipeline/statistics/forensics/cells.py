@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, sqrt
 
-from pipeline.publication import Cell, Measure, Publication, Scale
 from pipeline.statistics.forensics.finding import Finding, Statement
 from pipeline.statistics.forensics.granularity import Steps, possible_sample
-from pipeline.statistics.forensics.rounded import Rounded
+from pipeline.study.printed import Cell, Measure, Publication, Scale
+from pipeline.study.rounded import Rounded
 
 
 @dataclass(frozen=True)

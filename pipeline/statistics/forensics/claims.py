@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from pipeline.publication import Family, Measure, PrintedTest, Publication
 from pipeline.statistics.forensics.finding import Finding, Statement
 from pipeline.statistics.forensics.p_values import Bounds, meets
 from pipeline.statistics.forensics.phrases import label, written, written_p
 from pipeline.statistics.forensics.recomputed import p_left_open
-from pipeline.statistics.forensics.rounded import Rounded
 from pipeline.statistics.multiplicity import adjusted
+from pipeline.study.printed import Family, Measure, PrintedTest, Publication
+from pipeline.study.rounded import Rounded
 from pipeline.wording import counted
 
 Labelled = tuple[Measure, PrintedTest]

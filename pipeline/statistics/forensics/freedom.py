@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from pipeline.publication import Measure, PrintedTest, Publication
 from pipeline.statistics.forensics.finding import Finding, Statement
 from pipeline.statistics.forensics.p_values import DEGREES_OF_FREEDOM
 from pipeline.statistics.forensics.phrases import label, written
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.printed import Measure, PrintedTest, Publication
+from pipeline.study.rounded import Interval, Rounded
 
 WITHIN = ("rm_anova", "art_anova")
 _LESS_THAN_N = {"t_paired": 1, "correlation": 2}

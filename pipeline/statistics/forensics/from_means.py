@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf, sqrt
 
-from pipeline.publication import BETWEEN, Measure, PrintedTest, Publication
 from pipeline.statistics.forensics.cells import Described, described
 from pipeline.statistics.forensics.finding import Finding, Statement
 from pipeline.statistics.forensics.freedom import exactly, freedom
 from pipeline.statistics.forensics.p_values import Bounds
 from pipeline.statistics.forensics.phrases import label, written
+from pipeline.study.printed import BETWEEN, Measure, PrintedTest, Publication
 
 _PAIRED = ("t_paired", "rm_anova")
 _ROUND_OFF = 1e-9

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, isqrt
 
-from pipeline.statistics.forensics.rounded import Interval
+from pipeline.study.rounded import Interval
 
 _MOST_LOOKS = 20_000  # in a search, before a sample counts as possible, unproven
 _MOST_SUMS = 200  # pairs of sums tried before that

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.statistics.forensics.rounded import Interval
+from pipeline.study.rounded import Interval
 
 Symbol = Literal["t", "F", "chi2", "z", "r"]
 Bounds = tuple[float, float]

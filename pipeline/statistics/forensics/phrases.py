@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.publication import Measure, PrintedTest
 from pipeline.statistics.forensics.p_values import Symbol
-from pipeline.statistics.forensics.rounded import Rounded
+from pipeline.study.printed import Measure, PrintedTest
+from pipeline.study.rounded import Rounded
 from pipeline.wording import TESTS
 
 

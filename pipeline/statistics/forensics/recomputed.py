@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from pipeline.publication import Measure, PrintedTest, Publication
 from pipeline.statistics.forensics.finding import Finding, Statement
 from pipeline.statistics.forensics.freedom import WITHIN, freedom, rounded_after_correction
 from pipeline.statistics.forensics.p_values import Bounds, Symbol, meets, p_bounds, p_bounds_corrected
 from pipeline.statistics.forensics.phrases import label, written, written_p
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.printed import Measure, PrintedTest, Publication
+from pipeline.study.rounded import Interval, Rounded
 
 Reading = tuple[str, Bounds]
 """What p may be meant as, and what it then is; the plain ones are named ""."""

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.statistics.forensics.rounded import Interval
+from pipeline.study.rounded import Interval
 
 MOST_FOR_ALL_PATTERNS = 14
 MOST_FOR_NORMAL = 40

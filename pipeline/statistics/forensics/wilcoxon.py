@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import ceil, floor
 
-from pipeline.publication import Measure, PrintedTest, Publication
 from pipeline.statistics.forensics import signed_rank
 from pipeline.statistics.forensics.finding import Finding, Statement
 from pipeline.statistics.forensics.phrases import label, written_p
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.printed import Measure, PrintedTest, Publication
+from pipeline.study.rounded import Interval, Rounded
 
 _METHODS = {None: "exact p or normal approximation", "exact": "exact p", "normal": "normal approximation"}
 

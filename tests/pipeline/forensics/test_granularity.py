@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.statistics.forensics.granularity import Steps, has_sample, possible_sample
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.rounded import Interval, Rounded
 
 WHOLE = Steps(Fraction(1))
 

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from pipeline.publication import Publication
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.forensics.audit import audit
 from pipeline.statistics.forensics.finding import CONTRADICTION
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.rank import friedman, wilcoxon
+from pipeline.study.printed import Publication
 
 Row = dict[str, Any]
 

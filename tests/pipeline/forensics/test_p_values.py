@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from pipeline.statistics.forensics.p_values import Symbol, meets, p_bounds, p_bounds_corrected, p_two_sided
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.rounded import Interval, Rounded
 
 
 def exactly(value: float) -> Interval:

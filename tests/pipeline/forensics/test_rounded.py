@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.statistics.forensics.rounded import Interval, Rounded
+from pipeline.study.rounded import Interval, Rounded
 
 VALUES = st.decimals(-(10**6), 10**6, places=7)
 DIGITS = st.integers(0, 5)

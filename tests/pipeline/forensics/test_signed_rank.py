@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from pipeline.statistics.forensics.rounded import Interval, Rounded
 from pipeline.statistics.forensics.signed_rank import (
     exact_p_possible,
     exact_p_with_sum,
@@ -22,6 +21,7 @@ from pipeline.statistics.forensics.signed_rank import (
     untied_p_possible,
 )
 from pipeline.statistics.rank import signed_rank_p
+from pipeline.study.rounded import Interval, Rounded
 
 
 def at(value: Fraction) -> Interval:

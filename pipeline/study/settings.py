@@ -14,8 +14,8 @@ import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.settings_types import Finite, Frozen, Positive
-from pipeline.simulation_settings import Simulation, Task
+from pipeline.study.fields import Finite, Frozen, Positive
+from pipeline.study.simulation import Simulation, Task
 
 SETTINGS_FILE = "study.yaml"
 TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed", "repeats")  # files of a study

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.settings_types import Finite, Frozen, Positive
+from pipeline.study.fields import Finite, Frozen, Positive
 
 NotNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]

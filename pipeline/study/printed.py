@@ -18,10 +18,10 @@ from pydantic import (
 )
 
 from pipeline.errors import did_you_mean
-from pipeline.settings_types import Frozen
 from pipeline.statistics.forensics.p_values import DEGREES_OF_FREEDOM, Symbol
-from pipeline.statistics.forensics.rounded import Rounded, Rounding
-from pipeline.study import Id, known, parse, read_yaml, unique
+from pipeline.study.fields import Frozen
+from pipeline.study.rounded import Rounded, Rounding
+from pipeline.study.settings import Id, known, parse, read_yaml, unique
 
 BETWEEN = ("t_independent", "welch", "anova")
 """Tests of groups: each has participants of its own."""

@@ -1,0 +1,1 @@
+"""A study as its user gives it: settings, tables, printed figures; read and checked."""
