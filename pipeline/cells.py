@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.result import FloatArray
 from pipeline.study.settings import Comparison, Study
+from pipeline.tables import table as tables
 
 Row = dict[str, Any]
 

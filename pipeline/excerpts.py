@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from fusion_core import FloatArray, Samples, accuracy
-from pipeline import tables
 from pipeline.recording import Recording, Shown
 from pipeline.study.settings import Study
+from pipeline.tables import table as tables
 
 EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
 _SETTLED_S = 1.0

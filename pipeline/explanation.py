@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline import results
 from pipeline.cache import file_digest
-from pipeline.differences import ABSENT, Change
 from pipeline.errors import PipelineError
 from pipeline.provenance import PROVENANCE
+from pipeline.tables import results
+from pipeline.tables.differences import ABSENT, Change
 
 Content = Mapping[str, Any]
 _TOLD_APART = {"comparisons": ("measure", "test"), "variants": ("estimator", "variant")}

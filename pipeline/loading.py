@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline import tables, threads
+from pipeline import threads
 from pipeline.commands import console
 from pipeline.commands.run import PROCESS, cache_in, executor_of, mended, what_befell
 from pipeline.errors import PipelineError, did_you_mean
@@ -19,6 +19,7 @@ from pipeline.runner.result import Result
 from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stages import COMPARE
 from pipeline.study.settings import Session, Study
+from pipeline.tables import table as tables
 
 STAGE_OF: Mapping[str, str] = {
     **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),

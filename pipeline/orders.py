@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline import tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.settings import Session, identifier
+from pipeline.tables import table as tables
 
 Row = dict[str, Any]
 

@@ -10,7 +10,7 @@ from fusion_core import FloatArray, Samples, Sensor
 from fusion_core.alignment import carried, headed, heading, level, nearest, rotate, rotations
 from fusion_core.calibration import Body, Calibration, calibrate, mounted
 from pipeline.study.settings import AccelerationStream
-from pipeline.tables import Columns
+from pipeline.tables.table import Columns
 
 _MM_PER_M = 1000.0
 _HEADING_SD_RAD = 0.3  # above it an orientation is not known

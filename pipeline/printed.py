@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import tables
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.forensics.audit import audit
 from pipeline.statistics.forensics.phrases import label
 from pipeline.study.printed import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
 from pipeline.study.rounded import Rounded
+from pipeline.tables import table as tables
 
 Row = dict[str, Any]
 _STATISTIC_NAMES = {"t": "t", "F": "F", "chi2": "chi2", "W": "W+"}

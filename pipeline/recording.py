@@ -14,7 +14,6 @@ import pyarrow.compute as pc
 from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.alignment import nearest, rotate
 from fusion_core.calibration import Body
-from pipeline import tables
 from pipeline.estimators import build_estimator, sensor, sensors
 from pipeline.phone import Phone, aligned, phone
 from pipeline.study.settings import (
@@ -27,7 +26,8 @@ from pipeline.study.settings import (
     Study,
     VelocityStream,
 )
-from pipeline.tables import Columns
+from pipeline.tables import table as tables
+from pipeline.tables.table import Columns
 
 SMOOTHED = "smoothed"  # the name of the reference that a study without one gets
 _AXES = ("x", "y", "z")

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import movements, tables
+from pipeline import movements
 from pipeline.movements import FloatArray
+from pipeline.tables import table as tables
 
 Row = Mapping[str, Any]
 _TOLD = ["trial", "start_s", "selection_s", "left_s"]

@@ -10,7 +10,6 @@ import pytest
 import yaml
 
 from fusion_core import ESTIMATORS
-from pipeline import tables
 from pipeline.study.csv_tables import (
     MEASURE_REQUIRED,
     MEASURE_RESERVED,
@@ -20,6 +19,7 @@ from pipeline.study.csv_tables import (
 )
 from pipeline.study.fields import Frozen
 from pipeline.study.settings import KINDS, Comparison, Display, OperatorTerm, QualityLimits, Study, load_study, parse
+from pipeline.tables import table as tables
 from tests.conftest import CLONE
 
 REFERENCE = (CLONE / "studies" / "README.md").read_text(encoding="utf-8")

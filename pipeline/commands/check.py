@@ -10,14 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipeline import differences, results
 from pipeline.commands import console, junit
 from pipeline.commands.junit import Case, Suite
 from pipeline.commands.run import for_each, what_befell
-from pipeline.differences import Change, Figures
 from pipeline.errors import PipelineError
 from pipeline.runner.result import Result
 from pipeline.stages import COMPARE
+from pipeline.tables import differences, results
+from pipeline.tables.differences import Change, Figures
 
 EXPECTED = "expected.json"
 MOVED = 3  # the exit code

@@ -9,13 +9,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from pipeline import differences, explanation, results
+from pipeline import explanation
 from pipeline.commands import console
 from pipeline.commands.check import MOVED
-from pipeline.differences import ABSENT, Change, Differences, Identified
 from pipeline.errors import PipelineError
 from pipeline.explanation import Explanation, Made
 from pipeline.study.settings import SETTINGS_FILE
+from pipeline.tables import differences, results
+from pipeline.tables.differences import ABSENT, Change, Differences, Identified
 from pipeline.wording import counted
 
 _RESULTS = "results.json"

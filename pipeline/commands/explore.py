@@ -126,10 +126,10 @@ def _names(option: str, text: str | None, most: int = _VALUES) -> tuple[str, ...
 
 
 def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]]) -> Explored:
-    from pipeline import tables
     from pipeline.exploration import stated
     from pipeline.exploration_tables import MEASURES, differences, means, what_pays
     from pipeline.sections.exploration import Explored
+    from pipeline.tables import table as tables
 
     people, own = tables.frame("explore_people", rows), grid.nearest(stated(setting))
     found = {
@@ -143,10 +143,11 @@ def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]
 
 def _write(explored: Explored, grid: Grid, target: Path) -> None:
     """The pages, results.json and the tables, each whole or not at all."""
-    from pipeline import results, tables
     from pipeline.commands.publish import copy, publish_exploration
     from pipeline.document import html, pdf
     from pipeline.sections.exploration import document
+    from pipeline.tables import results
+    from pipeline.tables import table as tables
 
     study = {"name": explored.name, "title": explored.study.title, "alpha": explored.study.alpha}
     settings: Mapping[str, Any] = {**study, "own_tracker": explored.own._asdict(), **asdict(grid)}

@@ -7,11 +7,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline import tables
 from pipeline.commands import console
 from pipeline.errors import PipelineError, SessionError
 from pipeline.formats import read_log
 from pipeline.quality import quality_row
+from pipeline.tables import table as tables
 from pipeline.wording import number
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline import results, tables
 from pipeline.cache import Entry
 from pipeline.commands import console
 from pipeline.commands.publish import copy, publish_provenance, refuse_inputs, refuse_study
@@ -26,6 +25,8 @@ from pipeline.sections.replay import document
 from pipeline.stage import Stage
 from pipeline.stages import INGEST, REPLAY
 from pipeline.study.settings import Session, load_study
+from pipeline.tables import results
+from pipeline.tables import table as tables
 from pipeline.variants import Variant, read_changes, read_estimators, variants
 from pipeline.wording import interval, number, seconds
 

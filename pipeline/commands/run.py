@@ -9,7 +9,6 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipeline import results
 from pipeline.cache import Cache
 from pipeline.commands import console
 from pipeline.commands.publish import FORMATS, publish, publish_results, refuse_study
@@ -21,6 +20,7 @@ from pipeline.runner.result import Result
 from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stage import Stage
 from pipeline.stages import COMPARE, STAGES
+from pipeline.tables import results
 
 _CLONE = Path(__file__).resolve().parents[2]
 CACHE_FOLDER = ".steadyhand-cache"

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pandas as pd
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.figures import captions
 from pipeline.recording import SMOOTHED
 from pipeline.sections.material import Material, Row
+from pipeline.tables import table as tables
 from pipeline.wording import NOTHING, counted, number, percent, seconds
 
 _ROWS_MAX = 40

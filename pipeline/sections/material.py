@@ -11,11 +11,12 @@ from typing import Any
 import matplotlib.figure
 import pandas as pd
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.document.model import Figure
 from pipeline.figures import captions
 from pipeline.side_by_side import Job
 from pipeline.study.settings import Session, Study
+from pipeline.tables import table as tables
 from pipeline.wording import listing
 
 Row = Mapping[str, Any]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pandas as pd
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.document.model import Block, Section
 from pipeline.figures import captions
 from pipeline.figures.canvas import Plane
 from pipeline.sections.material import Material, first_of
+from pipeline.tables import table as tables
 
 _SESSIONS_MAX = 48  # drawn; a page of more would be slow to open
 _READ = ("tracks", "positions", "events")

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pipeline import figures, session_quality, tables
+from pipeline import figures, session_quality
 from pipeline.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.figures import captions
 from pipeline.sections import timeline
 from pipeline.sections.material import Material, Row
 from pipeline.sections.without_exclusions import without_exclusions
 from pipeline.session_quality import FACTS, LIGHTS, SYMBOLS, Judged, light_of
+from pipeline.tables import table as tables
 from pipeline.wording import NOTHING, counted, listing, measure_label, number
 
 _ROWS_MAX = 40  # a page stays readable; tables/quality.csv has them all

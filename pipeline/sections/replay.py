@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.document.model import (
     Block,
     Column,
@@ -25,6 +25,7 @@ from pipeline.recording import SMOOTHED
 from pipeline.sections.accuracy import SMOOTHED_REMARK
 from pipeline.sections.material import ORIGINS
 from pipeline.sections.provenance import libraries
+from pipeline.tables import table as tables
 from pipeline.wording import NOTHING, counted, interval, number, percent, seconds
 
 Row = Mapping[str, Any]

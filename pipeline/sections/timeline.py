@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.document.model import Block
 from pipeline.figures import captions
 from pipeline.sections.material import Material, first_of
+from pipeline.tables import table as tables
 
 _SESSIONS_MAX = 24  # a page holds no more rows
 

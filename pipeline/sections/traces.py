@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import recording, tables
+from pipeline import recording
 from pipeline.document import traces
 from pipeline.document.traces import Kind, Series, Traces
 from pipeline.sections.material import ORIGINS, Material
 from pipeline.study.settings import Session
+from pipeline.tables import table as tables
 
 PAGE = "traces.html"
 _KINDS: dict[str, Kind] = {"position": "tracker", "display": "display", "reference": "reference"}

@@ -11,12 +11,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusion_core import FloatArray, Samples, accuracy, noise
-from pipeline import excerpts, movements, recording, tables
+from pipeline import excerpts, movements, recording
 from pipeline.estimators import sensors
 from pipeline.phone import described
 from pipeline.recording import Recording, Shown
 from pipeline.stage import Outcome, Work
 from pipeline.study.settings import Study
+from pipeline.tables import table as tables
 from pipeline.trials import coordinates, selections_by_trial, told, with_movements
 
 _UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}

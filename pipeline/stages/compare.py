@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import results, tables
 from pipeline.comparisons import compared, everything_asked
 from pipeline.design_check import findings
 from pipeline.errors import PipelineError
@@ -22,6 +21,8 @@ from pipeline.statistics.descriptive import described
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
+from pipeline.tables import results
+from pipeline.tables import table as tables
 from pipeline.wording import measure_order
 
 Row = dict[str, Any]

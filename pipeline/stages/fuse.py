@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from pipeline import recording, tables
+from pipeline import recording
 from pipeline.recording import Shown
 from pipeline.stage import Outcome, Work
 from pipeline.study.settings import Study
+from pipeline.tables import table as tables
 
 
 def run(work: Work) -> Outcome:

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import movements, orders, tables
+from pipeline import movements, orders
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.stage import Outcome, Work
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Exclusion, Study
+from pipeline.tables import table as tables
 from pipeline.trials import selections_by_trial, with_movements
 
 Row = dict[str, Any]

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from fusion_core import Samples
-from pipeline import recording, tables
+from pipeline import recording
 from pipeline.recording import Recording
 from pipeline.stage import Outcome, Work
 from pipeline.stages.assess import accuracy_row, trial_rows
 from pipeline.study.settings import Study
+from pipeline.tables import table as tables
 
 _Held = tuple[Recording, tuple[str, Samples] | None]
 _last: dict[tuple[Path, str], _Held] = {}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 
-from pipeline import results, tables
 from pipeline.document import html, pdf
 from pipeline.document.model import Document
 from pipeline.sections import SECTIONS, glossary, participants, paste, traces
 from pipeline.sections.material import ORIGINS, Material
 from pipeline.side_by_side import Job, another_process, carry_out
 from pipeline.stage import Outcome, Work
+from pipeline.tables import results
+from pipeline.tables import table as tables
 
 _FROM_COMPARE = (
     "trials",

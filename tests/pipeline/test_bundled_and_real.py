@@ -12,11 +12,12 @@ import pytest
 import yaml
 
 from fusion_core.accuracy import interpolate, rmse
-from pipeline import recording, tables
+from pipeline import recording
 from pipeline.estimators import build_estimator
 from pipeline.stage import Work
 from pipeline.stages import ingest
 from pipeline.study.settings import find_sessions, load_study
+from pipeline.tables import table as tables
 from tests.conftest import CLONE, real
 from tests.pipeline.helpers import Steadyhand
 

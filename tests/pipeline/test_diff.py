@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import differences, explanation, results
+from pipeline import explanation
 from pipeline.commands import replay
-from pipeline.differences import ABSENT, OF_A_REPLAY, OF_A_STUDY, between, changes
-from pipeline.tables import TABLES
+from pipeline.tables import differences, results
+from pipeline.tables.differences import ABSENT, OF_A_REPLAY, OF_A_STUDY, between, changes
+from pipeline.tables.table import TABLES
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, run
 

@@ -15,13 +15,13 @@ import pytest
 from pypdf import PdfReader
 from scipy import stats
 
-from pipeline import tables
 from pipeline.errors import WorkerLostError
 from pipeline.executors import InThisProcess
 from pipeline.exploration import Grid, explore, stated, with_tracker
 from pipeline.exploration_tables import MEASURES, Tracker, differences, means, what_pays
 from pipeline.simulation.session import Setting
 from pipeline.study.settings import load_study
+from pipeline.tables import table as tables
 from tests.conftest import CLONE
 from tests.pipeline.helpers import Ran, run
 

@@ -14,10 +14,10 @@ import pandas as pd
 import pytest
 
 import pipeline
-from pipeline import results
-from pipeline import tables as stored
 from pipeline.errors import PipelineError
 from pipeline.loading import STAGE_OF, Tables
+from pipeline.tables import results
+from pipeline.tables import table as stored
 from tests.conftest import CLONE, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 

@@ -15,9 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fusion_core import FloatArray
-from pipeline import movements, tables
+from pipeline import movements
 from pipeline.formats.mcap import Message
 from pipeline.movements import Path as HandPath
+from pipeline.tables import table as tables
 from pipeline.trials import selections_by_trial
 from pipeline.wording import measure_label, unit_of
 from tests.conftest import STREAMS, session_messages, write_session

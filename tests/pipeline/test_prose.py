@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pypdf import PdfReader
 
-from pipeline import tables
 from pipeline.comparisons import compared as rows_of
 from pipeline.prose.glossary import explained
 from pipeline.prose.references import bibliography, escaped, used
@@ -21,6 +20,7 @@ from pipeline.prose.sentences import Told, sentence, told_of
 from pipeline.sections.comparisons import anchor
 from pipeline.stages.compare import descriptives
 from pipeline.study.settings import Study
+from pipeline.tables import table as tables
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.hostile import HOSTILE
 from tests.pipeline.reference import TASKS, compared, expected, study_of, the

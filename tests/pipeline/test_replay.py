@@ -14,9 +14,9 @@ import pytest
 from pypdf import PdfReader
 from scipy import stats
 
-from pipeline import tables
 from pipeline.ranking import ranked
 from pipeline.statistics.descriptive import described
+from pipeline.tables import table as tables
 from pipeline.variants import read_changes
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, Steadyhand

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from fusion_core import replay_loop
-from pipeline import recording, tables
+from pipeline import recording
 from pipeline.estimators import build_estimator
 from pipeline.formats.mcap import Message
 from pipeline.stage import Work
 from pipeline.stages import ingest
 from pipeline.study.settings import find_sessions, load_study
+from pipeline.tables import table as tables
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 

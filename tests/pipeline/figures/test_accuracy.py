@@ -10,9 +10,10 @@ import pytest
 from matplotlib.collections import LineCollection
 from scipy import stats
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.figures import captions
 from pipeline.figures.accuracy import nine_of_ten, shares
+from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 
 

@@ -10,8 +10,9 @@ import pytest
 from matplotlib.figure import Figure
 from scipy import stats
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.figures import captions
+from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 
 TIMES = pd.DataFrame(

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.figures import captions
 from pipeline.figures.sensors import errors_in
+from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import saved, texts
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline import figures, tables
+from pipeline import figures
 from pipeline.figures import captions
 from pipeline.figures.timeline import silences
+from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 
 SECOND = 1_000_000_000

@@ -10,10 +10,10 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline import tables
-from pipeline.differences import OF_A_REPLAY, OF_A_STUDY
 from pipeline.errors import PipelineError
 from pipeline.study.settings import Study
+from pipeline.tables import table as tables
+from pipeline.tables.differences import OF_A_REPLAY, OF_A_STUDY
 
 SCHEMA_VERSION = 1
 LISTS = (

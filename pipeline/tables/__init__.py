@@ -1,0 +1,1 @@
+"""The tables every stage speaks, and results.json."""
