@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline import threads
+from pipeline.engine import threads
 
 _INTERRUPTED = 130
 

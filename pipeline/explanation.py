@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.cache import file_digest
+from pipeline.engine.cache import file_digest
+from pipeline.engine.provenance import PROVENANCE
 from pipeline.errors import PipelineError
-from pipeline.provenance import PROVENANCE
 from pipeline.tables import results
 from pipeline.tables.differences import ABSENT, Change
 

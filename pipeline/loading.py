@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline import threads
 from pipeline.commands import console
 from pipeline.commands.run import PROCESS, cache_in, executor_of, mended, what_befell
+from pipeline.engine import threads
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date
 from pipeline.stages import COMPARE
 from pipeline.study.settings import Session, Study
 from pipeline.tables import table as tables

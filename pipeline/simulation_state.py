@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from pipeline.cache import code_digest, digest_of
+from pipeline.engine.cache import code_digest, digest_of
 from pipeline.study.settings import Study
 
 MADE = "simulated.json"

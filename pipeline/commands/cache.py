@@ -7,13 +7,13 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.cache import Cache
 from pipeline.commands import console
 from pipeline.commands.run import cache_in
+from pipeline.engine.cache import Cache
+from pipeline.engine.housekeeping import Held, held, prune, verify
+from pipeline.engine.run import current_entries
 from pipeline.errors import PipelineError
-from pipeline.runner.up_to_date import current_entries
 from pipeline.stages import STAGES
-from pipeline.upkeep import Held, held, prune, verify
 
 _DAY_S = 24 * 3600.0
 _MB = 1e6

@@ -13,8 +13,8 @@ from typing import Any
 from pipeline.commands import console, junit
 from pipeline.commands.junit import Case, Suite
 from pipeline.commands.run import for_each, what_befell
+from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
-from pipeline.runner.result import Result
 from pipeline.stages import COMPARE
 from pipeline.tables import differences, results
 from pipeline.tables.differences import Change, Figures

@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from pipeline.runner.means import Progress
+from pipeline.engine.resources import Progress
 
 _LABELS = {
     "ingest": "reading logs",

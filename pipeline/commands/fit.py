@@ -11,9 +11,9 @@ import numpy as np
 from pipeline import recording
 from pipeline.commands import console
 from pipeline.commands.run import for_each
+from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.fitting import Fit, Parameter, fit
-from pipeline.runner.result import Result
 from pipeline.stages import INGEST
 
 

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline.cache import code_digest, file_digest, versions
+from pipeline.engine.cache import code_digest, file_digest, versions
+from pipeline.engine.provenance import LIBRARIES, PROVENANCE
+from pipeline.engine.result import Result
+from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
-from pipeline.provenance import LIBRARIES, PROVENANCE
-from pipeline.runner.result import Result
-from pipeline.stage import Stage
 from pipeline.stages import COMPARE, INGEST, REPLAY
 from pipeline.study.settings import SETTINGS_FILE, Study
 

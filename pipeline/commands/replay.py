@@ -11,18 +11,18 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.cache import Entry
 from pipeline.commands import console
 from pipeline.commands.publish import copy, publish_provenance, refuse_inputs, refuse_study
 from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
 from pipeline.document import html, pdf
+from pipeline.engine.cache import Entry
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date, over_settings
+from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
 from pipeline.ranking import ranked
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date, over_settings
 from pipeline.sections.replay import document
-from pipeline.stage import Stage
 from pipeline.stages import INGEST, REPLAY
 from pipeline.study.settings import Session, load_study
 from pipeline.tables import results

@@ -9,16 +9,16 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipeline.cache import Cache
 from pipeline.commands import console
 from pipeline.commands.publish import FORMATS, publish, publish_results, refuse_study
 from pipeline.commands.summary import summary
+from pipeline.engine.cache import Cache
+from pipeline.engine.processes import InThisProcess, Processes
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date
+from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.executors import InThisProcess, Processes
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date
-from pipeline.stage import Stage
 from pipeline.stages import COMPARE, STAGES
 from pipeline.tables import results
 
@@ -51,7 +51,7 @@ def executor_of(jobs: int | None, where: str = PROCESS) -> Iterator[Executor]:
             yield processes
     elif where == DASK or (where.startswith(f"{DASK}://") and where != f"{DASK}://"):
         _require_dask(where)
-        from pipeline.dask_cluster import on_dask
+        from pipeline.engine.dask_cluster import on_dask
 
         with on_dask(where.partition("://")[2] or None, count, console.warn) as cluster:
             yield cluster

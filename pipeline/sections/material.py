@@ -13,8 +13,8 @@ import pandas as pd
 
 from pipeline import figures
 from pipeline.document.model import Figure
+from pipeline.engine.two_processes import Job
 from pipeline.figures import captions
-from pipeline.side_by_side import Job
 from pipeline.study.settings import Session, Study
 from pipeline.tables import table as tables
 from pipeline.wording import listing

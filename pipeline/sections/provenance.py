@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import platform
 
-from pipeline.cache import versions
 from pipeline.document.model import Column, Paragraph, Section, Table
-from pipeline.provenance import LIBRARIES
+from pipeline.engine.cache import versions
+from pipeline.engine.provenance import LIBRARIES
 from pipeline.sections.material import Material
 from pipeline.wording import counted
 

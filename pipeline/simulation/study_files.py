@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.cache import digest_of
 from pipeline.counterbalancing import assigned
+from pipeline.engine.cache import digest_of
 from pipeline.errors import PipelineError
 from pipeline.simulation.log import write_log
 from pipeline.simulation.session import Outcome, Setting, simulate

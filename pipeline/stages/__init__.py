@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.stage import Stage
+from pipeline.engine.stage import Stage
 from pipeline.study.settings import Study
 
 STAGES: tuple[Stage, ...] = (

@@ -12,10 +12,10 @@ import pyarrow.compute as pc
 
 from fusion_core import FloatArray, Samples, accuracy, noise
 from pipeline import excerpts, movements, recording
+from pipeline.engine.stage import Outcome, Work
 from pipeline.estimators import sensors
 from pipeline.phone import described
 from pipeline.recording import Recording, Shown
-from pipeline.stage import Outcome, Work
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.trials import coordinates, selections_by_trial, told, with_movements

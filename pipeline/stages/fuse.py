@@ -5,8 +5,8 @@ from __future__ import annotations
 import pyarrow as pa
 
 from pipeline import recording
+from pipeline.engine.stage import Outcome, Work
 from pipeline.recording import Shown
-from pipeline.stage import Outcome, Work
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 

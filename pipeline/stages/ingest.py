@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import SessionError, did_you_mean
 from pipeline.formats import read_log
 from pipeline.formats.log import Log, Readings, Wanted
 from pipeline.quality import clock_went_back, quality_row
-from pipeline.stage import Outcome, Work
 from pipeline.study.settings import Session, Stream, Study
 from pipeline.tables import table as tables
 

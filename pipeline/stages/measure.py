@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline import movements, orders
+from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.stage import Outcome, Work
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Exclusion, Study
 from pipeline.tables import table as tables

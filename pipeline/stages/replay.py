@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fusion_core import Samples
 from pipeline import recording
+from pipeline.engine.stage import Outcome, Work
 from pipeline.recording import Recording
-from pipeline.stage import Outcome, Work
 from pipeline.stages.assess import accuracy_row, trial_rows
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables

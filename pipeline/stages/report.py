@@ -6,10 +6,10 @@ from concurrent.futures import Executor
 
 from pipeline.document import html, pdf
 from pipeline.document.model import Document
+from pipeline.engine.stage import Outcome, Work
+from pipeline.engine.two_processes import Job, another_process, carry_out
 from pipeline.sections import SECTIONS, glossary, participants, paste, traces
 from pipeline.sections.material import ORIGINS, Material
-from pipeline.side_by_side import Job, another_process, carry_out
-from pipeline.stage import Outcome, Work
 from pipeline.tables import results
 from pipeline.tables import table as tables
 

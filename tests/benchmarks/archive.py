@@ -19,13 +19,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipeline.cache import Cache
 from pipeline.commands.console import PlainLines
 from pipeline.commands.run import executor_of
-from pipeline.executors import InThisProcess, Processes
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date
+from pipeline.engine.cache import Cache
+from pipeline.engine.processes import InThisProcess, Processes
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date
 from pipeline.stages import COMPARE, INGEST
 from tests.benchmarks.stock import stock_arrays
 from tests.conftest import CLONE, STREAMS, session_messages, write_session

@@ -6,7 +6,7 @@ import os
 import signal
 from pathlib import Path
 
-from pipeline.stage import Outcome, Work
+from pipeline.engine.stage import Outcome, Work
 from pipeline.stages import fuse, replay
 
 POISONED = "P1_a"

@@ -13,8 +13,8 @@ import yaml
 
 from fusion_core.accuracy import interpolate, rmse
 from pipeline import recording
+from pipeline.engine.stage import Work
 from pipeline.estimators import build_estimator
-from pipeline.stage import Work
 from pipeline.stages import ingest
 from pipeline.study.settings import find_sessions, load_study
 from pipeline.tables import table as tables

@@ -18,9 +18,9 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.cache import Cache
+from pipeline.engine.cache import Cache
+from pipeline.engine.housekeeping import held, prune
 from pipeline.stages import fuse
-from pipeline.upkeep import held, prune
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, Steadyhand, run
 

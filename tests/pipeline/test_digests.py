@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import digests
-from pipeline.cache import Cache, fault_of, file_digest
+from pipeline.engine import input_digests as digests
+from pipeline.engine.cache import Cache, fault_of, file_digest
 
 LONG_AGO_NS = 1_000_000_000_000_000_000
 
@@ -25,7 +25,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return file_digest(path)
 
     monkeypatch.setattr(digests, "file_digest", watched)
-    monkeypatch.setattr("pipeline.cache.file_digest", watched)
+    monkeypatch.setattr("pipeline.engine.cache.file_digest", watched)
     return names
 
 

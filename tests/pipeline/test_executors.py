@@ -14,16 +14,16 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import threads
-from pipeline.cache import Cache
 from pipeline.commands.console import PlainLines
 from pipeline.commands.run import executor_of
+from pipeline.engine import threads
+from pipeline.engine.cache import Cache
+from pipeline.engine.processes import Processes
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date, over_settings
+from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError, WorkerLostError
-from pipeline.executors import Processes
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date, over_settings
-from pipeline.stage import Stage
 from pipeline.stages import COMPARE, REPLAY, STAGES
 from pipeline.study.settings import Study, parse, read_yaml
 from tests.conftest import STREAMS, session_messages, write_session
@@ -87,7 +87,7 @@ def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where there are many variants, a process computes those of a session in one go."""
-    monkeypatch.setattr("pipeline.runner.entries._ENOUGH", 1)
+    monkeypatch.setattr("pipeline.engine.entries._ENOUGH", 1)
     settings = [
         parse(Study, {**read_yaml(study / "study.yaml"), "estimators": {name: {"type": "raw"}}}, study)
         for name in ("first", "held", "last")
@@ -112,7 +112,7 @@ def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(
     """To the same bytes, report and all; what a process that died of it costs is said."""
     with executor_of(1, "inline") as executor:
         here = bring_up_to_date(study, STAGES, Means(Cache(tmp_path / "here"), executor, PlainLines()))
-    monkeypatch.setattr("pipeline.runner.entries._ARCHIVE", 1)
+    monkeypatch.setattr("pipeline.engine.entries._ARCHIVE", 1)
     with Processes(1) as executor:
         means = Means(Cache(tmp_path / "apart"), executor, PlainLines())
         apart = bring_up_to_date(study, STAGES, means)
@@ -156,7 +156,7 @@ def test_dask_workers_give_the_same_entries_also_where_one_is_killed(
 
 def test_workers_with_other_code_are_refused() -> None:
     pytest.importorskip("distributed")
-    from pipeline.dask_cluster import _guarded
+    from pipeline.engine.dask_cluster import _guarded
 
     with pytest.raises(PipelineError, match="do not run the same Steadyhand as this command"):
         _guarded("0" * 64, [], str, (1,), {})
@@ -164,7 +164,7 @@ def test_workers_with_other_code_are_refused() -> None:
 
 def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    from pipeline import dask_cluster
+    from pipeline.engine import dask_cluster
 
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.5)
     with pytest.raises(PipelineError, match="no Dask scheduler answers there"), executor_of(1, "dask://127.0.0.1:1"):

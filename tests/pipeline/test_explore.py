@@ -15,8 +15,8 @@ import pytest
 from pypdf import PdfReader
 from scipy import stats
 
+from pipeline.engine.processes import InThisProcess
 from pipeline.errors import WorkerLostError
-from pipeline.executors import InThisProcess
 from pipeline.exploration import Grid, explore, stated, with_tracker
 from pipeline.exploration_tables import MEASURES, Tracker, differences, means, what_pays
 from pipeline.simulation.session import Setting

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import cache as cache_module
-from pipeline.cache import Cache, code_digest
 from pipeline.commands.console import PlainLines
-from pipeline.executors import InThisProcess
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.up_to_date import bring_up_to_date
+from pipeline.engine import cache as cache_module
+from pipeline.engine.cache import Cache, code_digest
+from pipeline.engine.processes import InThisProcess
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date
 from pipeline.stages import COMPARE, STAGES
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand

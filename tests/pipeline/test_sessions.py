@@ -12,9 +12,9 @@ import pytest
 
 from fusion_core import replay_loop
 from pipeline import recording
+from pipeline.engine.stage import Work
 from pipeline.estimators import build_estimator
 from pipeline.formats.mcap import Message
-from pipeline.stage import Work
 from pipeline.stages import ingest
 from pipeline.study.settings import find_sessions, load_study
 from pipeline.tables import table as tables

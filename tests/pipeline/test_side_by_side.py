@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import side_by_side
-from pipeline.side_by_side import Job
+from pipeline.engine import two_processes as side_by_side
+from pipeline.engine.two_processes import Job
 
 
 def note(folder: Path, number: int) -> None:

@@ -19,7 +19,7 @@ from hypothesis.extra.numpy import arrays
 from pipeline import recording
 from pipeline.document import traces
 from pipeline.document.traces import Series, Traces
-from pipeline.stage import Work
+from pipeline.engine.stage import Work
 from pipeline.stages import ingest
 from pipeline.study.settings import Session, load_study
 from tests.conftest import STREAMS, session_messages, write_session

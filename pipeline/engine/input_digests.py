@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from pipeline.cache import digest_of, file_digest
+from pipeline.engine.cache import digest_of, file_digest
 
 _SETTLED_NS = 2_000_000_000  # coarser than any file system's clock: a later change shows in the times
 _Stamp = list[int]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.cache import Entry, code_digest, digest_of
-from pipeline.runner.result import Result
-from pipeline.stage import Stage, Work
+from pipeline.engine.cache import Entry, code_digest, digest_of
+from pipeline.engine.result import Result
+from pipeline.engine.stage import Stage, Work
 from pipeline.study.settings import Session, Study
 
 

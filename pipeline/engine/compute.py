@@ -9,9 +9,9 @@ from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
 
-from pipeline.cache import Cache, Entry, digest_of
+from pipeline.engine.cache import Cache, Entry, digest_of
+from pipeline.engine.stage import Outcome, Stage, Work
 from pipeline.errors import PipelineError, SessionError
-from pipeline.stage import Outcome, Stage, Work
 
 Piece = tuple[Work, str]
 """A piece of work, and the key of its result."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipeline.cache import Entry
+from pipeline.engine.cache import Entry
 from pipeline.study.settings import Session, Study
 
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.cache import Cache, Entry
+from pipeline.engine.cache import Cache, Entry
+from pipeline.engine.entries import entries_of, entry_of_study
+from pipeline.engine.keys import seen_by, work_and_key
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.stage import Stage
+from pipeline.engine.usable_sessions import found_in, require_something, still_usable
 from pipeline.errors import PipelineError
-from pipeline.runner.entries import entries_of, entry_of_study
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.runner.sessions import found_in, require_something, still_usable
-from pipeline.runner.work import seen_by, work_and_key
-from pipeline.stage import Stage
 from pipeline.study.settings import Session, Study
 
 

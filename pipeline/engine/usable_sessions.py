@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.cache import Cache, Entry
-from pipeline.digests import remembered
+from pipeline.engine.cache import Cache, Entry
+from pipeline.engine.input_digests import remembered
+from pipeline.engine.result import Result
+from pipeline.engine.stage import Outcome
 from pipeline.errors import PipelineError
-from pipeline.runner.result import Result
-from pipeline.stage import Outcome
 from pipeline.study.settings import TABLE_FIELDS, Session, Study, find_sessions, load_study
 
 

@@ -6,7 +6,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Protocol
 
-from pipeline.cache import Cache
+from pipeline.engine.cache import Cache
 
 
 class Progress(Protocol):

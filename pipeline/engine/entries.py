@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 
-from pipeline.cache import Cache, Entry
+from pipeline.engine.cache import Cache, Entry
+from pipeline.engine.compute import Piece, compute, compute_all, keep_unusable
+from pipeline.engine.processes import InThisProcess, in_a_process_of_its_own
+from pipeline.engine.resources import Means
+from pipeline.engine.result import Result
+from pipeline.engine.stage import Stage, Work
 from pipeline.errors import PipelineError, WorkerLostError
-from pipeline.executors import InThisProcess, in_a_process_of_its_own
-from pipeline.runner.compute import Piece, compute, compute_all, keep_unusable
-from pipeline.runner.means import Means
-from pipeline.runner.result import Result
-from pipeline.stage import Stage, Work
 
 _AHEAD = 256  # groups of pieces handed to the executor before they are needed: more than a cluster has processes
 _TOGETHER = 8  # pieces of one session in a group, whose recording is then loaded once

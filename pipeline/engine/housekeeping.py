@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.cache import Cache, fault_of, last_used_s
+from pipeline.engine.cache import Cache, fault_of, last_used_s
 
 _REMNANT_S = 24 * 3600.0  # a run that still writes is younger
 

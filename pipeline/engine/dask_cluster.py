@@ -14,10 +14,10 @@ import dask
 from distributed import Client, LocalCluster, WorkerPlugin
 from distributed.scheduler import KilledWorker
 
-from pipeline import threads
-from pipeline.cache import code_digest
+from pipeline.engine import threads
+from pipeline.engine.cache import code_digest
+from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, WorkerLostError
-from pipeline.stage import Work
 
 _STAGES = "pipeline.stages"  # its digest follows the code of every stage
 _CONNECT_S = 10.0
