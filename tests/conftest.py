@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from pipeline.formats.mcap import Message, in_order, write
+from pipeline.sessions.logs.mcap import Message, in_order, write
 from tests.pipeline.helpers import Steadyhand
 
 # No test is timed: a busy machine, or the first use of a table of all characters, is no fault of what is tested.

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import recording
 from pipeline.commands import console
 from pipeline.commands.run import for_each
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
-from pipeline.fitting import Fit, Parameter, fit
+from pipeline.sessions import recording
+from pipeline.sessions.fitting import Fit, Parameter, fit
 from pipeline.stages import INGEST
 
 

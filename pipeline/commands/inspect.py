@@ -9,8 +9,8 @@ from pathlib import Path
 
 from pipeline.commands import console
 from pipeline.errors import PipelineError, SessionError
-from pipeline.formats import read_log
-from pipeline.quality import quality_row
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.stream_quality import quality_row
 from pipeline.tables import table as tables
 from pipeline.wording import number
 

@@ -23,11 +23,11 @@ from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
 from pipeline.ranking import ranked
 from pipeline.sections.replay import document
+from pipeline.sessions.variants import Variant, read_changes, read_estimators, variants
 from pipeline.stages import INGEST, REPLAY
 from pipeline.study.settings import Session, load_study
 from pipeline.tables import results
 from pipeline.tables import table as tables
-from pipeline.variants import Variant, read_changes, read_estimators, variants
 from pipeline.wording import interval, number, seconds
 
 _PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from pipeline.estimators import build_estimator
+from pipeline.sessions.estimators import build_estimator
 from pipeline.study.settings import Comparison, Sensing, Study
 from pipeline.wording import adjustment, counted, listing, number, subject, unit_of
 

@@ -7,8 +7,8 @@ import pandas as pd
 from pipeline import figures
 from pipeline.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.figures import captions
-from pipeline.recording import SMOOTHED
 from pipeline.sections.material import Material, Row
+from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
 from pipeline.wording import NOTHING, counted, number, percent, seconds
 

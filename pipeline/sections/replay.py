@@ -21,10 +21,10 @@ from pipeline.document.model import (
     Table,
     columns,
 )
-from pipeline.recording import SMOOTHED
 from pipeline.sections.accuracy import SMOOTHED_REMARK
 from pipeline.sections.material import ORIGINS
 from pipeline.sections.provenance import libraries
+from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
 from pipeline.wording import NOTHING, counted, interval, number, percent, seconds
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import recording
 from pipeline.document import traces
 from pipeline.document.traces import Kind, Series, Traces
 from pipeline.sections.material import ORIGINS, Material
+from pipeline.sessions import recording
 from pipeline.study.settings import Session
 from pipeline.tables import table as tables
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.mcap import Message, in_order, write
+from pipeline.sessions.logs.mcap import Message, in_order, write
 from pipeline.simulation.hand_steps import FloatArray, IntArray
 from pipeline.simulation.loop_steps import STEP_NS, TAP_S, TAP_X, TAP_Y
 from pipeline.simulation.sensing import gyroscope

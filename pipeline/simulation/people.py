@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipeline.recording import seeded
+from pipeline.sessions.recording import seeded
 from pipeline.simulation.hand_steps import INTERMITTENT, SECOND_ORDER_LAG, STEP_S, Person, Sway
 from pipeline.study.simulation import SelectionSimulation, Trait
 

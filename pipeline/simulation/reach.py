@@ -10,9 +10,9 @@ import numpy as np
 
 from fusion_core import FloatArray
 from pipeline.errors import PipelineError
-from pipeline.formats.log import Content
-from pipeline.formats.mcap import Message, in_order, write
-from pipeline.recording import seeded
+from pipeline.sessions.logs.log import Content
+from pipeline.sessions.logs.mcap import Message, in_order, write
+from pipeline.sessions.recording import seeded
 from pipeline.simulation.motion import minimum_jerk
 from pipeline.study.settings import AccelerationStream, PositionStream, ReferenceStream, Study, inside
 from pipeline.study.simulation import ReachSimulation

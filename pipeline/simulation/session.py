@@ -11,8 +11,8 @@ import numpy as np
 from fusion_core import Estimator, FloatArray, Samples, Sensor, accuracy
 from fusion_core.alignment import rotate, rotations
 from pipeline.errors import PipelineError
-from pipeline.estimators import build_estimator, sensors
-from pipeline.recording import seeded
+from pipeline.sessions.estimators import build_estimator, sensors
+from pipeline.sessions.recording import seeded
 from pipeline.simulation import layout as layouts
 from pipeline.simulation import loop_steps, people, sensing
 from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, Sway, hand_at

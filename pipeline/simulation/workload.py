@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.recording import seeded
+from pipeline.sessions.recording import seeded
 from pipeline.study.simulation import Workload
 
 

@@ -9,21 +9,21 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "ingest",
         "session",
-        "pipeline.stages.ingest:run",
+        "pipeline.sessions.ingest:run",
         settings=("streams", "events", "conditions"),
         reads_log=True,
     ),
     Stage(
         "fuse",
         "session",
-        "pipeline.stages.fuse:run",
+        "pipeline.sessions.fuse:run",
         reads=("ingest",),
         settings=("streams", "estimators", "axes"),
     ),
     Stage(
         "assess",
         "session",
-        "pipeline.stages.assess:run",
+        "pipeline.sessions.assess:run",
         reads=("ingest", "fuse"),
         settings=("streams", "estimators", "axes", "shown", "task"),
     ),
@@ -84,7 +84,7 @@ COMPARE = STAGES[:-1]
 REPLAY = Stage(
     "replay",
     "session",
-    "pipeline.stages.replay:run",
+    "pipeline.sessions.replay:run",
     reads=("ingest",),
     settings=("streams", "estimators", "axes"),
 )

@@ -13,8 +13,8 @@ from pipeline.comparisons import compared, everything_asked
 from pipeline.design_check import findings
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
-from pipeline.estimators import build_estimator
 from pipeline.printed import compare_printed
+from pipeline.sessions.estimators import build_estimator
 from pipeline.simulated import reductions
 from pipeline.stages.measure import ALL_DATA
 from pipeline.statistics.descriptive import described

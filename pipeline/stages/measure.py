@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import movements, orders
+from pipeline import orders
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError, did_you_mean
+from pipeline.sessions import movements
+from pipeline.sessions.trials import selections_by_trial, with_movements
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Exclusion, Study
 from pipeline.tables import table as tables
-from pipeline.trials import selections_by_trial, with_movements
 
 Row = dict[str, Any]
 CELL = ["participant", "condition"]

@@ -15,9 +15,9 @@ from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory as ProtobufFactory
 from mcap_ros2.decoder import DecoderFactory as Ros2Factory
 
-from pipeline.formats import read_log
-from pipeline.formats.log import Content, Wanted
-from pipeline.formats.mcap import Message, in_order
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Content, Wanted
+from pipeline.sessions.logs.mcap import Message, in_order
 from tests.benchmarks.timing import fastest
 from tests.conftest import session_messages, write_session
 from tests.pipeline.protobuf_types import ROS, message_class, schema_of

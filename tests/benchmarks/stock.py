@@ -8,7 +8,7 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from pipeline.formats.log import Content
+from pipeline.sessions.logs.log import Content
 
 KINDS: dict[str, Content] = {
     "/tracker/position": "position",

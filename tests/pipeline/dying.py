@@ -7,7 +7,7 @@ import signal
 from pathlib import Path
 
 from pipeline.engine.stage import Outcome, Work
-from pipeline.stages import fuse, replay
+from pipeline.sessions import fuse, replay
 
 POISONED = "P1_a"
 

@@ -12,10 +12,9 @@ import pytest
 import yaml
 
 from fusion_core.accuracy import interpolate, rmse
-from pipeline import recording
 from pipeline.engine.stage import Work
-from pipeline.estimators import build_estimator
-from pipeline.stages import ingest
+from pipeline.sessions import ingest, recording
+from pipeline.sessions.estimators import build_estimator
 from pipeline.study.settings import find_sessions, load_study
 from pipeline.tables import table as tables
 from tests.conftest import CLONE, real

@@ -20,7 +20,7 @@ import pytest
 from pipeline.__main__ import main
 from pipeline.engine.cache import Cache
 from pipeline.engine.housekeeping import held, prune
-from pipeline.stages import fuse
+from pipeline.sessions import fuse
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, Steadyhand, run
 

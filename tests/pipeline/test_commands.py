@@ -139,8 +139,8 @@ def test_inspect_counts_every_message_and_says_which_a_study_would_lose(
 def test_simulate_writes_the_same_messages_from_the_same_seed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipeline.formats import read_log
-    from pipeline.formats.log import Wanted
+    from pipeline.sessions.logs import read_log
+    from pipeline.sessions.logs.log import Wanted
 
     study = tmp_path / "reach"
     study.mkdir()

@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from pipeline.errors import SessionError
-from pipeline.formats import read_log
-from pipeline.formats.log import Log
-from pipeline.formats.mcap import MAGIC
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Log
+from pipeline.sessions.logs.mcap import MAGIC
 from tests.conftest import session_messages, write_session
 from tests.pipeline.test_mcap import WANTED, chunk_spans, counts, faulty
 

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 import pipeline
-from pipeline import excerpts
-from pipeline.formats.mcap import Message
 from pipeline.loading import Tables
+from pipeline.sessions import excerpts
+from pipeline.sessions.logs.mcap import Message
 from pipeline.tables import table as tables
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
 

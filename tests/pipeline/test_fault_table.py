@@ -14,9 +14,9 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import IndexType, Writer
 
 from pipeline.errors import SessionError
-from pipeline.formats import read_log
-from pipeline.formats.log import Log, Wanted
-from pipeline.formats.mcap import MAGIC
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Log, Wanted
+from pipeline.sessions.logs.mcap import MAGIC
 from tests.pipeline.test_damaged_logs import channel_record, chunk, message_record, text
 
 EVENT = b'{"type": "selection", "x": 0.5}'

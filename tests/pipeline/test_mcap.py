@@ -15,9 +15,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.errors import SessionError
-from pipeline.formats import read_log
-from pipeline.formats.log import Log, Wanted
-from pipeline.formats.mcap import MAGIC
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Log, Wanted
+from pipeline.sessions.logs.mcap import MAGIC
 from tests.conftest import CLONE, session_messages, write_session
 
 WANTED = [

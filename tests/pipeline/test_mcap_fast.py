@@ -16,11 +16,11 @@ from mcap.reader import NonSeekingReader
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
-from pipeline.formats import read_log
-from pipeline.formats.log import Content, Readings, Wanted
-from pipeline.formats.mcap import cdr, ros2
-from pipeline.formats.mcap.schemas import SCHEMAS
-from pipeline.formats.mcap.writer import _IMU, _POINT_STAMPED
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Content, Readings, Wanted
+from pipeline.sessions.logs.mcap import cdr, ros2
+from pipeline.sessions.logs.mcap.schemas import SCHEMAS
+from pipeline.sessions.logs.mcap.writer import _IMU, _POINT_STAMPED
 from tests.conftest import CLONE, write_session
 from tests.pipeline.test_mcap import faulty
 

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from pipeline.formats import read_log
-from pipeline.formats.log import Content, Readings, Wanted
-from pipeline.formats.mcap import json_payload
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Content, Readings, Wanted
+from pipeline.sessions.logs.mcap import json_payload
 from tests.pipeline.test_mcap_fast import assert_same
 
 CONTENTS: tuple[Content, ...] = ("position", "acceleration")

@@ -19,10 +19,10 @@ from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 from mcap_protobuf.schema import build_file_descriptor_set
 
-from pipeline.formats import read_log
-from pipeline.formats.log import Content, Readings, Wanted
-from pipeline.formats.mcap import protobuf
-from pipeline.formats.mcap.protobuf_template import Declined, Template
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Content, Readings, Wanted
+from pipeline.sessions.logs.mcap import protobuf
+from pipeline.sessions.logs.mcap.protobuf_template import Declined, Template
 from tests.pipeline.protobuf_types import FOXGLOVE, ROS, changed, message_class, schema_of
 from tests.pipeline.test_mcap_fast import assert_same, figures
 

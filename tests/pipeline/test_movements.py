@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fusion_core import FloatArray
-from pipeline import movements
-from pipeline.formats.mcap import Message
-from pipeline.movements import Path as HandPath
+from pipeline.sessions import movements
+from pipeline.sessions.logs.mcap import Message
+from pipeline.sessions.movements import Path as HandPath
+from pipeline.sessions.trials import selections_by_trial
 from pipeline.tables import table as tables
-from pipeline.trials import selections_by_trial
 from pipeline.wording import measure_label, unit_of
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand

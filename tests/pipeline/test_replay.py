@@ -15,9 +15,9 @@ from pypdf import PdfReader
 from scipy import stats
 
 from pipeline.ranking import ranked
+from pipeline.sessions.variants import read_changes
 from pipeline.statistics.descriptive import described
 from pipeline.tables import table as tables
-from pipeline.variants import read_changes
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, Steadyhand
 
@@ -281,7 +281,7 @@ def test_sessions_that_are_not_in_it_are_said(study: Path, steadyhand: Steadyhan
 def test_a_fault_of_ours_in_one_variant_leaves_the_others(
     study: Path, steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipeline.stages import replay
+    from pipeline.sessions import replay
 
     original = replay.run
 

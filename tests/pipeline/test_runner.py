@@ -136,7 +136,7 @@ def test_a_damaged_entry_is_computed_again(update: Callable[[], Result]) -> None
 def test_a_fault_of_ours_in_one_session_is_said_and_tried_again(
     study: Path, update: Callable[[], Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipeline.stages import fuse
+    from pipeline.sessions import fuse
 
     original = fuse.run
 

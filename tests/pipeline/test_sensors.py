@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.formats.mcap import Message
+from pipeline.sessions.logs.mcap import Message
 from tests.conftest import EPOCH_NS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand, run
 

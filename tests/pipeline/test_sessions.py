@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from fusion_core import replay_loop
-from pipeline import recording
 from pipeline.engine.stage import Work
-from pipeline.estimators import build_estimator
-from pipeline.formats.mcap import Message
-from pipeline.stages import ingest
+from pipeline.sessions import ingest, recording
+from pipeline.sessions.estimators import build_estimator
+from pipeline.sessions.logs.mcap import Message
 from pipeline.study.settings import find_sessions, load_study
 from pipeline.tables import table as tables
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session

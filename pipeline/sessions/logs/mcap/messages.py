@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.formats.log import IntArray
+from pipeline.sessions.logs.log import IntArray
 
 _LENGTH = struct.Struct("<xQ")  # after the opcode
 RECORD_HEAD_BYTES = 9

@@ -11,14 +11,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusion_core import FloatArray, Samples, accuracy, noise
-from pipeline import excerpts, movements, recording
 from pipeline.engine.stage import Outcome, Work
-from pipeline.estimators import sensors
-from pipeline.phone import described
-from pipeline.recording import Recording, Shown
+from pipeline.sessions import excerpts, movements, recording
+from pipeline.sessions.estimators import sensors
+from pipeline.sessions.phone import described
+from pipeline.sessions.recording import Recording, Shown
+from pipeline.sessions.trials import coordinates, selections_by_trial, told, with_movements
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
-from pipeline.trials import coordinates, selections_by_trial, told, with_movements
 
 _UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}
 _SETTLED_S = 1.0  # after the first frame's arrival: the grid of accuracy begins there

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from fusion_core import FloatArray, Samples, accuracy
-from pipeline.recording import Recording, Shown
+from pipeline.sessions.recording import Recording, Shown
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 

@@ -11,9 +11,9 @@ import pyarrow as pa
 
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import SessionError, did_you_mean
-from pipeline.formats import read_log
-from pipeline.formats.log import Log, Readings, Wanted
-from pipeline.quality import clock_went_back, quality_row
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Log, Readings, Wanted
+from pipeline.sessions.stream_quality import clock_went_back, quality_row
 from pipeline.study.settings import Session, Stream, Study
 from pipeline.tables import table as tables
 

@@ -19,11 +19,11 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, MessageIndex, Metadata, Schema, Statistics
 
 from pipeline.errors import SessionError
-from pipeline.formats.log import Content, IntArray
-from pipeline.formats.mcap.inflate import CHUNK_LIMIT, DAMAGED, check_stated_size, inflate
-from pipeline.formats.mcap.messages import Messages, joined, messages_at, record_starts
-from pipeline.formats.mcap.resume import next_place
-from pipeline.formats.mcap.schemas import content_of
+from pipeline.sessions.logs.log import Content, IntArray
+from pipeline.sessions.logs.mcap.inflate import CHUNK_LIMIT, DAMAGED, check_stated_size, inflate
+from pipeline.sessions.logs.mcap.messages import Messages, joined, messages_at, record_starts
+from pipeline.sessions.logs.mcap.resume import next_place
+from pipeline.sessions.logs.mcap.schemas import content_of
 
 _Record = TypeVar("_Record", bound=McapRecord)
 

@@ -18,8 +18,8 @@ import numpy as np
 import orjson
 from mcap.records import Channel, Schema
 
-from pipeline.formats.log import FloatArray, IntArray
-from pipeline.formats.mcap.fields import (
+from pipeline.sessions.logs.log import FloatArray, IntArray
+from pipeline.sessions.logs.mcap.fields import (
     COVARIANCE,
     FORCE,
     NANOSECONDS,
@@ -38,7 +38,7 @@ from pipeline.formats.mcap.fields import (
     check_stamp,
     holds_stamps,
 )
-from pipeline.formats.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.messages import Messages
 
 _BLOCK = 256  # messages: few enough that one unusual message does not cost much, and that objects do not pile up
 _UNUSUAL = (ValueError, TypeError, LookupError, OverflowError)

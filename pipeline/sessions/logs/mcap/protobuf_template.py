@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
-from pipeline.formats.log import FloatArray, IntArray
-from pipeline.formats.mcap.cdr import Bytes
-from pipeline.formats.mcap.fields import Fields, Path, Reading, holds_stamps
+from pipeline.sessions.logs.log import FloatArray, IntArray
+from pipeline.sessions.logs.mcap.cdr import Bytes
+from pipeline.sessions.logs.mcap.fields import Fields, Path, Reading, holds_stamps
 
 _VARINT, _FIXED64, _LENGTH, _FIXED32 = 0, 1, 2, 5
 _DEPTH_LIMIT = 8

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from pipeline import recording
 from pipeline.engine.stage import Outcome, Work
-from pipeline.recording import Shown
+from pipeline.sessions import recording
+from pipeline.sessions.recording import Shown
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 

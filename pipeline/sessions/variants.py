@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.estimators import build_estimator
+from pipeline.sessions.estimators import build_estimator
 from pipeline.study.settings import Estimator, Estimators, Study, known, parse, read_values, read_yaml
 
 

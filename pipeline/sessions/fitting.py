@@ -12,8 +12,8 @@ from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, Wi
 from fusion_core.accuracy import interpolate, rmse
 from fusion_core.likelihood import Fitted, foretold, foretold_by, maximise
 from pipeline.errors import PipelineError
-from pipeline.estimators import build_estimator, sensors
-from pipeline.recording import Recording
+from pipeline.sessions.estimators import build_estimator, sensors
+from pipeline.sessions.recording import Recording
 from pipeline.study.settings import Study
 
 _IMU_PRIOR = 0.7  # SD of the logarithm: a factor of two. Smooth motion alone cannot tell an accelerometer's noise

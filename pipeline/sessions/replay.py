@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from fusion_core import Samples
-from pipeline import recording
 from pipeline.engine.stage import Outcome, Work
-from pipeline.recording import Recording
-from pipeline.stages.assess import accuracy_row, trial_rows
+from pipeline.sessions import recording
+from pipeline.sessions.assess import accuracy_row, trial_rows
+from pipeline.sessions.recording import Recording
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 

@@ -11,12 +11,12 @@ import numpy as np
 from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from pipeline.formats.log import IntArray
-from pipeline.formats.mcap import cdr
-from pipeline.formats.mcap.definition import check_definition
-from pipeline.formats.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields, Reading, check_stamp
-from pipeline.formats.mcap.messages import Messages
-from pipeline.formats.mcap.schemas import SCHEMAS
+from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.logs.mcap import cdr
+from pipeline.sessions.logs.mcap.definition import check_definition
+from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields, Reading, check_stamp
+from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 
 _DEFINITIONS_KEPT = 16
 

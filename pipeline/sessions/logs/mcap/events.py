@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from mcap.records import Channel
 
-from pipeline.formats.mcap.fields import UNFIT
+from pipeline.sessions.logs.mcap.fields import UNFIT
 
 EVENT_TYPES = ("session_start", "trial_start", "selection", "session_end")
 EVENTS_LIMIT = 100_000

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.formats.log import IntArray
-from pipeline.formats.mcap.fields import Fields, Reading
+from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.logs.mcap.fields import Fields, Reading
 
 Bytes = npt.NDArray[np.uint8]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from pipeline.formats.log import Content
+from pipeline.sessions.logs.log import Content
 
 SCHEMAS: Mapping[str, str] = {
     "position": "geometry_msgs/msg/PointStamped",

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from pipeline.formats.log import Log, Wanted
-from pipeline.formats.mcap.container import MAGIC, walk_log
-from pipeline.formats.mcap.payload import counted, decode
-from pipeline.formats.mcap.writer import Message, in_order, write
+from pipeline.sessions.logs.log import Log, Wanted
+from pipeline.sessions.logs.mcap.container import MAGIC, walk_log
+from pipeline.sessions.logs.mcap.payload import counted, decode
+from pipeline.sessions.logs.mcap.writer import Message, in_order, write
 
 __all__ = ["MAGIC", "Message", "in_order", "read", "write"]
 

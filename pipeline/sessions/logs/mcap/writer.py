@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.log import Content, FloatArray
-from pipeline.formats.mcap.schemas import SCHEMAS
+from pipeline.sessions.logs.log import Content, FloatArray
+from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 
 _HEADER = """std_msgs/Header header
 {body}

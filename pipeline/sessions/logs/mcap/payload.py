@@ -14,17 +14,17 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from pipeline.errors import SessionError
-from pipeline.formats.log import Content, FloatArray, IntArray, Readings
-from pipeline.formats.mcap.container import Walk
-from pipeline.formats.mcap.events import EVENTS_LIMIT, event
-from pipeline.formats.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields
-from pipeline.formats.mcap.messages import Messages, joined
-from pipeline.formats.mcap.schemas import SAMPLED
+from pipeline.sessions.logs.log import Content, FloatArray, IntArray, Readings
+from pipeline.sessions.logs.mcap.container import Walk
+from pipeline.sessions.logs.mcap.events import EVENTS_LIMIT, event
+from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields
+from pipeline.sessions.logs.mcap.messages import Messages, joined
+from pipeline.sessions.logs.mcap.schemas import SAMPLED
 
 _DECODERS: Mapping[str, str] = {
-    "cdr": "pipeline.formats.mcap.ros2",
-    "protobuf": "pipeline.formats.mcap.protobuf",
-    "json": "pipeline.formats.mcap.json_payload",
+    "cdr": "pipeline.sessions.logs.mcap.ros2",
+    "protobuf": "pipeline.sessions.logs.mcap.protobuf",
+    "json": "pipeline.sessions.logs.mcap.json_payload",
 }
 """The module that reads an encoding, loaded when a log has it."""
 

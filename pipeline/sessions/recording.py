@@ -14,8 +14,8 @@ import pyarrow.compute as pc
 from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.alignment import nearest, rotate
 from fusion_core.calibration import Body
-from pipeline.estimators import build_estimator, sensor, sensors
-from pipeline.phone import Phone, aligned, phone
+from pipeline.sessions.estimators import build_estimator, sensor, sensors
+from pipeline.sessions.phone import Phone, aligned, phone
 from pipeline.study.settings import (
     AccelerationStream,
     DisplayStream,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import movements
-from pipeline.movements import FloatArray
+from pipeline.sessions import movements
+from pipeline.sessions.movements import FloatArray
 from pipeline.tables import table as tables
 
 Row = Mapping[str, Any]

@@ -16,8 +16,8 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from pipeline.formats.log import IntArray
-from pipeline.formats.mcap.fields import (
+from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.logs.mcap.fields import (
     COVARIANCE,
     FORCE,
     NANOSECONDS,
@@ -35,8 +35,8 @@ from pipeline.formats.mcap.fields import (
     check_size,
     check_stamp,
 )
-from pipeline.formats.mcap.messages import Messages
-from pipeline.formats.mcap.protobuf_template import Declined, Template
+from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.protobuf_template import Declined, Template
 
 _SCHEMA_LIMIT = 256 * 1024  # bytes; Foxglove's take up to ten thousand
 _TEMPLATES = 16  # tried for messages of one length; what fits none of them is left to the stock decoder

@@ -7,9 +7,9 @@ from importlib import import_module
 from pathlib import Path
 
 from pipeline.errors import SessionError
-from pipeline.formats.log import Log, Wanted
+from pipeline.sessions.logs.log import Log, Wanted
 
-READERS = {".mcap": "pipeline.formats.mcap"}
+READERS = {".mcap": "pipeline.sessions.logs.mcap"}
 """The module that reads a file, by its suffix."""
 
 

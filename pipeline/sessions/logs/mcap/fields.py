@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.formats.log import FloatArray, IntArray
-from pipeline.formats.mcap.container import BROKEN
-from pipeline.formats.mcap.messages import Messages
+from pipeline.sessions.logs.log import FloatArray, IntArray
+from pipeline.sessions.logs.mcap.container import BROKEN
+from pipeline.sessions.logs.mcap.messages import Messages
 
 WIDTHS: Mapping[str, int] = {"position": 3, "acceleration": 11}
 """How many figures are kept: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""

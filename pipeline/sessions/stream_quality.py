@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.formats.log import FloatArray, IntArray, Readings
+from pipeline.sessions.logs.log import FloatArray, IntArray, Readings
 
 _SECONDS = 1e-9
 _STEP_BACK_MIN = 10  # messages: a clock that went back stays back; a late message comes alone
