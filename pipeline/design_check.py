@@ -12,9 +12,9 @@ import pandas as pd
 
 from pipeline import model_rows, orders
 from pipeline.cells import Asked
-from pipeline.counterbalancing import balance
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
+from pipeline.statistics.counterbalancing import balance
 from pipeline.statistics.crossover import crossover
 from pipeline.statistics.mixed import mixed_model
 from pipeline.statistics.result import Result

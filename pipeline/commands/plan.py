@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.commands import console
-from pipeline.counterbalancing import Order, assigned, balance, williams_design
 from pipeline.errors import PipelineError
+from pipeline.statistics.counterbalancing import Order, assigned, balance, williams_design
 from pipeline.study.settings import identifier, load_study
 from pipeline.wording import counted
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipeline.counterbalancing import williams_design
+from pipeline.statistics.counterbalancing import williams_design
 from pipeline.statistics.power import Design
 from pipeline.statistics.sample_size import Needed, SampleSize
 from pipeline.wording import number, share

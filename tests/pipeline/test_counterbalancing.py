@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.counterbalancing import assigned, balance, williams_design
+from pipeline.statistics.counterbalancing import assigned, balance, williams_design
 from pipeline.study.csv_tables import read_participants
 from tests.pipeline.helpers import Ran, run
 
