@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from pipeline.analysis.audit.audit import audit as findings_of
+from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
 from pipeline.commands import console
-from pipeline.statistics.forensics.audit import audit as findings_of
-from pipeline.statistics.forensics.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
 from pipeline.study.printed import load_publication
 from pipeline.wording import counted, listing
 

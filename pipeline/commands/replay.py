@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from pipeline.analysis.ranking import ranked
 from pipeline.commands import console
 from pipeline.commands.publish import copy, publish_provenance, refuse_inputs, refuse_study
 from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
@@ -21,7 +22,6 @@ from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date, over_settings
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
-from pipeline.ranking import ranked
 from pipeline.sections.replay import document
 from pipeline.sessions.variants import Variant, read_changes, read_estimators, variants
 from pipeline.stages import INGEST, REPLAY

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pipeline.statistics.forensics.finding import CONTRADICTION
+from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.wording import comparison_sentence, counted, measure_label, number
 
 Row = Mapping[str, Any]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED
 from pipeline.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.sections.material import Material, Row
-from pipeline.statistics.forensics.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED
 from pipeline.wording import counted
 
 _VERDICTS = {AGREEMENT: "Agree", CONTRADICTION: "Contradict", REMARK: "Remarks", UNCHECKED: "Cannot be checked"}

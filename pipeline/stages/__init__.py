@@ -30,7 +30,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "measure",
         "study",
-        "pipeline.stages.measure:run",
+        "pipeline.analysis.measure:run",
         reads=("ingest", "assess"),
         settings=(
             "conditions",
@@ -46,7 +46,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "compare",
         "study",
-        "pipeline.stages.compare:run",
+        "pipeline.analysis.compare:run",
         reads=("ingest", "assess", "measure"),
         settings=(
             "title",

@@ -17,8 +17,8 @@ from pydantic import (
     model_validator,
 )
 
+from pipeline.analysis.audit.p_values import DEGREES_OF_FREEDOM, Symbol
 from pipeline.errors import did_you_mean
-from pipeline.statistics.forensics.p_values import DEGREES_OF_FREEDOM, Symbol
 from pipeline.study.fields import Frozen
 from pipeline.study.rounded import Rounded, Rounding
 from pipeline.study.settings import Id, known, parse, read_yaml, unique

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
+from pipeline.analysis.audit.audit import audit
+from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
 from pipeline.errors import PipelineError
-from pipeline.statistics.forensics.audit import audit
-from pipeline.statistics.forensics.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
 from pipeline.study import printed as publication
 from pipeline.study.fields import Frozen
 from pipeline.study.printed import load_publication

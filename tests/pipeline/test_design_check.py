@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.orders import conditions_in_order
+from pipeline.analysis.orders import conditions_in_order
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.reference import study_of, the

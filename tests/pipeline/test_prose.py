@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pypdf import PdfReader
 
-from pipeline.comparisons import compared as rows_of
+from pipeline.analysis.compare import descriptives
+from pipeline.analysis.comparisons import compared as rows_of
 from pipeline.prose.glossary import explained
 from pipeline.prose.references import bibliography, escaped, used
 from pipeline.prose.sentences import Told, sentence, told_of
 from pipeline.sections.comparisons import anchor
-from pipeline.stages.compare import descriptives
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from tests.pipeline.helpers import Steadyhand

@@ -14,7 +14,7 @@ import pytest
 from pypdf import PdfReader
 from scipy import stats
 
-from pipeline.ranking import ranked
+from pipeline.analysis.ranking import ranked
 from pipeline.sessions.variants import read_changes
 from pipeline.statistics.descriptive import described
 from pipeline.tables import table as tables

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.analysis.simulated_reductions import reductions
 from pipeline.errors import PipelineError
-from pipeline.simulated import reductions
 from pipeline.simulation import hand_steps, layout, people, study_files
 from pipeline.simulation.motion import minimum_jerk
 from pipeline.simulation.session import Setting, simulate

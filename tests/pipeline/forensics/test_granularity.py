@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.statistics.forensics.granularity import Steps, has_sample, possible_sample
+from pipeline.analysis.audit.granularity import Steps, has_sample, possible_sample
 from pipeline.study.rounded import Interval, Rounded
 
 WHOLE = Steps(Fraction(1))

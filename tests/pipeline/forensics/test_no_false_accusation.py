@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from pipeline.analysis.audit.audit import audit
+from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.statistics.anova import rm_anova
-from pipeline.statistics.forensics.audit import audit
-from pipeline.statistics.forensics.finding import CONTRADICTION
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.rank import friedman, wilcoxon

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from pipeline.statistics.forensics.signed_rank import (
+from pipeline.analysis.audit.signed_rank import (
     exact_p_possible,
     exact_p_with_sum,
     exact_tails,

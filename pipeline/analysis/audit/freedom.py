@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.p_values import DEGREES_OF_FREEDOM
-from pipeline.statistics.forensics.phrases import label, written
+from pipeline.analysis.audit.finding import Finding, Statement
+from pipeline.analysis.audit.p_values import DEGREES_OF_FREEDOM
+from pipeline.analysis.audit.phrases import label, written
 from pipeline.study.printed import Measure, PrintedTest, Publication
 from pipeline.study.rounded import Interval, Rounded
 

@@ -8,8 +8,8 @@ from functools import reduce
 from math import ceil, floor
 from operator import add
 
-from pipeline.statistics.forensics.cells import described
-from pipeline.statistics.forensics.finding import Finding, Statement
+from pipeline.analysis.audit.cells import described
+from pipeline.analysis.audit.finding import Finding, Statement
 from pipeline.study.printed import Measure, Parts, Publication, Reduction, Share, Total
 from pipeline.study.rounded import Interval, Rounded
 

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.comparisons import compared, everything_asked
-from pipeline.design_check import findings
+from pipeline.analysis.audit.beside_computed import compare_printed
+from pipeline.analysis.comparisons import compared, everything_asked
+from pipeline.analysis.design_check import findings
+from pipeline.analysis.measure import ALL_DATA
+from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
-from pipeline.printed import compare_printed
 from pipeline.sessions.estimators import build_estimator
-from pipeline.simulated import reductions
-from pipeline.stages.measure import ALL_DATA
 from pipeline.statistics.descriptive import described
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Study

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.statistics.forensics.p_values import Symbol
+from pipeline.analysis.audit.p_values import Symbol
 from pipeline.study.printed import Measure, PrintedTest
 from pipeline.study.rounded import Rounded
 from pipeline.wording import TESTS

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.freedom import WITHIN, freedom, rounded_after_correction
-from pipeline.statistics.forensics.p_values import Bounds, Symbol, meets, p_bounds, p_bounds_corrected
-from pipeline.statistics.forensics.phrases import label, written, written_p
+from pipeline.analysis.audit.finding import Finding, Statement
+from pipeline.analysis.audit.freedom import WITHIN, freedom, rounded_after_correction
+from pipeline.analysis.audit.p_values import Bounds, Symbol, meets, p_bounds, p_bounds_corrected
+from pipeline.analysis.audit.phrases import label, written, written_p
 from pipeline.study.printed import Measure, PrintedTest, Publication
 from pipeline.study.rounded import Interval, Rounded
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, sqrt
 
-from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.granularity import Steps, possible_sample
+from pipeline.analysis.audit.finding import Finding, Statement
+from pipeline.analysis.audit.granularity import Steps, possible_sample
 from pipeline.study.printed import Cell, Measure, Publication, Scale
 from pipeline.study.rounded import Rounded
 

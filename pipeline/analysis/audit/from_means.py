@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf, sqrt
 
-from pipeline.statistics.forensics.cells import Described, described
-from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.freedom import exactly, freedom
-from pipeline.statistics.forensics.p_values import Bounds
-from pipeline.statistics.forensics.phrases import label, written
+from pipeline.analysis.audit.cells import Described, described
+from pipeline.analysis.audit.finding import Finding, Statement
+from pipeline.analysis.audit.freedom import exactly, freedom
+from pipeline.analysis.audit.p_values import Bounds
+from pipeline.analysis.audit.phrases import label, written
 from pipeline.study.printed import BETWEEN, Measure, PrintedTest, Publication
 
 _PAIRED = ("t_paired", "rm_anova")

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.analysis.audit.audit import audit
+from pipeline.analysis.audit.phrases import label
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.statistics.forensics.audit import audit
-from pipeline.statistics.forensics.phrases import label
 from pipeline.study.printed import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
 from pipeline.study.rounded import Rounded
 from pipeline.tables import table as tables

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import ceil, floor
 
-from pipeline.statistics.forensics import signed_rank
-from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.phrases import label, written_p
+from pipeline.analysis.audit import signed_rank
+from pipeline.analysis.audit.finding import Finding, Statement
+from pipeline.analysis.audit.phrases import label, written_p
 from pipeline.study.printed import Measure, PrintedTest, Publication
 from pipeline.study.rounded import Interval, Rounded
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from pipeline.statistics.forensics.finding import Finding, Statement
-from pipeline.statistics.forensics.p_values import Bounds, meets
-from pipeline.statistics.forensics.phrases import label, written, written_p
-from pipeline.statistics.forensics.recomputed import p_left_open
+from pipeline.analysis.audit.finding import Finding, Statement
+from pipeline.analysis.audit.p_values import Bounds, meets
+from pipeline.analysis.audit.phrases import label, written, written_p
+from pipeline.analysis.audit.recomputed import p_left_open
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.study.printed import Family, Measure, PrintedTest, Publication
 from pipeline.study.rounded import Rounded

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import cells, model_rows
-from pipeline.cells import Asked, Cells
+from pipeline.analysis import complete_cases as cells
+from pipeline.analysis import model_rows
+from pipeline.analysis.complete_cases import Asked, Cells
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics import OK, diagnostics, pairs
 from pipeline.statistics.anova import rm_anova

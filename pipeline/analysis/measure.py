@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import orders
+from pipeline.analysis import orders
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.sessions import movements

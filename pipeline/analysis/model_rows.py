@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import cells
-from pipeline.cells import Asked
+from pipeline.analysis import complete_cases as cells
+from pipeline.analysis.complete_cases import Asked
 from pipeline.errors import PipelineError
 from pipeline.statistics.mixed import Column, Covariate, Factor
 from pipeline.statistics.result import FloatArray

@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline import model_rows, orders
-from pipeline.cells import Asked
+from pipeline.analysis import model_rows, orders
+from pipeline.analysis.complete_cases import Asked
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
 from pipeline.statistics.counterbalancing import balance

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from pipeline.statistics.forensics.arithmetic import count_finding, reduction_findings, share_finding, total_finding
-from pipeline.statistics.forensics.cells import cell_findings
-from pipeline.statistics.forensics.claims import claim_findings, family_findings
-from pipeline.statistics.forensics.finding import CONTRADICTION, Finding, Statement
-from pipeline.statistics.forensics.freedom import freedom_findings
-from pipeline.statistics.forensics.from_means import statistic_findings
-from pipeline.statistics.forensics.phrases import label, written_p
-from pipeline.statistics.forensics.recomputed import p_finding
-from pipeline.statistics.forensics.wilcoxon import wilcoxon_finding
+from pipeline.analysis.audit.arithmetic import count_finding, reduction_findings, share_finding, total_finding
+from pipeline.analysis.audit.cells import cell_findings
+from pipeline.analysis.audit.claims import claim_findings, family_findings
+from pipeline.analysis.audit.finding import CONTRADICTION, Finding, Statement
+from pipeline.analysis.audit.freedom import freedom_findings
+from pipeline.analysis.audit.from_means import statistic_findings
+from pipeline.analysis.audit.phrases import label, written_p
+from pipeline.analysis.audit.recomputed import p_finding
+from pipeline.analysis.audit.wilcoxon import wilcoxon_finding
 from pipeline.study.printed import Measure, PrintedTest, Publication
 
 

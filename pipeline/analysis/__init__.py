@@ -1,0 +1,1 @@
+"""Which values go into which test, and what the design allows."""
