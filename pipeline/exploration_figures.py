@@ -15,7 +15,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.exploration_tables import MOST, Tracker
+from pipeline.simulation.what_pays import MOST, Tracker
 from pipeline.typeface import showable
 from pipeline.wording import NOTHING, number
 

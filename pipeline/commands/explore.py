@@ -17,8 +17,8 @@ from pipeline.study.settings import Study, load_study
 from pipeline.study.simulation import SelectionSimulation
 
 if TYPE_CHECKING:
-    from pipeline.exploration import Grid
     from pipeline.sections.exploration import Explored
+    from pipeline.simulation.exploration import Grid
     from pipeline.simulation.session import Setting
 
 _PAGE, _PRINT, _RESULTS = "explore.html", "explore.pdf", "results.json"
@@ -46,7 +46,7 @@ def explore(folder: Path, asked: Asked, out: Path | None, jobs: int | None, wher
     study = _study(folder)
     target = out or reports_folder() / f"{folder.resolve().name}-explore"
     refuse_study(target)
-    from pipeline import exploration
+    from pipeline.simulation import exploration
     from pipeline.simulation.session import Setting
 
     setting = Setting(study, str(folder / "study.yaml"))
@@ -81,7 +81,7 @@ def _study(folder: Path) -> Study:
 
 def _grid(setting: Setting, asked: Asked) -> Grid:
     """What is asked for; else the study's own tracker, better and worse ones, and the estimators it shows."""
-    from pipeline.exploration import Grid, shown_estimators, stated
+    from pipeline.simulation.exploration import Grid, shown_estimators, stated
 
     own = stated(setting)
     late = (own.latency_s / 2, own.latency_s, min(2 * own.latency_s, 0.9)) if own.latency_s else (0.0, 0.05, 0.1)
@@ -126,9 +126,9 @@ def _names(option: str, text: str | None, most: int = _VALUES) -> tuple[str, ...
 
 
 def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]]) -> Explored:
-    from pipeline.exploration import stated
-    from pipeline.exploration_tables import MEASURES, differences, means, what_pays
     from pipeline.sections.exploration import Explored
+    from pipeline.simulation.exploration import stated
+    from pipeline.simulation.what_pays import MEASURES, differences, means, what_pays
     from pipeline.tables import table as tables
 
     people, own = tables.frame("explore_people", rows), grid.nearest(stated(setting))

@@ -80,7 +80,7 @@ def publish_exploration(study: Study, folder: Path, command: Sequence[str]) -> N
     """provenance.json of an exploration, which reads study.yaml alone."""
     settings = json.loads(study.model_dump_json(exclude_defaults=True))
     program = _program(command, ())
-    program["code_sha256"] = {"explore": code_digest("pipeline.exploration")}
+    program["code_sha256"] = {"explore": code_digest("pipeline.simulation.exploration")}
     _write_provenance({**program, "settings": settings}, folder / _RESULTS, folder)
 
 

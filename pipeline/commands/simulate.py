@@ -10,7 +10,7 @@ from pathlib import Path
 from pipeline.commands import console
 from pipeline.commands.run import PROCESS, executor_of
 from pipeline.errors import PipelineError
-from pipeline.simulation_state import is_made
+from pipeline.simulation.up_to_date import is_made
 from pipeline.study.settings import Study, load_study
 from pipeline.study.simulation import ReachSimulation
 

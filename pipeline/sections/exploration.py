@@ -12,8 +12,8 @@ import pandas as pd
 from pipeline import exploration_figures, figures
 from pipeline.document.model import Block, Document, Figure, Notice, Paragraph, Section, Strong, Table, columns
 from pipeline.exploration_figures import ERROR, PARTICIPANTS, TIME, Surface
-from pipeline.exploration_tables import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.sections.provenance import libraries
+from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.wording import NOTHING, counted, interval, listing, number, percent, reduction_phrase, short_label

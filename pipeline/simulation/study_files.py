@@ -17,8 +17,8 @@ from pipeline.engine.cache import digest_of
 from pipeline.errors import PipelineError
 from pipeline.simulation.log import write_log
 from pipeline.simulation.session import Outcome, Setting, simulate
+from pipeline.simulation.up_to_date import MADE, files_made, made_from
 from pipeline.simulation.workload import ratings
-from pipeline.simulation_state import MADE, files_made, made_from
 from pipeline.statistics.counterbalancing import assigned
 from pipeline.study.settings import Study, inside
 from pipeline.study.simulation import SelectionSimulation

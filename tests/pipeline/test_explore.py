@@ -17,9 +17,9 @@ from scipy import stats
 
 from pipeline.engine.processes import InThisProcess
 from pipeline.errors import WorkerLostError
-from pipeline.exploration import Grid, explore, stated, with_tracker
-from pipeline.exploration_tables import MEASURES, Tracker, differences, means, what_pays
+from pipeline.simulation.exploration import Grid, explore, stated, with_tracker
 from pipeline.simulation.session import Setting
+from pipeline.simulation.what_pays import MEASURES, Tracker, differences, means, what_pays
 from pipeline.study.settings import load_study
 from pipeline.tables import table as tables
 from tests.conftest import CLONE
@@ -275,7 +275,7 @@ def test_a_lost_process_is_said(study: Path, command: Command, monkeypatch: pyte
     def lost(*_: object) -> None:
         raise WorkerLostError("signal 9")
 
-    monkeypatch.setattr("pipeline.exploration.small_study", lost)
+    monkeypatch.setattr("pipeline.simulation.exploration.small_study", lost)
     ran = command(study, *SMALL)
     assert ran.code == 2
     assert "a process was lost (signal 9)" in ran.err
@@ -285,7 +285,7 @@ def test_ctrl_c_writes_nothing(study: Path, command: Command, monkeypatch: pytes
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pipeline.exploration.small_study", interrupted)
+    monkeypatch.setattr("pipeline.simulation.exploration.small_study", interrupted)
     ran = command(study, *SMALL)
     assert ran.code == 130
     assert "interrupted; nothing was written" in ran.err

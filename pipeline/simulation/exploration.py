@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError, WorkerLostError, did_you_mean
-from pipeline.exploration_tables import Tracker
 from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.study_files import participants, with_other_people
+from pipeline.simulation.what_pays import Tracker
 from pipeline.study.settings import Study
 
 Row = dict[str, Any]
