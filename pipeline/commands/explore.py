@@ -17,7 +17,7 @@ from pipeline.study.settings import Study, load_study
 from pipeline.study.simulation import SelectionSimulation
 
 if TYPE_CHECKING:
-    from pipeline.sections.exploration import Explored
+    from pipeline.report.sections.exploration import Explored
     from pipeline.simulation.exploration import Grid
     from pipeline.simulation.session import Setting
 
@@ -126,7 +126,7 @@ def _names(option: str, text: str | None, most: int = _VALUES) -> tuple[str, ...
 
 
 def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]]) -> Explored:
-    from pipeline.sections.exploration import Explored
+    from pipeline.report.sections.exploration import Explored
     from pipeline.simulation.exploration import stated
     from pipeline.simulation.what_pays import MEASURES, differences, means, what_pays
     from pipeline.tables import table as tables
@@ -144,8 +144,8 @@ def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]
 def _write(explored: Explored, grid: Grid, target: Path) -> None:
     """The pages, results.json and the tables, each whole or not at all."""
     from pipeline.commands.publish import copy, publish_exploration
-    from pipeline.document import html, pdf
-    from pipeline.sections.exploration import document
+    from pipeline.report.document import html, pdf
+    from pipeline.report.sections.exploration import document
     from pipeline.tables import results
     from pipeline.tables import table as tables
 
@@ -166,7 +166,7 @@ def _write(explored: Explored, grid: Grid, target: Path) -> None:
 
 
 def _say(explored: Explored) -> None:
-    from pipeline.sections.exploration import pays_sentence
+    from pipeline.report.sections.exploration import pays_sentence
 
     for pays in explored.pays:
         console.say("".join(pays_sentence(pays, pays.now.estimator)))

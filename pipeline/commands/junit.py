@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from pipeline.errors import PipelineError
-from pipeline.typeface import STAND_IN
+from pipeline.report.glyphs import STAND_IN
 
 _NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 

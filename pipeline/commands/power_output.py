@@ -138,7 +138,7 @@ def write(folder: Path, design: Design, settings: Mapping[str, Any], found: Samp
 def _draw(path: Path, design: Design, rows: Sequence[Record], found: SampleSize, target: float) -> None:
     import pandas as pd
 
-    from pipeline import figures
+    from pipeline.report import figures
 
     needed = {
         "power_closed_form": found.closed_form,

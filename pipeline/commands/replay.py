@@ -15,14 +15,14 @@ from pipeline.analysis.ranking import ranked
 from pipeline.commands import console
 from pipeline.commands.publish import copy, publish_provenance, refuse_inputs, refuse_study
 from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
-from pipeline.document import html, pdf
 from pipeline.engine.cache import Entry
 from pipeline.engine.resources import Means
 from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date, over_settings
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
-from pipeline.sections.replay import document
+from pipeline.report.document import html, pdf
+from pipeline.report.sections.replay import document
 from pipeline.sessions.variants import Variant, read_changes, read_estimators, variants
 from pipeline.stages import INGEST, REPLAY
 from pipeline.study.settings import Session, load_study

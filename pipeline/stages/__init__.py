@@ -68,7 +68,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "report",
         "study",
-        "pipeline.stages.report:run",
+        "pipeline.report.write:run",
         reads=("ingest", "fuse", "assess", "measure", "compare"),
         settings=tuple(Study.model_fields),
         names_inputs=True,

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.label_places import Label, placed, spans
+from pipeline.report.figures.label_places import Label, placed, spans
 
 FRAME = np.array([0.0, 0.0, 220.0, 180.0])
 RADIUS = 5.0

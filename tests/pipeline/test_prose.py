@@ -15,10 +15,10 @@ from pypdf import PdfReader
 
 from pipeline.analysis.compare import descriptives
 from pipeline.analysis.comparisons import compared as rows_of
-from pipeline.prose.glossary import explained
-from pipeline.prose.references import bibliography, escaped, used
-from pipeline.prose.sentences import Told, sentence, told_of
-from pipeline.sections.comparisons import anchor
+from pipeline.report.prose.glossary import explained
+from pipeline.report.prose.references import bibliography, escaped, used
+from pipeline.report.prose.sentences import Told, sentence, told_of
+from pipeline.report.sections.comparisons import anchor
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from tests.pipeline.helpers import Steadyhand

@@ -18,8 +18,8 @@ from xml.etree import ElementTree
 import pytest
 from pypdf import PdfReader
 
-from pipeline.document import html, pdf
-from pipeline.document.model import (
+from pipeline.report.document import html, pdf
+from pipeline.report.document.model import (
     Column,
     CrossReference,
     Document,

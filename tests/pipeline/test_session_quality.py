@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.session_quality import LIGHTS, Judged, judged, light_of, limits_text
+from pipeline.report.traffic_lights import LIGHTS, Judged, judged, light_of, limits_text
 from pipeline.study.settings import QualityLimits, Study
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand

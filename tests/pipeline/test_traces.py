@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pipeline.document import traces
-from pipeline.document.traces import Series, Traces
 from pipeline.engine.stage import Work
+from pipeline.report.document import traces
+from pipeline.report.document.traces import Series, Traces
 from pipeline.sessions import ingest, recording
 from pipeline.study.settings import Session, load_study
 from tests.conftest import STREAMS, session_messages, write_session

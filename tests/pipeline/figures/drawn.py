@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from matplotlib.figure import Figure
 
-from pipeline import figures
+from pipeline.report import figures
 
 SVG = "{http://www.w3.org/2000/svg}"
 

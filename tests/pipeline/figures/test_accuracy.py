@@ -10,9 +10,9 @@ import pytest
 from matplotlib.collections import LineCollection
 from scipy import stats
 
-from pipeline import figures
-from pipeline.figures import captions
-from pipeline.figures.accuracy import nine_of_ten, shares
+from pipeline.report import figures
+from pipeline.report.figures import captions
+from pipeline.report.figures.accuracy import nine_of_ten, shares
 from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Circle, Ellipse
 
-from pipeline import figures
-from pipeline.figures import captions
-from pipeline.figures.canvas import ellipse_95, offsets_mm, targets_of, way
+from pipeline.report import figures
+from pipeline.report.figures import captions
+from pipeline.report.figures.canvas import ellipse_95, offsets_mm, targets_of, way
 from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 from scipy import stats
 
-from pipeline import figures
-from pipeline.figures import captions
+from pipeline.report import figures
+from pipeline.report.figures import captions
 from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline import figures
-from pipeline.figures import captions
-from pipeline.figures.sensors import errors_in
+from pipeline.report import figures
+from pipeline.report.figures import captions
+from pipeline.report.figures.sensors import errors_in
 from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import saved, texts
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline import figures
-from pipeline.figures import captions
-from pipeline.figures.timeline import silences
+from pipeline.report import figures
+from pipeline.report.figures import captions
+from pipeline.report.figures.timeline import silences
 from pipeline.tables import table as tables
 from tests.pipeline.figures.drawn import pictures, saved, texts
 

@@ -1,0 +1,73 @@
+"""A document as one self-contained HTML file, whole without its script, and closed to the network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from pipeline.report.document.model import CrossReference, Document, Link, Strong, numbered
+
+_DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would turn round the numbers that follow
+_CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
+_UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may end there
+_HERE = Path(__file__).parent
+
+
+def render(document: Document, figures: Path, path: Path) -> None:
+    """Write the page; `figures` is the folder of the SVG files it shows."""
+
+    def picture(name: str) -> str:
+        """An SVG as a data address: as an image of its own, its ids cannot clash with another's."""
+        return "data:image/svg+xml;base64," + base64.b64encode((figures / name).read_bytes()).decode()
+
+    values = {"document": document, "names": numbered(document), "picture": picture}
+    write_page("report.html.jinja", "report.js", path, document.origin, **values)
+
+
+def write_page(template: str, script: str, path: Path, origin: str, **values: Any) -> None:
+    """A page from a template, with the style and a script in it; controls among its text are shown as □.
+
+    The page's own policy lets no other script or style run and nothing be fetched, whatever text it holds. `origin`
+    stands at the foot of each page that a browser prints.
+    """
+    style, code = ((_HERE / name).read_text(encoding="utf-8") for name in ("style.css", script))
+    style += f"@page {{ @bottom-left {{ content: {_quoted(origin)}; }} }}\n"
+    policy = (
+        f"default-src 'none'; img-src data:; style-src {_hashed(style)}; script-src {_hashed(code)};"
+        " base-uri 'none'; form-action 'none'"
+    )
+    page = (
+        _environment().get_template(template).render(style=style, script=code, policy=policy, origin=origin, **values)
+    )
+    path.write_text(page.translate(_CONTROLS | _UNBROKEN), encoding="utf-8")
+
+
+def _quoted(text: str) -> str:
+    """A string as CSS takes it: whatever is neither a letter nor a space, by its number."""
+    return '"' + "".join(c if c.isalpha() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
+
+
+def _hashed(text: str) -> str:
+    """What a policy allows: exactly this text."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.tests["strong"] = lambda part: isinstance(part, Strong)
+    environment.tests["link"] = lambda part: isinstance(part, Link)
+    environment.tests["cross_reference"] = lambda part: isinstance(part, CrossReference)
+    environment.filters["kind"] = lambda block: type(block).__name__
+    return environment

@@ -1,0 +1,129 @@
+"""Tables of an exploration to figures: heat maps over latency and noise, a panel a tracker's rate and estimator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import matplotlib.cm
+import matplotlib.colors
+import matplotlib.patches
+import matplotlib.ticker
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.glyphs import showable
+from pipeline.simulation.what_pays import MOST, Tracker
+from pipeline.wording import NOTHING, number
+
+FloatArray = npt.NDArray[np.float64]
+
+_COLOURS = colormaps["cividis"]  # read alike by the colour-blind (Nuñez, Anderton and Renslow 2018)
+_EMPTY, _OWN = "#e3e6e8", "#D55E00"
+_WIDTH, _TITLE_LENGTH = 7.2, 24  # inches; characters
+_INK = (0.2126, 0.7152, 0.0722)  # weights of red, green and blue in a colour's brightness
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A column of the table, what it is with its unit, and how its cells are written."""
+
+    column: str
+    label: str
+    decimals: int = 1
+    logarithmic: bool = False
+    empty: str = NOTHING
+
+
+ERROR = Surface("selection_rmse_mm", "Selection error, RMSE (mm)", logarithmic=True)
+TIME = Surface("completion_time_s", "Completion time (s)")
+PARTICIPANTS = Surface("participants_needed", "Participants needed", 0, logarithmic=True, empty=f"> {MOST}")
+
+
+def surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -> Figure:
+    """A row of panels for each value of the text column `panels`, a panel in it for each rate; a frame marks `own`.
+
+    All share a scale; a cell without a value is grey, and one whose row is true in `bracketed` stands in brackets.
+    """
+    names, rates = list(dict.fromkeys(table[panels])), sorted(table["rate_hz"].unique())
+    figure = Figure(figsize=(_WIDTH, 0.75 + 1.75 * len(names)))
+    grid = figure.subplots(len(names), len(rates), squeeze=False, sharex=True, sharey=True)
+    scale = _scale(table[surface.column].to_numpy(np.float64, na_value=np.nan), surface)
+    for name, line in zip(names, grid, strict=True):
+        for rate, axes in zip(rates, line, strict=True):
+            rows = table[(table[panels] == name) & (table["rate_hz"] == rate)]
+            _panel(axes, rows, surface, scale, own if own.rate_hz == rate else None)
+            axes.set_title(f"{_short(name)}, {rate:g} Hz")
+        line[0].set_ylabel("Noise SD (mm)")
+    for axes in grid[-1]:
+        axes.set_xlabel("Latency (ms)")
+    bar = figure.colorbar(matplotlib.cm.ScalarMappable(scale, _COLOURS), ax=grid.ravel().tolist(), aspect=30)
+    bar.set_label(surface.label)
+    if surface.logarithmic:
+        bar.ax.yaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 3, 5, 7)))
+        bar.ax.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+        bar.ax.yaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+    return figure
+
+
+def _short(name: str) -> str:
+    shown = showable(name)
+    return shown if len(shown) <= _TITLE_LENGTH else f"{shown[: _TITLE_LENGTH - 1]}…"
+
+
+def _scale(values: FloatArray, surface: Surface) -> matplotlib.colors.Normalize:
+    """From the least to the largest value, a little apart where they are one."""
+    known = values[np.isfinite(values) & ((values > 0) | (not surface.logarithmic))]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (1.0, 2.0)
+    if surface.logarithmic:
+        return matplotlib.colors.LogNorm(low, max(high, 1.1 * low))
+    return matplotlib.colors.Normalize(low, max(high, low + 1e-9 + 0.01 * abs(low)))
+
+
+def _panel(
+    axes: Axes, rows: pd.DataFrame, surface: Surface, scale: matplotlib.colors.Normalize, own: Tracker | None
+) -> None:
+    """A cell a tracker, latency to the right and noise upwards, with its value."""
+    latencies, noises = (sorted(map(float, rows[name].unique())) for name in ("latency_s", "noise_sd_mm"))
+    values, bracketed = np.full((len(noises), len(latencies)), np.nan), np.zeros((len(noises), len(latencies)), bool)
+    for row in rows.to_dict("records"):
+        cell = noises.index(row["noise_sd_mm"]), latencies.index(row["latency_s"])
+        value = row[surface.column]
+        values[cell] = np.nan if pd.isna(value) else value
+        bracketed[cell] = row.get("bracketed", False)
+    _cells(axes, values, bracketed, surface, scale)
+    axes.set_xticks(np.arange(len(latencies)) + 0.5, [f"{1000 * one:g}" for one in latencies])
+    axes.set_yticks(np.arange(len(noises)) + 0.5, [f"{one:g}" for one in noises])
+    axes.tick_params(length=0)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    if own is not None:
+        corner = latencies.index(own.latency_s), noises.index(own.noise_sd_mm)
+        axes.add_patch(
+            matplotlib.patches.Rectangle(corner, 1, 1, fill=False, edgecolor=_OWN, linewidth=2.2, clip_on=False)
+        )
+
+
+def _cells(
+    axes: Axes,
+    values: FloatArray,
+    bracketed: npt.NDArray[np.bool_],
+    surface: Surface,
+    scale: matplotlib.colors.Normalize,
+) -> None:
+    axes.set_facecolor(_EMPTY)
+    axes.pcolormesh(np.ma.masked_invalid(values), cmap=_COLOURS, norm=scale, edgecolors="white", linewidth=0.5)
+    size = 8.0 if values.shape[1] <= 3 else 6.5
+    for (row, column), value in np.ndenumerate(values):
+        text = number(float(value), surface.decimals) if np.isfinite(value) else surface.empty
+        text = f"({text})" if bracketed[row, column] else text
+        ink = _ink(_COLOURS(scale(value))) if np.isfinite(value) else "black"
+        axes.text(column + 0.5, row + 0.5, text, ha="center", va="center", color=ink, fontsize=size)
+
+
+def _ink(colour: tuple[float, float, float, float]) -> str:
+    """Black or white, whichever is read more easily on a colour."""
+    return "black" if float(np.dot(_INK, colour[:3])) > 0.42 else "white"

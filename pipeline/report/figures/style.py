@@ -1,0 +1,203 @@
+"""The look that all figures share: colours that the colour-blind tell apart, names, intervals, and how to save one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any, Literal, ParamSpec
+
+import matplotlib as mpl
+import matplotlib.ticker
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.glyphs import showable
+from pipeline.wording import MINUS, THIN
+
+FloatArray = npt.NDArray[np.float64]
+Drawn = ParamSpec("Drawn")
+Place = Literal["outside upper left", "outside lower left", "outside right center"]
+
+# Okabe and Ito (2008), darkest first, so that neighbours also differ in print without colour.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+BLACK = COLOURS[6]
+GREY = "#6b757d"
+PALE = "#e3e7ea"
+WIDTH = 7.2  # inches: a page's text
+MARKS_MAX = 2000  # more than these are pixels: an SVG of each would be slow to open
+_PANELS_A_ROW = 4
+_NAME_LENGTH = 32
+_TICKS = 8.5
+
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": _TICKS,
+    "ytick.labelsize": _TICKS,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.4,
+    "figure.constrained_layout.use": True,
+    "text.parse_math": False,  # a name with two dollar signs is a name
+    "svg.fonttype": "path",
+    "svg.hashsalt": "steadyhand",
+    "savefig.dpi": 150,  # of what is kept as pixels
+}
+
+
+def styled(function: Callable[Drawn, Figure]) -> Callable[Drawn, Figure]:
+    """A figure in the house's style wherever it is made, and whatever style is in force when it is shown."""
+
+    @wraps(function)
+    def drawn(*arguments: Drawn.args, **named: Drawn.kwargs) -> Figure:
+        with mpl.rc_context(_STYLE):
+            figure = function(*arguments, **named)
+            for axes in figure.axes:  # ticks are made when they are asked for, in the style of that moment
+                axes.get_xticklabels()
+                axes.get_yticklabels()
+        return figure
+
+    return drawn
+
+
+def save(figure: Figure, path: Path) -> None:
+    """A figure as SVG, the same bytes for the same data."""
+    with mpl.rc_context(_STYLE):
+        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "Steadyhand"})
+
+
+def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:
+    """Draw a figure and save it as SVG."""
+    save(function(*arguments), path)
+
+
+def name(text: object, length: int = _NAME_LENGTH) -> str:
+    """A name as a figure can show it: with glyphs for all of it, and no longer than leaves room for the data."""
+    shown = showable(str(text))
+    if shown.startswith("_"):  # matplotlib leaves such names out of legends
+        shown = THIN + shown
+    return shown if len(shown) <= length else f"{shown[: length - 1]}…"
+
+
+def colour(index: int) -> str:
+    """The colour of the condition or estimator at this place."""
+    return COLOURS[index % len(COLOURS)]
+
+
+def marker(index: int) -> str:
+    """Its mark."""
+    return MARKERS[index % len(MARKERS)]
+
+
+def panels(rows: int = 1, columns: int = 1, height: float = 3.0, **options: Any) -> tuple[Figure, list[Axes]]:
+    """A figure as wide as a page and its panels, row by row."""
+    figure = Figure(figsize=(WIDTH, height))
+    return figure, list(np.atleast_1d(figure.subplots(rows, columns, **options)).ravel())
+
+
+def multiples(
+    count: int, row_height: float, a_row: int = _PANELS_A_ROW, **options: Any
+) -> tuple[Figure, list[Axes], int]:
+    """A figure with as many small panels of one scale, those that are left over taken away, and how many are in a row.
+
+    The axes of one scale are labelled at the left and below, also above a place that stays empty.
+    """
+    across = min(count, a_row)
+    down = -(-count // across)
+    shared: dict[str, Any] = {"sharex": True, "sharey": True} | options
+    figure, every = panels(down, across, 0.6 + row_height * down, **shared)
+    for axes in every:
+        axes.locator_params(nbins=4)
+    for spare in every[count:]:
+        spare.set_visible(False)
+        if shared["sharex"]:
+            every[every.index(spare) - across].tick_params(labelbottom=True)
+    return figure, every[:count], across
+
+
+def lowest(every: Sequence[Axes], across: int) -> list[Axes]:
+    """The panels with nothing below them."""
+    return list(every[-across:])
+
+
+def legend(figure: Figure, axes: Iterable[Axes], columns: int = 4, place: Place = "outside upper left") -> None:
+    """What marks and lines stand for, each once, outside the panels; nothing where none has a label."""
+    told: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            told.setdefault(label, handle)
+    if told:
+        figure.legend(list(told.values()), list(told), loc=place, ncols=columns)
+
+
+def mean_and_interval(values: FloatArray) -> tuple[float, float]:
+    """Mean and half the width of its 95 % t interval; NaN where one value, or none, gives no such thing."""
+    if len(values) == 0:
+        return np.nan, np.nan
+    if len(values) < 2:
+        return float(values[0]), np.nan
+    from scipy import stats
+
+    half = stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
+    return float(np.mean(values)), float(half)
+
+
+def finite(values: Any) -> FloatArray:
+    """The numbers among them."""
+    array = np.asarray(values, dtype=np.float64)
+    kept: FloatArray = array[np.isfinite(array)]
+    return kept
+
+
+def interval(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], upright: bool = True) -> None:
+    """A mean with its 95 % interval at a place; `look` is its colour and mark."""
+    mean, half = mean_and_interval(values)
+    shade, mark = look
+    place = ([at], [mean]) if upright else ([mean], [at])
+    arms: dict[str, Any] = {"yerr" if upright else "xerr": None if np.isnan(half) else [half]}
+    axes.errorbar(
+        *place,
+        **arms,
+        fmt=mark,
+        color=shade,
+        markersize=8,
+        markeredgecolor="white",
+        capsize=4,
+        linewidth=2,
+        zorder=4,
+    )
+
+
+def arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """An interval as matplotlib takes it: how far to each side, nothing where there is none."""
+    return np.nan_to_num(np.maximum(0, np.stack([middle - low, high - middle])))
+
+
+def grouped(axes: Axes) -> None:
+    """Thousands set apart on the value axis, and a true minus."""
+    axes.yaxis.set_major_formatter(
+        mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", THIN).replace("-", MINUS))
+    )
+
+
+def as_pixels(axes: Axes, marks: int) -> float:
+    """The zorder for so many marks: where they are many, one at which a panel's marks are one picture."""
+    if marks <= MARKS_MAX:
+        return 2.0
+    axes.set_rasterization_zorder(0)
+    return -1.0
+
+
+def thinned(count: int, most: int) -> slice:
+    """Every so manieth of `count`, `most` at the most."""
+    return slice(None, None, max(1, -(-count // most)))

@@ -1,0 +1,40 @@
+"""A report's sections in order: each from a study's tables to a Section, or to None where it has nothing to show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.report.document.model import Section
+from pipeline.report.sections import (
+    accuracy,
+    comparisons,
+    design,
+    outcomes,
+    overview,
+    participants,
+    paste,
+    paths,
+    printed,
+    provenance,
+    quality,
+    simulation,
+)
+from pipeline.report.sections.material import Material
+
+SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
+    overview.section,
+    design.section,
+    quality.section,
+    accuracy.section,
+    paths.section,
+    outcomes.selection,
+    outcomes.time,
+    outcomes.workload,
+    outcomes.others,
+    comparisons.section,
+    simulation.section,
+    paste.section,
+    printed.section,
+    participants.section,
+    provenance.section,
+)

@@ -1,0 +1,151 @@
+"""How well each estimator follows the hand: the paper's Table 1 and Figures 6, 8 and 9 for any study."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pipeline.report import figures
+from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
+from pipeline.report.figures import captions
+from pipeline.report.sections.material import Material, Row
+from pipeline.sessions.recording import SMOOTHED
+from pipeline.tables import table as tables
+from pipeline.wording import NOTHING, counted, number, percent, seconds
+
+_ROWS_MAX = 40
+
+
+SMOOTHED_REMARK = (
+    " Estimates are held against all readings smoothed, before and after each instant, by the fusion filter. That"
+    " leaves out whatever all sensors have wrong together, and is kinder to estimators that resemble it."
+)
+
+
+def section(material: Material) -> Section | None:
+    """Fusion accuracy; None for a study of tables alone."""
+    if not material.sessions or not material.study.estimators:
+        return None
+    rows = material.rows("accuracy")
+    blocks: list[Block] = [Paragraph(_method(material))]
+    if rows:
+        if any(row["reference"] == SMOOTHED for row in rows):
+            blocks.append(Paragraph((Strong("No reference was recorded."), SMOOTHED_REMARK)))
+        blocks.append(_summary_table(material, rows))
+        blocks += _over_sessions(material, tables.frame("accuracy", rows))
+    else:
+        blocks.append(Paragraph(("The logs hold no reference position, so errors cannot be given.",)))
+    blocks += _session_figures(material)
+    if rows and len(material.sessions) > 1:
+        blocks.append(_session_table(rows))
+    return Section("accuracy", "Fusion accuracy", tuple(blocks))
+
+
+def _method(material: Material) -> tuple[str | Strong, ...]:
+    listed = [f"{name} ({settings.type})" for name, settings in material.study.estimators.items()]
+    return (
+        (
+            "Every estimator was run over the same raw streams and asked, at the arrival of each acceleration, where"
+            " the hand is at that instant, from what had arrived by then. Estimators: "
+        ),
+        Strong("; ".join(listed)),
+        ".",
+    )
+
+
+def _summary_table(material: Material, rows: list[Row]) -> Table:
+    titles = (
+        "Estimator",
+        "RMSE (mm)",
+        "Stated SD (mm)",
+        "In 95 % interval",
+        "Lag (ms)",
+        "Lead, paper's (ms)",
+        "Jitter at rest (mm)",
+    )
+    cells = tuple(
+        (
+            row["estimator"],
+            number(row["rmse_mm"], 2),
+            number(row["sd_mm"], 2),
+            percent(row["coverage_95"], 0),
+            seconds(row["lag_s"]),
+            seconds(row["lead_xcorr_s"]),
+            number(row["jitter_mm"], 2),
+        )
+        for row in material.rows("accuracy_means")
+    )
+    n, axes = len({row["session"] for row in rows}), len(material.study.axes)
+    where = f"{axes} axes together" if axes > 1 else f"along {material.study.axes[0]}"
+    return Table(
+        "table-accuracy",
+        f"Accuracy of each estimator against the reference, means over {counted(n, 'session')} ({where}). Lower is"
+        " better in all columns but the third, which should be near 95 %.",
+        columns(titles, 1),
+        cells,
+        "RMSE: root mean square distance to the reference. Stated SD: the error the estimator says it makes. In 95 % "
+        "interval: share of instants and axes where the reference is within 1.96 stated SDs. Lag: the shift that fits "
+        "the reference best, positive = late. Lead: the paper's measure, the peak of the cross-correlation with the "
+        "tracker as it arrived, positive = ahead of it; fragile where the hand moves only once or drifts. Jitter: SD "
+        "while the hand is slower than 20 mm/s.",
+    )
+
+
+def _session_table(rows: list[Row]) -> Table:
+    titles = (
+        "Session",
+        "Estimator",
+        "RMSE (mm)",
+        "Stated SD (mm)",
+        "In 95 % interval",
+        "Lag (ms)",
+        "95 % interval (ms)",
+        "Jitter (mm)",
+    )
+    cells = tuple(
+        (
+            row["session"],
+            row["estimator"],
+            number(row["rmse_mm"], 2),
+            number(row["sd_mm"], 2),
+            percent(row["coverage_95"], 0),
+            seconds(row["lag_s"]),
+            NOTHING if row["lag_low_s"] is None else f"[{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]",
+            number(row["jitter_mm"], 2),
+        )
+        for row in rows[:_ROWS_MAX]
+    )
+    more = (
+        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/accuracy.csv." if len(rows) > _ROWS_MAX else ""
+    )
+    return Table(
+        "table-accuracy-sessions",
+        f"The same for each session, the lag with its 95 % interval.{more}",
+        columns(titles, 2),
+        cells,
+        "Intervals of the lag: moving-block bootstrap, blocks of 0.5 s.",
+    )
+
+
+def _over_sessions(material: Material, rows: pd.DataFrame) -> list[Block]:
+    """Error and lag by estimator, one against the other, and the stated SD against what happened."""
+    blocks: list[Block] = [material.drawn("accuracy", figures.errors, captions.errors, rows)]
+    if rows["lag_s"].notna().any():
+        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, captions.lag_and_error, rows))
+    counts = material.table("calibration")
+    if len(counts):
+        blocks.append(material.drawn("calibration", figures.calibration, captions.calibration, counts))
+    return blocks
+
+
+def _session_figures(material: Material) -> list[Block]:
+    """The paper's figures for one session: the first that can be used."""
+    folder = material.assessed[(material.used() or [0])[0]]
+    excerpts, curves = (tables.read(name, folder) for name in ("excerpts", "lead_curves"))
+    blocks: list[Block] = []
+    if len(excerpts):
+        blocks.append(material.drawn("streams", figures.streams, captions.streams, excerpts))
+    if (excerpts["kind"] == "estimate").any():
+        blocks.append(material.drawn("estimates", figures.estimates, captions.estimates, excerpts))
+    if len(curves):
+        blocks.append(material.drawn("lead", figures.lead, captions.lead, curves))
+    return blocks

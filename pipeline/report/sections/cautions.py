@@ -1,0 +1,103 @@
+"""What a reader of the results has to be careful about, in a line each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+from pipeline.report.document.model import Strong, Text
+from pipeline.report.sections.material import Material, Row
+from pipeline.wording import counted, listing, measure_label
+
+_REST_ON_NORMAL = ("rm_anova", "t_paired", "tost", "bayes_t", "crossover")
+_REMARKS_MAX = 3
+_FEW = 8  # participants
+
+
+def cautions(material: Material) -> list[Text]:
+    """From where the data come from, through assumptions and design, to what is missing."""
+    return [*_of_data(material), *_of_assumptions(material), *_of_design(material), *_of_gaps(material)]
+
+
+def _of_data(material: Material) -> Iterator[Text]:
+    origin, n = material.study.data_origin, material.results["study"]["participants"]["n"]
+    if origin == "reconstructed":
+        yield (Strong("The data are reconstructed: "), "they fit printed figures and are nobody's measurements.")
+    if origin == "simulated":
+        yield (Strong("The data are simulated: "), "they show what a model does, not what people do.")
+    if material.rows("comparisons") and n < _FEW:
+        text = f"with n = {n} intervals are wide and a normal distribution cannot be checked."
+        yield (Strong("Few participants: "), text)
+
+
+def _details(row: Row, *names: str) -> float | None:
+    """The first of these figures that a row has."""
+    details = row["details"] or {}
+    return next((details[name] for name in names if details.get(name) is not None), None)
+
+
+def _named(rows: list[Row]) -> str:
+    """Their measures, each once."""
+    return listing(list(dict.fromkeys(measure_label(row["measure"]) for row in rows)))
+
+
+def _of_assumptions(material: Material) -> Iterator[Text]:
+    alpha, rows = material.study.alpha, material.rows("comparisons")
+
+    def below(row: Row, *names: str) -> bool:
+        found = _details(row, *names)
+        return found is not None and found < alpha
+
+    violated = [row for row in rows if row["test"] == "rm_anova" and below(row, "mauchly_p")]
+    if violated:
+        text = f"(the differences between conditions vary unequally) for {_named(violated)}: judge by the"
+        yield (Strong("Sphericity is violated "), f"{text} Greenhouse-Geisser p.")
+    resting = [row for row in rows if row["test"] in _REST_ON_NORMAL]
+    skewed = [row for row in resting if below(row, "shapiro_p", "residual_shapiro_p")]
+    if skewed:
+        text = f"by Shapiro and Wilk's test, for {_named(skewed)}: see whether a rank test says the same."
+        yield (Strong("Differences are not normally distributed "), text)
+    yield from _far_out(resting)
+    singular = [row for row in rows if (row["details"] or {}).get("singular")]
+    if singular:
+        text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so that it"
+        yield (Strong("Singular fit "), f"{text} treats their rows as if of different people.")
+    undefined = sum(row["status"] != "ok" for row in rows)
+    if undefined:
+        yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
+    narrow = [
+        row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
+    ]
+    if narrow:
+        text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals hold the"
+        yield (Strong("Stated uncertainty too small "), f"{text} reference in less than 90 % of instants.")
+
+
+def _far_out(rows: list[Row]) -> Iterator[Text]:
+    """Participants whose difference lies far from the others'."""
+    found = [row for row in rows if (row["details"] or {}).get("outliers")]
+    people = list(dict.fromkeys(person for row in found for person in row["details"]["outliers"]))
+    if people:
+        who = listing(people) if len(people) <= _REMARKS_MAX else counted(len(people), "participant")
+        text = f"in {_named(found)}: {who}. Nobody is left out for that; look at the figures."
+        yield (Strong("Far from the other participants "), text)
+
+
+def _of_design(material: Material) -> Iterator[Text]:
+    """What in the check of the design is not as it should be: order of the conditions, period, carry-over, cells."""
+    remarked = [row for row in material.rows("design_check") if row["remark"]]
+    told = [f"{row['what']}: {row['remark']}" for row in remarked]
+    if told:
+        more = f"; and {len(told) - _REMARKS_MAX} more" if len(told) > _REMARKS_MAX else ""
+        yield (Strong("Design: "), f"{'; '.join(told[:_REMARKS_MAX])}{more}. See design and participants.")
+
+
+def _of_gaps(material: Material) -> Iterator[Text]:
+    contradictions = sum(row["verdict"] == "contradiction" for row in material.rows("printed"))
+    if contradictions:
+        verb = "contradicts" if contradictions == 1 else "contradict"
+        yield (f"{counted(contradictions, 'printed figure')} {verb} others in the same publication; see there.",)
+    kinds = Counter(row["what"] for row in material.rows("exclusions"))
+    if kinds:
+        told = listing([f"{what} ({count})" for what, count in kinds.items()])
+        yield (Strong("Not everything is in: "), f"{told}; data quality says which and why.")

@@ -1,0 +1,144 @@
+"""Every comparison in one table, and what its columns mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
+from pipeline.report.sections.material import Material, Row
+from pipeline.statistics.diagnostics import OUTLIER_RULE
+from pipeline.wording import (
+    NOTHING,
+    TESTS,
+    adjustment,
+    contrast,
+    counted,
+    degrees_of_freedom,
+    effect_size,
+    listing,
+    measure_label,
+    number,
+    p_value,
+    percent,
+    share,
+    statistic_name,
+    statistic_value,
+)
+
+
+def anchor(at: int) -> str:
+    """The id of a comparison's row, by its place in the table `comparisons`."""
+    return f"comparison-{at + 1}"
+
+
+def section(material: Material) -> Section | None:
+    """Every comparison."""
+    rows = material.rows("comparisons")
+    if not rows:
+        return None
+    tests = list(dict.fromkeys(row["test"] for row in rows))
+    filled = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NOTHING, "") for row in rows)]
+    table = Table(
+        "table-comparisons",
+        f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
+        f" if there were none; the study's level is {100 * material.study.alpha:g} %.",
+        columns([title for title, _ in filled], 3),
+        tuple(tuple(cell(row) for _, cell in filled) for row in rows),
+        f"{_who_counts(tests)} Mean difference: first minus second condition; reduction: relative to the first.",
+        tuple(anchor(at) for at in range(len(rows))),
+    )
+    where = "Every test of the study, a row each. What the words and letters mean stands in the "
+    explained = Paragraph((where, CrossReference("glossary", "glossary"), "."))
+    blocks: list[Block] = [explained, table, Paragraph((Strong("Methods: "), _methods(rows)))]
+    return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
+
+
+def _who_counts(tests: Sequence[str]) -> str:
+    every = "Only participants with a value in every condition count (n)"
+    return f"{every}, but in the mixed model all." if "mixed_model" in tests else f"{every}."
+
+
+def _methods(rows: Sequence[Row]) -> str:
+    """Every method by name, and how families of p values were adjusted."""
+    named: dict[str, list[str]] = {}
+    for row in rows:
+        named.setdefault(TESTS[row["test"]], []).append(row["method"])
+    told = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in named.items()]
+    return "; ".join(told) + ". Adjusted p: over the measures of an entry of study.yaml, pairs over those of a measure."
+
+
+def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:
+    """Are the differences that tests of pairs rest on normal, and does any lie far out? Once for each pair."""
+    found: dict[tuple[str, str], Row] = {}
+    for row in rows:
+        details = row["details"] or {}
+        if "shapiro_w" in details or "residual_shapiro_w" in details:
+            found.setdefault((row["measure"], _differences(row, conditions)), row)
+    if not found:
+        return []
+    cells = tuple(
+        (measure_label(measure), compared, f"{row['n']}", *_normality(row["details"]), _outliers(row["details"]))
+        for (measure, compared), row in found.items()
+    )
+    table = Table(
+        "table-diagnostics",
+        "The differences looked at: a small p of Shapiro and Wilk's test (W) speaks against a normal distribution, "
+        "which t tests and ANOVA suppose and rank tests do not.",
+        columns(("Measure", "Differences", "n", "W", "p", "Far out"), 2),
+        cells,
+        f"Far out: participants whose difference has a {OUTLIER_RULE}; nobody is left out for that. No spread: more "
+        "than half of the differences are equal, so that the rule does not apply.",
+    )
+    return [table]
+
+
+def _differences(row: Row, conditions: Sequence[str]) -> str:
+    """Between what: the pair, or all conditions, whose residuals are looked at."""
+    if row["contrast"] is None and "shapiro_w" not in row["details"]:
+        return "residuals of all conditions"
+    pair = " - ".join(conditions) if row["contrast"] is None else row["contrast"]
+    return contrast({**row, "contrast": pair, "details": None})
+
+
+def _normality(details: Mapping[str, Any]) -> tuple[str, str]:
+    prefix = "" if "shapiro_w" in details else "residual_"
+    return share(details[f"{prefix}shapiro_w"]), p_value(details[f"{prefix}shapiro_p"])
+
+
+def _outliers(details: Mapping[str, Any]) -> str:
+    if "outliers" not in details:
+        return NOTHING
+    if details["outliers"] is None:
+        return "no spread"
+    return listing(details["outliers"]) if details["outliers"] else "nobody"
+
+
+def _statistic(row: Row) -> str:
+    return f"{statistic_name(row)} = {statistic_value(row)}" if row["status"] == "ok" else str(row["status"])
+
+
+def _adjusted_p(row: Row) -> str:
+    adjusted = row["p_adjusted"]
+    return NOTHING if adjusted is None else f"{p_value(adjusted)} ({adjustment(row['adjust'])})"
+
+
+def _corrected_p(row: Row) -> str:
+    return p_value((row["details"] or {}).get("p_gg"))
+
+
+_COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
+    ("Measure", lambda row: measure_label(row["measure"])),
+    ("Test", lambda row: TESTS[row["test"]]),
+    ("Compared", contrast),
+    ("n", lambda row: f"{row['n']}"),
+    ("Statistic", _statistic),
+    ("df", degrees_of_freedom),
+    ("p", lambda row: p_value(row["p"])),
+    ("p corrected", _corrected_p),
+    ("p adjusted", _adjusted_p),
+    ("Effect size [95 % interval]", effect_size),
+    ("Mean difference", lambda row: number(row["mean_difference"])),
+    ("Reduction", lambda row: percent(row["reduction"])),
+)
+"""The table's columns; one that no row fills is left out."""

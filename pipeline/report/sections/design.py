@@ -1,0 +1,81 @@
+"""How the study was done and who took part."""
+
+from __future__ import annotations
+
+from pipeline.report.document.model import Block, Notice, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.report.sections.material import ORIGINS, Material, conditions_text
+from pipeline.wording import counted, listing, measure_label, number
+
+
+def section(material: Material) -> Section:
+    """Design and participants."""
+    study = material.study
+    blocks: list[Block] = [Paragraph(_participants(material))]
+    if len(study.conditions) > 1:
+        text = f"{conditions_text(study.conditions)}. A difference is the first minus the second in this order."
+        blocks.append(Paragraph((Strong("Conditions: "), text)))
+    else:
+        blocks.append(Paragraph((Strong("Condition: "), f"{study.conditions[0]}.")))
+    if material.sessions:
+        blocks.append(
+            Paragraph((Strong("Sessions: "), f"{counted(len(material.sessions), 'log')} of raw sensor streams."))
+        )
+    if study.shown:
+        shown = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
+        blocks.append(Paragraph((Strong("Display: "), f"{listing(shown)}.")))
+    blocks += _checked(material)
+    notes: list[Text] = [(ORIGINS[study.data_origin],)]
+    if study.notes.strip():
+        notes.append((study.notes.strip(),))
+    if study.citation.strip():
+        notes.append((Strong("Source: "), study.citation.strip()))
+    blocks.append(Notice("Where the data come from", tuple(notes), "information"))
+    return Section("design", "Design and participants", tuple(blocks))
+
+
+def _participants(material: Material) -> Text:
+    """Number, sex and age, as far as participants.csv gives them."""
+    facts = material.results["study"]["participants"]
+    text = counted(facts["n"], "participant")
+    if facts.get("sex"):
+        text += f" ({listing([f'{count} {name}' for name, count in facts['sex'].items()])})"
+    if facts.get("age"):
+        age = facts["age"]
+        text += f", aged {number(age['min'], 0)} to {number(age['max'], 0)} years (mean {number(age['mean'], 1)})"
+    if material.study.participants is None:
+        text += "; the study has no participants table, so age and sex are not known"
+    return (Strong("Participants: "), text + ".")
+
+
+def _checked(material: Material) -> list[Block]:
+    """What the check of the design found, and in a sentence what of it calls for attention."""
+    rows = material.rows("design_check")
+    if not rows:
+        return []
+    cells = tuple(
+        (
+            row["what"].capitalize(),
+            " ".join(filter(None, (row["condition"], row["measure"] and measure_label(row["measure"])))),
+            row["found"],
+            row["expected"],
+            row["remark"] or "",
+        )
+        for row in rows
+    )
+    remarked = [row["what"] for row in rows if row["remark"]]
+    text = "everything that could be checked is as it should be."
+    if remarked:
+        text = f"{counted(len(remarked), 'remark')}, on {listing(list(dict.fromkeys(remarked)))}; see the table."
+    note = (
+        f"Effects of the period and carry-over are tested singly at the {100 * material.study.alpha:g} % level; that "
+        "none is found does not mean that there is none, least of all for carry-over between few people."
+    )
+    table = Table(
+        "table-design",
+        "The design checked: who met which condition when, and whether it mattered. A comparison within people is fair "
+        "if each condition comes equally often early and late, and equally often after each other one.",
+        columns(("What", "Of", "Found", "Expected", "Remark"), 5),
+        cells,
+        note if any(row["expected"] == "none" for row in rows) else "",
+    )
+    return [Paragraph((Strong("Design: "), text)), table]

@@ -1,0 +1,46 @@
+"""What the words of a report mean: those that it uses, and no others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from pipeline.report.document.model import (
+    Block,
+    Figure,
+    KeyFigures,
+    Notice,
+    Paragraph,
+    Section,
+    Table,
+    columns,
+    plain,
+)
+from pipeline.report.prose.glossary import explained
+
+ANCHOR = "glossary"
+
+
+def of(sections: Sequence[Section]) -> tuple[Section, ...]:
+    """A section for the end of a report that has these; none where there is nothing to explain."""
+    found = explained([text for section in sections for block in section.blocks for text in _texts(block)])
+    if not found:
+        return ()
+    caption = "The statistical words of this report, a sentence each."
+    table = Table("table-glossary", caption, columns(("Word", "Meaning"), 2), tuple(found))
+    return (Section(ANCHOR, "Glossary", (table,)),)
+
+
+def _texts(block: Block) -> Iterator[str]:
+    """Every text of a block by itself."""
+    match block:
+        case Paragraph():
+            yield plain(block.text)
+        case Notice():
+            yield from (block.title, *(plain(text) for text in block.texts))
+        case KeyFigures():
+            yield from (text for figure in block.figures for text in (figure.value, figure.label, figure.evidence))
+        case Table():
+            yield from (block.caption, block.note, *(column.title for column in block.columns))
+            yield from (cell for row in block.rows for cell in row)
+        case Figure():
+            yield block.caption

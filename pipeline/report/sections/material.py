@@ -1,0 +1,117 @@
+"""What sections are made from, and what they share."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import matplotlib.figure
+import pandas as pd
+
+from pipeline.engine.two_processes import Job
+from pipeline.report import figures
+from pipeline.report.document.model import Figure
+from pipeline.report.figures import captions
+from pipeline.study.settings import Session, Study
+from pipeline.tables import table as tables
+from pipeline.wording import listing
+
+Row = Mapping[str, Any]
+
+_NAME_LENGTH = 60
+
+ORIGINS = {
+    "recorded": "Recorded data: measured with people and devices.",
+    "simulated": "Simulated data: made by a model, not measured with people.",
+    "reconstructed": "Reconstructed data: invented to fit printed figures, not anybody's measurements.",
+}
+
+
+@dataclass(frozen=True)
+class Material:
+    """A study's settings, results and tables. `ingested` and `fused` are a folder a session, in their order.
+
+    `whole` are the folders with tables of the whole study; `drawings` gathers the figures that are to be drawn.
+    """
+
+    name: str
+    study: Study
+    results: Mapping[str, Any]
+    measures: pd.DataFrame
+    sessions: tuple[Session, ...]
+    ingested: tuple[Path, ...]
+    fused: tuple[Path, ...]
+    assessed: tuple[Path, ...]
+    figures: Path
+    inputs: Mapping[str, str]
+    whole: tuple[Path, ...]
+    drawings: list[Job] = field(default_factory=list)
+
+    def rows(self, table: str) -> list[Row]:
+        """The rows of a table of results.json."""
+        return list(self.results[table])
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the whole study."""
+        return tables.read(name, [folder for folder in self.whole if (folder / f"{name}.parquet").is_file()][:1])
+
+    def used(self) -> list[int]:
+        """The places, in `sessions`, of those that are not excluded as a whole."""
+        return [place for place, session in enumerate(self.sessions) if not self.study.exclusion_of(session)]
+
+    def comparisons_of(self, measure: str) -> list[Row]:
+        """The comparisons of one measure."""
+        return [row for row in self.rows("comparisons") if row["measure"] == measure]
+
+    def measured(self) -> list[str]:
+        """Every measure with descriptives, in their order."""
+        return list(dict.fromkeys(row["measure"] for row in self.rows("descriptives")))
+
+    def participant_means(self, measure: str) -> pd.DataFrame:
+        """A row a participant, a column a condition."""
+        return tables.participant_means(self.measures, measure, self.study.conditions)
+
+    def figure(
+        self,
+        name: str,
+        function: Callable[..., matplotlib.figure.Figure],
+        caption: str,
+        alt: str,
+        *arguments: Any,
+    ) -> Figure:
+        """Have a figure drawn into the report's figures, and name it in the text."""
+        self.drawings.append(Job(figures.draw, (function, self.figures / f"{name}.svg", *arguments)))
+        return Figure(f"figure-{name}", f"{name}.svg", caption, alt)
+
+    def drawn(
+        self,
+        name: str,
+        function: Callable[..., matplotlib.figure.Figure],
+        said: Callable[..., captions.Said],
+        *arguments: Any,
+        more: str = "",
+    ) -> Figure:
+        """A figure with what its caption function says of the same arguments, and more, such as what is left out."""
+        caption, alt = said(*arguments)
+        return self.figure(name, function, f"{caption}{more}", alt, *arguments)
+
+
+def safe_name(text: str) -> str:
+    """A name fit for a file, different for different texts: letters, digits and dashes."""
+    plain = "-".join("".join(c if c.isalnum() and c.isascii() else " " for c in text).split()).lower()
+    if plain == text.replace("_", "-").replace("/", "-") and len(plain) <= _NAME_LENGTH:
+        return plain
+    return f"{plain[:_NAME_LENGTH]}-{hashlib.sha256(text.encode()).hexdigest()[:6]}".lstrip("-")
+
+
+def first_of(shown: int, there: int, what: str) -> str:
+    """That a figure shows the first of many, or nothing where it shows all."""
+    return f" The first {shown} of {there} {what}." if there > shown else ""
+
+
+def conditions_text(conditions: Sequence[str]) -> str:
+    """The conditions for a sentence, the baseline named."""
+    return f"{listing(list(conditions))} ({conditions[0]} is the baseline)" if len(conditions) > 1 else conditions[0]

@@ -1,0 +1,249 @@
+"""What people did and felt: selection, time, workload and whatever else was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from pipeline.report import figures
+from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
+from pipeline.report.figures import captions
+from pipeline.report.figures.canvas import offsets_mm
+from pipeline.report.sections.material import Material, Row, first_of, safe_name
+from pipeline.wording import (
+    TESTS,
+    adjustment,
+    comparison_sentence,
+    contrast,
+    effect_size,
+    evidence,
+    interval,
+    measure_label,
+    number,
+    p_value,
+    short_label,
+    statistic,
+)
+
+_SELECTION = ("selection_mse_px2", "selection_mse_mm2", "selection_rmse_px", "selection_rmse_mm")
+_TIME = ("completion_time_s", "trial_time_s")
+_PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
+
+
+def selection(material: Material) -> Section | None:
+    """Accuracy of target selection (the paper's Fig. 12)."""
+    names = [name for name in _SELECTION if name in material.measured()]
+    if not names:
+        return None
+    drawn = next(name for name in names if "mse" in name)
+    text = (
+        "How far from the target people selected. MSE is a participant's mean squared distance over trials; RMSE is the"
+        " square root of the mean of the participants' MSEs, in the unit of the display."
+    )
+    blocks: list[Block] = [Paragraph((text,)), *_task(material), _descriptives(material, "table-selection", names)]
+    blocks += _measured(material, drawn)
+    blocks += _selected(material)
+    if material.rows("shown_at_selection"):
+        blocks.append(_shown(material))
+    return Section("selection", "Target selection", tuple(blocks))
+
+
+def time(material: Material) -> Section | None:
+    """Time (the paper's Fig. 13)."""
+    names = [name for name in _TIME if name in material.measured()]
+    if not names:
+        return None
+    text = (
+        "Completion time runs from the start of a session to its last selection, time per trial from a target's "
+        "appearance to its selection."
+    )
+    blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-time", names)]
+    for name in names:
+        blocks += _measured(material, name)
+    return Section("time", "Time", tuple(blocks))
+
+
+def workload(material: Material) -> Section | None:
+    """Questionnaires (the paper's Table 2 and Fig. 14)."""
+    scales = [name for name in material.measured() if "/" in name]
+    if not scales:
+        return None
+    blocks: list[Block] = []
+    for questionnaire in dict.fromkeys(name.partition("/")[0] for name in scales):
+        mine = [name for name in scales if name.partition("/")[0] == questionnaire]
+        blocks += _questionnaire(material, questionnaire, mine)
+    return Section("workload", "Workload and other ratings", tuple(blocks))
+
+
+def others(material: Material) -> Section | None:
+    """Every measure that has no section of its own."""
+    names = [name for name in material.measured() if name not in (*_SELECTION, *_TIME) and "/" not in name]
+    if not names:
+        return None
+    blocks: list[Block] = [_descriptives(material, "table-others", names)]
+    for name in names:
+        blocks += _measured(material, name)
+    return Section("others", "Further measures", tuple(blocks))
+
+
+def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Table:
+    titles = ("Measure", "Condition", "n", "Mean", "SD", "Median", "95 % interval of the mean")
+    rows = [row for name in names for row in material.rows("descriptives") if row["measure"] == name]
+    cells = tuple(
+        (
+            measure_label(row["measure"]),
+            row["condition"],
+            f"{row['n']}",
+            number(row["mean"]),
+            number(row["sd"]),
+            number(row["median"]),
+            interval(row["ci_low"], row["ci_high"]),
+        )
+        for row in rows
+    )
+    caption = "Means over participants, each participant one value in each condition."
+    return Table(table_id, caption, columns(titles, 2), cells)
+
+
+def _measured(material: Material, measure: str) -> list[Block]:
+    """A measure's figure and what its tests say."""
+    wide = material.participant_means(measure)
+    if not wide.notna().any().any():
+        return []
+    label = measure_label(measure)
+    blocks: list[Block] = [
+        material.drawn(f"measure-{safe_name(measure)}", figures.paired, captions.paired, wide, measure)
+    ]
+    for sentence in _sentences(material.comparisons_of(measure)):
+        blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
+    return blocks
+
+
+def _task(material: Material) -> list[Block]:
+    """The layout of the task, where study.yaml has one."""
+    task = getattr(material.study, "task", None)
+    return [] if task is None else [material.drawn("task", figures.task_layout, captions.task_layout, task)]
+
+
+def _selected(material: Material) -> list[Block]:
+    """Where selections fell about their targets, and each participant's errors trial by trial."""
+    study, selections, trials = material.study, material.table("selections"), material.table("trials")
+    blocks: list[Block] = []
+    if len(study.axes) > 1:
+        plane = (study.axes[0], study.axes[1])
+        scale = study.display.px_per_mm if study.display is not None and study.display.unit == "px" else None
+        if len(offsets_mm(selections, plane)):
+            shown = (selections, study.conditions, plane, scale)
+            blocks.append(
+                material.drawn("selection-errors", figures.selection_errors, captions.selection_errors, *shown)
+            )
+    several = trials.groupby(["participant", "condition"])["trial"].nunique().max() if len(trials) else 0
+    people = sorted(set(trials["participant"]))
+    if several > 1:
+        some = trials[trials["participant"].isin(people[:_PEOPLE_MAX])]
+        more = first_of(_PEOPLE_MAX, len(people), "participants")
+        blocks.append(material.drawn("trials", figures.trials, captions.trials, some, study.conditions, more=more))
+    return blocks
+
+
+def _sentences(rows: Sequence[Row]) -> Iterator[str]:
+    """A sentence a comparison; the pairs that follow one up share one."""
+    whole = {(row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] == "F"}
+
+    def follows_up(row: Row) -> bool:
+        return row["contrast"] is not None and (row["test"], row["effect"]) in whole
+
+    for (test, _, follows), group in groupby(rows, key=lambda row: (row["test"], row["effect"], follows_up(row))):
+        pairs = list(group)
+        if not follows:
+            yield from (comparison_sentence(row) for row in pairs)
+            continue
+        told = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
+        yield f"follow-up of the {TESTS[test]}, n = {pairs[0]['n']}: {'; '.join(told)}"
+
+
+def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:
+    scales = [name for name in names if not name.endswith("/total")]
+    title = measure_label(f"{questionnaire}/x").partition(":")[0]
+    wide = {name: material.participant_means(name) for name in scales}
+    blocks: list[Block] = [_ratings_table(material, questionnaire, title, names)]
+    tested = [row for name in names for row in material.comparisons_of(name)]
+    if tested:
+        blocks.append(_tests_table(questionnaire, title, tested))
+    called = f"ratings-{safe_name(questionnaire)}"
+    blocks.append(material.drawn(called, figures.workload, captions.workload, wide))
+    blocks.append(material.drawn(f"{called}-people", figures.scales, captions.scales, wide))
+    return blocks
+
+
+def _ratings_table(material: Material, questionnaire: str, title: str, names: list[str]) -> Table:
+    """Mean and SD of every scale, conditions side by side (the paper's Table 2)."""
+    conditions = material.study.conditions
+    found = {(row["measure"], row["condition"]): row for row in material.rows("descriptives")}
+    columns = [Column("Scale", False)]
+    for condition in conditions:
+        columns += [Column(f"{condition}: mean"), Column("SD"), Column("n")]
+    rows = []
+    for name in names:
+        cells = [short_label(name)]
+        for condition in conditions:
+            row = found.get((name, condition))
+            cells += ["–", "–", "0"] if row is None else [number(row["mean"]), number(row["sd"]), f"{row['n']}"]
+        rows.append(tuple(cells))
+    note = "Total: a participant's sum over the scales." if any(name.endswith("/total") for name in names) else ""
+    return Table(f"table-{safe_name(questionnaire)}", f"{title} ratings by scale.", tuple(columns), tuple(rows), note)
+
+
+def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
+    titles = ("Scale", "Comparison", "n", "Statistic", "p", "p adjusted", "Effect size [95 % interval]")
+    cells = tuple(
+        (
+            short_label(row["measure"]),
+            contrast(row),
+            f"{row['n']}",
+            statistic(row),
+            p_value(row["p"]),
+            p_value(row["p_adjusted"]),
+            effect_size(row) if row["status"] == "ok" else row["status"],
+        )
+        for row in rows
+    )
+    methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
+    note = f"Methods: {methods}. Adjusted: {_families(rows)}."
+    caption = (
+        f"Tests of the {title} scales. Judge by the adjusted p: with many tests some fall below any level by chance."
+    )
+    return Table(
+        f"table-{safe_name(questionnaire)}-tests",
+        caption,
+        columns(titles, 2),
+        cells,
+        note,
+    )
+
+
+def _families(rows: list[Row]) -> str:
+    """How p values were adjusted, and over what."""
+    methods = [adjustment(name) for name in dict.fromkeys(row["adjust"] for row in rows) if name != "none"]
+    if not methods:
+        return "no"
+    pairs = len({row["contrast"] for row in rows if row["contrast"] is not None}) > 1
+    over = "the scales, pairs over those of their scale" if pairs else "the scales"
+    return f"{', '.join(methods)} over {over}"
+
+
+def _shown(material: Material) -> Table:
+    """What each estimator would have shown when people selected."""
+    titles = ("Condition", "Estimator", "n", "RMSE (mm)")
+    cells = tuple(
+        (row["condition"], row["estimator"], f"{row['n']}", number(row["rmse_mm"]))
+        for row in material.rows("shown_at_selection")
+    )
+    return Table(
+        "table-shown",
+        "What each estimator would have shown at the moments of selection: its distance from the targets. People "
+        "steered by what was displayed, so the displayed estimator has the advantage.",
+        columns(titles, 2),
+        cells,
+        '"recorded" is where the participants selected.',
+    )

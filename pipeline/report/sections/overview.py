@@ -1,0 +1,293 @@
+"""The first page: the question, the answer in two sentences and a figure, and what to be careful about."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pipeline.report import figures
+from pipeline.report.document.model import (
+    Block,
+    Figure,
+    KeyFigure,
+    KeyFigures,
+    Link,
+    Notice,
+    Paragraph,
+    Section,
+    Strong,
+    Text,
+)
+from pipeline.report.sections import traces
+from pipeline.report.sections.cautions import cautions
+from pipeline.report.sections.material import ORIGINS, Material, Row
+from pipeline.wording import (
+    EFFECTS_OF_CONDITION,
+    MINUS,
+    NOTHING,
+    adjustment,
+    comparison_sentence,
+    counted,
+    decisive_p,
+    interval,
+    listing,
+    measure_label,
+    number,
+    p_phrase,
+    percent,
+    reduction_phrase,
+    short_label,
+    statistic,
+    unit_of,
+    verdict,
+)
+
+_HEADLINES = ("selection_mse_px2", "selection_mse_mm2", "completion_time_s", "trial_time_s")
+_KEY_FIGURES_MAX = 3
+_SENTENCES = 2
+_NOT_OF_CHANCE = ("tost", "bayes_t")  # they answer another question than whether there is a difference
+
+
+def section(material: Material) -> Section:
+    """Summary."""
+    blocks: list[Block] = [Paragraph(_question(material))]
+    answer = _answer(material)
+    if answer:
+        blocks.append(Paragraph(answer))
+    keys = _key_figures(material)
+    if keys:
+        blocks.append(KeyFigures(tuple(keys)))
+    blocks += _figure(material)
+    blocks.append(Paragraph(_data(material)))
+    found = cautions(material)
+    if found:
+        blocks.append(Notice("To be careful about", tuple(found)))
+    blocks += [Paragraph(text) for text in _evidence(material)]
+    if material.sessions:
+        told = "Every session can be looked at closely, as the tracker gave it and as each estimator made of it: "
+        blocks.append(Paragraph((told, Link(traces.PAGE, traces.PAGE), ".")))
+    return Section("summary", "Summary", tuple(blocks))
+
+
+def _answer(material: Material) -> Text:
+    """Two sentences: of the two measures people look for first, else of the ratings, else of the estimators."""
+    rows = _headline_rows(material)[:_SENTENCES]
+    if rows:
+        lead, *others = [_sentence(material, row) for row in rows]
+        return (Strong(lead), *(f" {other}" for other in others))
+    ratings = _ratings(material)[:_SENTENCES]
+    if ratings:
+        return tuple(part for text in ratings for part in (*text, " "))
+    return _closest(material)
+
+
+def _sentence(material: Material, row: Row) -> str:
+    """What a comparison of the conditions came to, with the means and their intervals."""
+    label = short_label(row["measure"])
+    if row["status"] != "ok":
+        return f"{label}: {comparison_sentence(row)}."
+    study, p = material.study, decisive_p(row)
+    significant = p is not None and p < study.alpha
+    found = f"{p_phrase(p)}, n = {row['n']}"
+    told = {one["condition"]: one for one in material.rows("descriptives") if one["measure"] == row["measure"]}
+    if row["reduction"] is not None and set(study.conditions) <= set(told):
+        first, second = study.conditions
+        change = f"{percent(abs(row['reduction']))} {'lower' if row['reduction'] >= 0 else 'higher'}"
+        means = f"{_mean(told[second])} with {second} against {_mean(told[first])} with {first}"
+        sure = "" if significant else ", a difference that is not statistically significant"
+        return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({found})."
+    ranked = sorted((one for one in told.values() if one["mean"] is not None), key=lambda one: one["mean"])
+    verb = "differs" if significant else "does not differ statistically significantly"
+    if len(ranked) < 2:
+        return f"{label} {verb} between the conditions ({found})."
+    ends = f"{_mean(ranked[0])} with {ranked[0]['condition']} to {_mean(ranked[-1])} with {ranked[-1]['condition']}"
+    return f"{label} {verb} between the conditions: means run from {ends} ({found})."
+
+
+def _mean(row: Row) -> str:
+    """`12.3 s [10.1, 14.5]`: a mean and its 95 % interval."""
+    parts = (number(row["mean"]), unit_of(row["measure"]), interval(row["ci_low"], row["ci_high"]))
+    return " ".join(part for part in parts if part not in ("", NOTHING))
+
+
+def _closest(material: Material) -> Text:
+    """The estimator with the smallest mean error and the one after it, with their range over sessions."""
+    means = list(_means(material).items())[:_SENTENCES]
+    errors = {
+        name: [row["rmse_mm"] for row in material.rows("accuracy") if row["estimator"] == name] for name, _ in means
+    }
+    told = [
+        f"{number(mean, 1)} mm on average over {counted(n, 'session')}"
+        + (f" ({number(min(errors[name]), 1)} to {number(max(errors[name]), 1)} mm in single ones)" if n > 1 else "")
+        for name, (mean, n) in means
+    ]
+    if not told:
+        return ()
+    lead = f"{means[0][0]} comes closest to the reference: its root mean square error (RMSE) is {told[0]}."
+    after = (f" Next is {name} with {text}." for (name, _), text in zip(means[1:], told[1:], strict=True))
+    return (Strong(lead), *after)
+
+
+def _figure(material: Material) -> list[Figure]:
+    """The one figure that shows the answer."""
+    for row in _headline_rows(material):
+        wide = material.participant_means(row["measure"])
+        if row["status"] == "ok" and wide.notna().any().any():
+            return [_of_people(material, row["measure"], wide)]
+    rows = pd.DataFrame(material.rows("accuracy"))
+    if rows.empty or material.rows("comparisons"):
+        return []
+    n = rows["session"].nunique()
+    return [
+        material.figure(
+            "answer",
+            figures.errors,
+            f"Error (left) and lag (right) of each estimator, a small mark a session (n = {n}), the large one their"
+            " mean. An estimator that helps sits to the left in both.",
+            f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
+            rows,
+        )
+    ]
+
+
+def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
+    label, two = measure_label(measure), len(material.study.conditions) == 2
+    differences = " Right: each participant's difference and their mean with its interval; zero is no difference."
+    told = [
+        f"{row['condition']} {_mean(row)}"
+        for row in material.rows("descriptives")
+        if row["measure"] == measure and row["mean"] is not None
+    ]
+    return material.figure(
+        "answer",
+        figures.paired,
+        f"{label}: a line is a participant, large marks are means with 95 % intervals.{differences if two else ''}",
+        f"{label} of each participant by condition. Means with 95 % intervals: {'; '.join(told)}.",
+        wide,
+        measure,
+    )
+
+
+def _data(material: Material) -> Text:
+    """Where the data come from."""
+    logs = f" {counted(len(material.sessions), 'session')} of raw sensor logs." if material.sessions else ""
+    source = material.study.citation.strip()
+    kind, _, what = ORIGINS[material.study.data_origin].partition(": ")
+    return (Strong(f"{kind}: "), what, logs, f" Source: {source}" if source else "")
+
+
+def _question(material: Material) -> Text:
+    conditions = material.study.conditions
+    compared = (
+        "" if len(conditions) == 1 else f" under {counted(len(conditions), 'condition')}, {listing(list(conditions))}"
+    )
+    people = counted(material.results["study"]["participants"]["n"], "participant")
+    if material.rows("comparisons"):
+        return (
+            Strong("Does it make a difference to people which system they use? "),
+            f"{people}{compared}.",
+        )
+    return (Strong("How accurately does each estimator follow the hand? "), f"{people}{compared}.")
+
+
+def _of_conditions(material: Material) -> list[Row]:
+    """The rows that compare all conditions at once: omnibus ones, or the pair where there are two conditions."""
+    return [
+        row
+        for row in material.rows("comparisons")
+        if row["effect"] in EFFECTS_OF_CONDITION and (row["contrast"] is None or len(material.study.conditions) == 2)
+    ]
+
+
+def _headline_rows(material: Material) -> list[Row]:
+    """One omnibus row a measure that is no questionnaire's, the well-known measures first."""
+    rows = [row for row in _of_conditions(material) if "/" not in row["measure"] and row["test"] not in _NOT_OF_CHANCE]
+    first = {row["measure"]: row for row in reversed(rows)}
+    known = [name for name in _HEADLINES if name in first]
+    return [first[name] for name in [*known, *sorted(set(first) - set(known))]]
+
+
+def _key_figures(material: Material) -> list[KeyFigure]:
+    keys = [_key_figure(row) for row in _headline_rows(material)]
+    return (keys or _accuracy_keys(material))[:_KEY_FIGURES_MAX]
+
+
+def _key_figure(row: Row) -> KeyFigure:
+    label = measure_label(row["measure"])
+    if row["status"] != "ok":
+        return KeyFigure("undefined", label, row["status"])
+    p = p_phrase(decisive_p(row))
+    evidence = f"{statistic(row)}, {p}, n = {row['n']}"
+    if row["reduction"] is None:
+        return KeyFigure(p, label, f"{statistic(row)}, n = {row['n']}")
+    sign = MINUS if row["reduction"] >= 0 else "+"
+    return KeyFigure(f"{sign}{percent(abs(row['reduction']))}", label, evidence)
+
+
+def _means(material: Material) -> dict[str, tuple[float, int]]:
+    """Mean RMSE over sessions and their number, by estimator, best first."""
+    ranked = sorted(material.rows("accuracy_means"), key=lambda row: row["rmse_mm"])
+    return {row["estimator"]: (row["rmse_mm"], row["n"]) for row in ranked}
+
+
+def _accuracy_keys(material: Material) -> list[KeyFigure]:
+    return [
+        KeyFigure(f"{number(mean, 1)} mm", f"{name}: position error", f"mean RMSE of {counted(n, 'session')}")
+        for name, (mean, n) in _means(material).items()
+    ]
+
+
+def _evidence(material: Material) -> list[Text]:
+    """What the answer rests on: a sentence a headline, one for the questionnaires, one for the estimators."""
+    answers: list[Text] = []
+    for row in _headline_rows(material):
+        label = measure_label(row["measure"])
+        if row["status"] != "ok":
+            answers.append((Strong(f"{label}: "), f"{comparison_sentence(row)}."))
+            continue
+        change = ""
+        if row["reduction"] is not None:
+            first, second = material.study.conditions
+            change = f"{reduction_phrase(row['reduction'])} with {second} relative to {first}; "
+        said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
+        answers.append((Strong(f"{label}: "), f"{change}{said}."))
+    for row in _of_conditions(material):
+        if row["test"] in _NOT_OF_CHANCE and row["status"] == "ok":
+            said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
+            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
+    answers += _ratings(material)
+    means = _means(material)
+    if means:
+        best, (lowest, n) = next(iter(means.items()))
+        others = "; ".join(f"{name} {number(mean, 1)} mm" for name, (mean, _) in list(means.items())[1:])
+        tail = f" Others: {others}." if others else ""
+        answers.append(
+            (
+                Strong("Accuracy: "),
+                (
+                    f"{best} comes closest to the reference, with a root mean square error (RMSE) of"
+                    f" {number(lowest, 1)} mm on average over {counted(n, 'session')}.{tail}"
+                ),
+            )
+        )
+    return answers
+
+
+def _ratings(material: Material) -> list[Text]:
+    """How many scales of a questionnaire differ, before and after the adjustment, over the rows of one test."""
+    answers: list[Text] = []
+    alpha = material.study.alpha
+    families: dict[tuple[str, str], list[Row]] = {}
+    for row in _of_conditions(material):
+        if "/" in row["measure"] and row["test"] not in _NOT_OF_CHANCE:
+            families.setdefault((row["measure"].partition("/")[0], row["test"]), []).append(row)
+    for (questionnaire, _), rows in families.items():
+        label = measure_label(f"{questionnaire}/x").partition(":")[0]
+        below = [row for row in rows if row["p"] is not None and row["p"] < alpha]
+        text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level taken singly"
+        if any(row["p_adjusted"] is not None for row in rows):
+            kept = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
+            text += (
+                f", and {len(kept)} after adjusting for {counted(len(rows), 'test')} ({adjustment(rows[0]['adjust'])})"
+            )
+        answers.append((Strong(f"{label}: "), f"{text}."))
+    return answers

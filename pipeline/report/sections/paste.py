@@ -1,0 +1,68 @@
+"""Words to paste into a paper: the methods, a sentence for every comparison, and what to cite."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.report.prose.methods import methods
+from pipeline.report.prose.references import Reference, bibliography, used
+from pipeline.report.prose.sentences import Told, means_sentence, sentence, tells_means, told_of
+from pipeline.report.sections.comparisons import anchor
+from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.provenance import used_versions
+
+BIBLIOGRAPHY = "references.bib"
+"""The file beside the report."""
+
+
+def section(material: Material) -> Section:
+    """To paste."""
+    said = methods(material.study, material.results, used_versions())
+    blocks: list[Block] = [
+        Paragraph(("Written from the rows of this report's tables, to be shortened and put into your own words.",)),
+        Paragraph((Strong("Methods. "), said)),
+    ]
+    results = list(_results(material))
+    if results:
+        blocks += [Paragraph((Strong("Results. "), *results[0])), *(Paragraph(text) for text in results[1:])]
+    return Section("paste", "To paste", (*blocks, _references(material)))
+
+
+def references(material: Material) -> list[Reference]:
+    """What the study's report rests on."""
+    return used(material.study, material.rows("comparisons"), material.measured(), used_versions())
+
+
+def bibtex(material: Material) -> str:
+    """The content of references.bib."""
+    return bibliography(references(material))
+
+
+def _results(material: Material) -> Iterator[Text]:
+    """A paragraph a measure and test: a sentence a row, each with the way to its row."""
+    study = material.study
+    told = told_of(study.conditions, study.alpha, material.rows("descriptives"))
+    rows = list(enumerate(material.rows("comparisons")))
+    lacking = {row["measure"] for _, row in rows} - {row["measure"] for _, row in rows if tells_means(row, told)}
+    for (measure, _), group in groupby(rows, key=lambda item: (item[1]["measure"], item[1]["test"])):
+        means = means_sentence(measure, told) if measure in lacking else ""
+        lacking.discard(measure)
+        text: list[str | Strong | CrossReference] = [f"{means} "] if means else []
+        text += [part for at, row in group for part in _linked(at, row, told)]
+        yield tuple(text)
+
+
+def _linked(at: int, row: Row, told: Told) -> tuple[str | Strong | CrossReference, ...]:
+    return f"{sentence(row, told)} ", CrossReference("[row]", anchor(at)), " "
+
+
+def _references(material: Material) -> Table:
+    listed = references(material)
+    return Table(
+        "table-references",
+        f"What was used and should be cited; {BIBLIOGRAPHY} beside this report has it for BibTeX.",
+        columns(("Key", "Reference", "Used for"), 3),
+        tuple((one.key, one.text, one.used_for) for one in listed),
+    )

@@ -1,0 +1,80 @@
+"""The hand's way past the targets: one session closely, then every participant."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pipeline.report import figures
+from pipeline.report.document.model import Block, Section
+from pipeline.report.figures import captions
+from pipeline.report.figures.canvas import Plane
+from pipeline.report.sections.material import Material, first_of
+from pipeline.tables import table as tables
+
+_SESSIONS_MAX = 48  # drawn; a page of more would be slow to open
+_READ = ("tracks", "positions", "events")
+_STEP = 4  # of a track's rows in small panels: no eye sees more
+
+
+def section(material: Material) -> Section | None:
+    """Hand paths; None where nothing moves in a plane."""
+    used, axes = material.used(), material.study.axes
+    if not used or len(axes) < 2 or not material.study.estimators:
+        return None
+    plane = (axes[0], axes[1])
+    blocks = _one(material, used, plane)
+    if blocks and len(used) > 1:
+        blocks += _every(material, used, plane)
+    return Section("paths", "Hand paths", tuple(blocks)) if blocks else None
+
+
+def _one(material: Material, used: list[int], plane: Plane) -> list[Block]:
+    """The first session: the reference, what was displayed, and what the best fusion makes of it."""
+    tracks, positions, events = (_read(material, name, used[0]) for name in _READ)
+    lines = [material.study.stream_of_kind("reference"), _displayed(material, used[0]), _fused(material)]
+    there = {*positions["stream"], *tracks["estimator"]}
+    shown = [line for line in dict.fromkeys(lines) if line in there]
+    if not shown:
+        return []
+    return [material.drawn("path", figures.path, captions.path, tracks, positions, events, shown, plane)]
+
+
+def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
+    """What each session displayed, a panel a participant."""
+    shown, more = {}, first_of(_SESSIONS_MAX, len(used), "sessions")
+    used = used[:_SESSIONS_MAX]
+    for place in used:
+        line, condition = _displayed(material, place), material.sessions[place].condition
+        if line is not None and condition is not None:
+            shown[condition] = line
+    ordered = {condition: shown[condition] for condition in material.study.conditions if condition in shown}
+    if not ordered:
+        return []
+    found: dict[str, list[pd.DataFrame]] = {name: [] for name in _READ}
+    for place in used:
+        tracks, positions, events = (_read(material, name, place) for name in _READ)
+        found["tracks"].append(tracks[tracks["estimator"].isin(shown.values())].iloc[::_STEP])
+        found["positions"].append(positions[positions["stream"].isin(shown.values())].iloc[::_STEP])
+        found["events"].append(events)
+    sessions = pd.DataFrame([material.sessions[place].ids for place in used])
+    whole = [pd.concat(found[name]) for name in _READ]
+    return [material.drawn("paths", figures.paths, captions.paths, *whole, sessions, ordered, plane, more=more)]
+
+
+def _read(material: Material, name: str, place: int) -> pd.DataFrame:
+    return tables.read(name, (material.fused if name == "tracks" else material.ingested)[place])
+
+
+def _displayed(material: Material, place: int) -> str | None:
+    """What a session showed: its display's stream, else the estimator it names, else the tracker."""
+    study = material.study
+    condition = material.sessions[place].condition or ""
+    return study.stream_of_kind("display") or study.shown.get(condition) or study.tracker
+
+
+def _fused(material: Material) -> str | None:
+    """The estimator with the least error; the last one where errors are not known."""
+    rows = [row for row in material.rows("accuracy_means") if row["rmse_mm"] is not None]
+    if rows:
+        return str(min(rows, key=lambda row: row["rmse_mm"])["estimator"])
+    return list(material.study.estimators)[-1]

@@ -1,0 +1,87 @@
+"""A publication's figures beside the computed ones, and what of them cannot be true together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED
+from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.report.sections.material import Material, Row
+from pipeline.wording import counted
+
+_VERDICTS = {AGREEMENT: "Agree", CONTRADICTION: "Contradict", REMARK: "Remarks", UNCHECKED: "Cannot be checked"}
+
+
+def section(material: Material) -> Section | None:
+    """Printed and computed; None where the study has no printed.yaml."""
+    rows = material.rows("printed")
+    if not rows:
+        return None
+    figures = [row for row in rows if row["check"] is None]
+    held = [row for row in rows if row["check"] is not None]
+    blocks: list[Block] = []
+    if figures:
+        blocks += _beside_computed(figures)
+    if held:
+        blocks += _against_each_other(rows[0]["source"], held)
+    return Section("printed", "Printed and computed", tuple(blocks))
+
+
+def _beside_computed(figures: Sequence[Row]) -> list[Block]:
+    agreeing = sum(row["verdict"] == "agrees" for row in figures)
+    text: Text = (
+        f"{figures[0]['source']} prints {counted(len(figures), 'figure')} of this study. ",
+        Strong(f"{agreeing} of them come out to the last printed digit"),
+        f", {len(figures) - agreeing} not.",
+    )
+    table = Table(
+        "table-printed",
+        "Each printed figure with the computed one at as many digits. “Differs” names what no data can give together"
+        " with the rest, or what these data do not give.",
+        (Column("Figure", False), Column("Printed"), Column("Computed"), Column("Verdict", False)),
+        tuple((row["what"], row["printed"], row["computed"], row["verdict"]) for row in figures),
+    )
+    return [Paragraph(text), table]
+
+
+def _against_each_other(source: str, held: Sequence[Row]) -> list[Block]:
+    """Contradictions and remarks in words, the others by number."""
+    blocks: list[Block] = [
+        Paragraph(
+            (
+                f"The printed figures of {source} were held against each other in {counted(len(held), 'check')}, each"
+                " in the room that rounding leaves.",
+            )
+        )
+    ]
+    for verdict, title in (
+        (CONTRADICTION, "Contradictions within the publication"),
+        (REMARK, "What a reader of it should know"),
+    ):
+        texts = tuple(_sentence(row) for row in held if row["verdict"] == verdict)
+        if texts:
+            blocks.append(Notice(title, texts, "care" if verdict == CONTRADICTION else "information"))
+    checks = dict.fromkeys(row["check"] for row in held)
+    counts = tuple(
+        (
+            check,
+            *(str(sum((row["check"], row["verdict"]) == (check, verdict) for row in held)) for verdict in _VERDICTS),
+        )
+        for check in checks
+    )
+    blocks.append(
+        Table(
+            "table-held",
+            "Printed figures held against each other: how many statements agree with the rest. Each of them stands in"
+            " results.json.",
+            columns(("Check", *_VERDICTS.values()), 1),
+            counts,
+        )
+    )
+    return blocks
+
+
+def _sentence(row: Row) -> Text:
+    text = str(row["printed"])
+    printed = text if not text[:1].isdigit() else f"printed {text}"
+    return (Strong(f"{row['what']}: "), f"{printed}; {row['explanation']}.")

@@ -1,0 +1,284 @@
+"""What the logs were like, and everything that was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from pipeline.report import figures
+from pipeline.report import traffic_lights as session_quality
+from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
+from pipeline.report.figures import captions
+from pipeline.report.sections import timeline
+from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.without_exclusions import without_exclusions
+from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
+from pipeline.tables import table as tables
+from pipeline.wording import NOTHING, counted, listing, measure_label, number
+
+_ROWS_MAX = 40  # a page stays readable; tables/quality.csv has them all
+
+
+def section(material: Material) -> Section:
+    """Data quality and exclusions."""
+    blocks: list[Block] = []
+    if material.rows("quality"):
+        blocks += _lights(material)
+        blocks.append(_quality_table(material))
+        blocks += timeline.blocks(material)
+        if material.rows("sensor_noise"):
+            blocks += _noise(material)
+        elif material.rows("accuracy"):
+            blocks.append(
+                Paragraph(
+                    ("No session holds a still stretch of a second or more, so the sensors' noise cannot be told.",)
+                )
+            )
+    if any(row["in_log"] == 0 or row["carried"] or row["left_out"] for row in material.rows("phones")):
+        blocks.append(_orientation_table(material))
+    if any(row["calibrated_until_s"] is not None for row in material.rows("phones")):
+        blocks.append(_mounting_table(material))
+    agreement = material.rows("replay_agreement")
+    if agreement:
+        blocks.append(_agreement_table(material))
+    blocks += [*_exclusions(material), *without_exclusions(material)]
+    return Section("quality", "Data quality and exclusions", tuple(blocks))
+
+
+def _lights(material: Material) -> list[Block]:
+    """How many sessions are green, amber and red, and what it is in each."""
+    found: dict[str, list[Judged]] = {}
+    judged = session_quality.judged(material.study, material.rows("quality"), material.rows("replay_agreement"))
+    for one in judged:
+        found.setdefault(one.session, []).append(one)
+    lights = [light_of(figures) for figures in found.values()]
+    shares = [f"{lights.count(light)} {SYMBOLS[light]} {light}" for light in LIGHTS[1:]]
+    facts = [fact for fact in FACTS if any(one.fact == fact for one in judged)]
+    ordered = sorted(found.items(), key=lambda item: -LIGHTS.index(light_of(item[1])))
+    cells = tuple((session, *_session_lights(figures, facts)) for session, figures in ordered[:_ROWS_MAX])
+    more = f" The worst {_ROWS_MAX} of {len(ordered)}." if len(ordered) > _ROWS_MAX else ""
+    limits = session_quality.limits_text(material.study.quality_limits)
+    table = Table(
+        "table-lights",
+        f"Each session's quality at a glance, the worst first: a light, what it is of, and how far it is off.{more}",
+        columns(("Session", "Light", *facts), len(facts) + 2),
+        cells,
+        f"Amber from here on (red): {limits}. A rate is held against the one that study.yaml states, or the median of "
+        "three sessions and more; quality_limits in study.yaml moves the limits. Nobody is left out for a light.",
+    )
+    text = f"{counted(len(found), 'session')}: {listing(shares)}.{_not_whole(material)}"
+    return [Paragraph((Strong("Quality: "), text)), table]
+
+
+def _session_lights(figures: Sequence[Judged], facts: Sequence[str]) -> tuple[str, ...]:
+    """A session's light, and the worst figure of each fact."""
+    light = light_of(figures)
+    of_fact = [_fact_light([one for one in figures if one.fact == fact]) for fact in facts]
+    return f"{SYMBOLS[light]} {light}", *of_fact
+
+
+def _fact_light(figures: Sequence[Judged]) -> str:
+    """The worst of a fact's figures, and how many others are as bad."""
+    worst = session_quality.worst(figures)
+    if worst is None:
+        return NOTHING
+    others = sum(one.light == worst.light for one in figures) - 1
+    return worst.text + (f" and {others} more" if others and worst.light in ("amber", "red") else "")
+
+
+def _not_whole(material: Material) -> str:
+    """How many sessions are not in this report, or not as a whole."""
+    what = [row["what"] for row in material.rows("exclusions")]
+    told = (("session set aside", "set aside"), ("session read in part", "read in part"))
+    parts = [f"{counted(what.count(name), 'session')} {said}" for name, said in told if name in what]
+    return f" Beside these lights: {listing(parts)}; the table of exclusions says why." if parts else ""
+
+
+def _quality_table(material: Material) -> Table:
+    rows = material.rows("quality")
+    titles = (
+        "Session",
+        "Stream",
+        "Messages",
+        "Lost",
+        "Rate (Hz)",
+        "Longest gap (ms)",
+        "Jitter (ms)",
+        "Out of order",
+        "Delay in log (ms)",
+        "Note",
+    )
+    cells = tuple(
+        (
+            row["session"],
+            row["stream"],
+            f"{row['messages_read']}",
+            "unknown" if row["messages_lost"] is None else f"{row['messages_lost']}",
+            number(row["rate_hz"], 1),
+            _milliseconds(row["gap_max_s"]),
+            number(row["jitter_ms"], 1) if row["jitter_ms"] is None or row["jitter_ms"] >= 0.05 else "0.0",
+            NOTHING if row["out_of_order"] is None else f"{row['out_of_order']}",
+            _milliseconds(row["latency_s"]),
+            row["note"] or "",
+        )
+        for row in rows[:_ROWS_MAX]
+    )
+    shown = len(titles) if any(row[-1] for row in cells) else len(titles) - 1  # no column without a note in it
+    more = (
+        f" The first {_ROWS_MAX} of {len(rows)} rows; all are in tables/quality.csv." if len(rows) > _ROWS_MAX else ""
+    )
+    return Table(
+        "table-quality",
+        "Each sensor stream as it was recorded. Look for lost messages, long gaps and rates off their usual value."
+        + more,
+        tuple(Column(title, title not in ("Session", "Stream", "Note")) for title in titles[:shown]),
+        tuple(row[:shown] for row in cells),
+        "Rate: messages a second of the stream's own clock. Jitter: SD of the time between arrivals, gaps left out. "
+        "Delay in log: median of arrival minus stamp; a tracker that stamps on delivery shows none.",
+    )
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return NOTHING if seconds is None else number(1000 * seconds, 0 if seconds >= 0.01 else 1)
+
+
+def _orientation_table(material: Material) -> Table:
+    """Where orientations came from, where not all of them stood in the logs."""
+    cells = tuple(
+        (row["session"], row["stream"], *(f"{row[key]}" for key in ("in_log", "carried", "found", "left_out")))
+        for row in material.rows("phones")[:_ROWS_MAX]
+    )
+    titles = ("Session", "Stream", "In the log", "Carried on", "Found", "Left out")
+    return Table(
+        "orientations",
+        "Where the orientation of each acceleration came from. Carried on: by the gyroscope from the last known one,"
+        " for up to a second. Found: tilt by gyroscope and accelerometer, heading from how the tracker's positions"
+        " move. Left out: not known, so the acceleration was not used.",
+        columns(titles, 2),
+        cells,
+    )
+
+
+def _mounting_table(material: Material) -> Table:
+    """What was learned of each phone's mounting."""
+    learned = [row for row in material.rows("phones") if row["calibrated_until_s"] is not None]
+
+    def three(row: Row, key: str, unit: str, digits: int) -> str:
+        pairs = ((row[f"{key}_{a}_{unit}"], row[f"{key}_sd_{a}_{unit}"]) for a in "xyz")
+        return ", ".join(f"{value:.{digits}f} ± {1.96 * sd:.{digits}f}" for value, sd in pairs).replace("-", "−")
+
+    cells = tuple(
+        (
+            row["session"],
+            row["stream"],
+            number(row["calibrated_until_s"], 1),
+            three(row, "mounting", "deg", 1),
+            three(row, "lever_arm", "mm", 0),
+        )
+        for row in learned[:_ROWS_MAX]
+    )
+    titles = ("Session", "Stream", "Learned until (s)", "Mounting error x, y, z (°)", "Lever arm x, y, z (mm)")
+    return Table(
+        "mountings",
+        "How each accelerometer sits on the body that the tracker sees, learned from the beginning of the session and"
+        " used from then on: the small rotation of its axes, and the way from it to the point that is seen, with 95 %"
+        " intervals.",
+        columns(titles, len(titles)),
+        cells,
+    )
+
+
+def _noise(material: Material) -> list[Block]:
+    """The sensors' noise in still stretches, against what study.yaml states."""
+    rows = pd.DataFrame(material.rows("sensor_noise"))
+    names = [name for name in material.study.streams if name in set(rows["stream"])]
+    units = pd.Series({name: str(rows.loc[rows["stream"] == name, "unit"].iloc[0]) for name in names})
+    cells = tuple(
+        (
+            row["session"],
+            row["stream"],
+            row["unit"],
+            f"{number(row['begin_s'], 1)} to {number(row['end_s'], 1)}",
+            f"{row['n']}",
+            number(row["sd"], 1),
+            number(row["stated_sd"], 1),
+        )
+        for row in material.rows("sensor_noise")[:_ROWS_MAX]
+    )
+    titles = (
+        "Session",
+        "Stream",
+        "Unit",
+        "Still from … to (s)",
+        "Readings",
+        "SD measured",
+        "SD in study.yaml",
+    )
+    return [
+        material.drawn("sensor-noise", figures.noise, captions.noise, _residuals(material, names), units),
+        Table(
+            "table-noise",
+            "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",
+            columns(titles, 3),
+            cells,
+            "Still: the reference moves slower than 20 mm/s; without a reference, the accelerations vary little.",
+        ),
+    ]
+
+
+def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:
+    """Every session's residuals by stream; session by session, and names as numbers, for there may be millions."""
+    parts = []
+    for folder in material.assessed:
+        rows = tables.read("noise_residuals", folder)[["stream", "residual"]]
+        parts.append(rows.assign(stream=rows["stream"].astype(pd.CategoricalDtype(list(names)))))
+    return pd.concat(parts)
+
+
+def _agreement_table(material: Material) -> Table:
+    return Table(
+        "table-replay",
+        "How far what was displayed is from what the estimator gives when it is run again over the same log. Zero, up "
+        "to rounding, means that the log shows what it says it showed.",
+        columns(("Session", "Estimator", "Samples", "Largest (mm)", "Root mean square (mm)"), 2),
+        tuple(
+            (
+                row["session"],
+                row["estimator"],
+                f"{row['n']}",
+                number(row["max_mm"], 3),
+                number(row["rms_mm"], 3),
+            )
+            for row in material.rows("replay_agreement")[:_ROWS_MAX]
+        ),
+    )
+
+
+def _exclusions(material: Material) -> list[Block]:
+    rows = material.rows("exclusions")
+    if not rows:
+        return [
+            Paragraph(("Nothing was left out: every session, participant and value of the study is in this report.",))
+        ]
+    titles = ("Participant", "Condition", "Session", "Measure", "What", "Reason")
+    cells = tuple(
+        (
+            row["participant"] or NOTHING,
+            row["condition"] or NOTHING,
+            row["session"] or NOTHING,
+            measure_label(row["measure"]) if row["measure"] else "all",
+            row["what"],
+            row["reason"] or "",
+        )
+        for row in rows[:_ROWS_MAX]
+    )
+    more = f" The first {_ROWS_MAX} of {len(rows)}; all are in tables/exclusions.csv." if len(rows) > _ROWS_MAX else ""
+    return [
+        Table(
+            "table-exclusions",
+            f"Everything that is missing or was left out, and why ({counted(len(rows), 'entry', 'entries')}).{more}",
+            columns(titles, len(titles)),
+            cells,
+        )
+    ]

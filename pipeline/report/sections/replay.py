@@ -1,0 +1,168 @@
+"""The report of a replay: variants ranked, what each costs in lag and jitter, and what is not in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from pipeline.report import figures
+from pipeline.report.document.model import (
+    Block,
+    Column,
+    Document,
+    Figure,
+    Notice,
+    Paragraph,
+    Section,
+    Strong,
+    Table,
+    columns,
+)
+from pipeline.report.sections.accuracy import SMOOTHED_REMARK
+from pipeline.report.sections.material import ORIGINS
+from pipeline.report.sections.provenance import libraries
+from pipeline.sessions.recording import SMOOTHED
+from pipeline.tables import table as tables
+from pipeline.wording import NOTHING, counted, interval, number, percent, seconds
+
+Row = Mapping[str, Any]
+_ROWS_MAX = 120
+_TITLES = (
+    "Estimator",
+    "Rank",
+    "Sessions",
+    "RMSE (mm)",
+    "Lag (ms)",
+    "Jitter (mm)",
+    "In 95 % interval",
+)
+_AT_SELECTION = ("At the selections, RMSE (mm)",)
+_NOTE = (
+    "Means over sessions; in brackets 95 % t intervals over sessions, cut off where values end. RMSE: root mean square"
+    " distance to the reference. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In 95 %"
+    " interval: share of instants and axes where the reference is within 1.96 stated SDs."
+)
+_NOTE_SELECTION = (
+    " At the selections: root of the mean over sessions of the mean squared distance to the target that the estimator"
+    " would have shown when people selected; they aimed with what they saw then, so this favours what was shown."
+)
+
+
+def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Document:
+    """The whole report. `studies` are as in results.json, `found` its tables; figures go into the folder `drawn`."""
+    origins = dict.fromkeys(ORIGINS[study["data_origin"]] for study in studies)
+    sections = [Section("variants", "Variants side by side", tuple(_variants(studies, found, drawn)))]
+    left_out = _left_out(found["replay_exclusions"])
+    if left_out is not None:
+        sections.append(Section("exclusions", "What is not in it, or only in part", (left_out,)))
+    sections.append(Section("provenance", "Provenance", (_studies(studies), libraries())))
+    subtitle = f"Replay of {counted(len(studies), 'study', 'studies')}"
+    return Document("Variants of estimators", subtitle, " ".join(origins), tuple(sections))
+
+
+def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Iterator[Block]:
+    every = list(tables.records("replay_means", found["replay_means"]))
+    yield Paragraph(
+        (
+            "Every variant was run over the same raw streams and asked, at the arrival of each acceleration, where the"
+            " hand is at that instant, from what had arrived by then. An estimator without brackets has its own"
+            " settings.",
+        )
+    )
+    if (found["accuracy"]["reference"] == SMOOTHED).any():
+        yield Paragraph((Strong("No reference was recorded in some study."), SMOOTHED_REMARK))
+    for index, study in enumerate([None, *(study["name"] for study in studies)]):
+        rows = [row for row in every if row["study"] == study]
+        if rows:
+            yield from _one(rows, "all studies together" if study is None else f"study “{study}”", index, drawn)
+    yield Notice(
+        "The best of many",
+        (
+            (
+                "Of several variants the first is partly first by chance: its figures here flatter it. Settings chosen"
+                " so should be tried on sessions that had no say in the choice.",
+            ),
+        ),
+    )
+
+
+def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[Block]:
+    """One study's table and figure, or those of all together."""
+    best = rows[0]
+    if best["rank"] is not None:
+        evidence = f"RMSE {_with_interval(best, 'rmse')} mm over {counted(best['n'], 'session')}."
+        yield Paragraph((Strong(f"Least error, {where}: {_called(best)}. "), evidence))
+    selections = any(row["selection_n"] for row in rows)
+    titles = _TITLES + (_AT_SELECTION if selections else ())
+    shown = f" The first {_ROWS_MAX} of {len(rows)}." if len(rows) > _ROWS_MAX else ""
+    yield Table(
+        f"table-variants-{index}",
+        f"Variants by their mean RMSE, {where}.{shown}",
+        tuple(Column(title, title != "Estimator") for title in titles),
+        tuple(_cells(row)[: len(titles)] for row in rows[:_ROWS_MAX]),
+        _NOTE + (_NOTE_SELECTION if selections else ""),
+    )
+    ranked = [row for row in rows if row["rank"] is not None and (row["lag_s"], row["jitter_mm"]) != (None, None)]
+    if not ranked:
+        yield Paragraph(("Neither lag nor jitter could be measured, so what less error costs cannot be drawn.",))
+    else:
+        name = f"trade-off-{index}.svg"
+        figures.draw(figures.trade_off, drawn / name, tables.frame("replay_means", ranked))
+        yield Figure(
+            f"figure-trade-off-{index}",
+            name,
+            f"What less error costs, {where}: lag and jitter against RMSE, means over sessions with 95 % intervals; the"
+            " numbers are the ranks of the table, a ring marks an estimator's own settings. To the left and near zero"
+            " is better.",
+            f"Scatter plot of lag and jitter against RMSE for {counted(len(ranked), 'variant')}, {where}.",
+        )
+
+
+def _called(row: Row) -> str:
+    return str(row["variant"] or row["estimator"])
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    lag = seconds(row["lag_s"])
+    if row["lag_low_s"] is not None:
+        lag += f" [{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]"
+    return (
+        _called(row),
+        NOTHING if row["rank"] is None else str(row["rank"]),
+        str(row["n"]),
+        _with_interval(row, "rmse"),
+        lag,
+        _with_interval(row, "jitter"),
+        percent(row["coverage_95"], 0),
+        _with_interval(row, "selection_rmse"),
+    )
+
+
+def _with_interval(row: Row, figure: str) -> str:
+    """A figure in mm and, where there is one, its interval."""
+    low, high = row[f"{figure}_low_mm"], row[f"{figure}_high_mm"]
+    return number(row[f"{figure}_mm"]) + ("" if low is None else f" {interval(low, high)}")
+
+
+def _left_out(excluded: pd.DataFrame) -> Table | None:
+    rows = list(tables.records("replay_exclusions", excluded))
+    if not rows:
+        return None
+    more = f" The first {_ROWS_MAX} of {len(rows)}; all are in results.json." if len(rows) > _ROWS_MAX else ""
+    cells = tuple(
+        tuple(row[key] or NOTHING for key in ("study", "session", "variant", "what", "reason"))
+        for row in rows[:_ROWS_MAX]
+    )
+    titles = columns(("Study", "Session", "Variant", "What", "Why"), 5)
+    return Table("table-exclusions", f"Sessions and files that are not wholly in this report.{more}", titles, cells)
+
+
+def _studies(studies: Sequence[Row]) -> Table:
+    cells = tuple((study["name"], study["title"], study["data_origin"], str(study["sessions"])) for study in studies)
+    titles = columns(("Study", "Title", "Data", "Sessions"), 3)
+    return Table(
+        "table-studies", "What was replayed; every number of this report stands in results.json.", titles, cells
+    )

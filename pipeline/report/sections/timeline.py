@@ -1,0 +1,22 @@
+"""What arrived when, as a figure for the section on quality."""
+
+from __future__ import annotations
+
+from pipeline.report import figures
+from pipeline.report.document.model import Block
+from pipeline.report.figures import captions
+from pipeline.report.sections.material import Material, first_of
+from pipeline.tables import table as tables
+
+_SESSIONS_MAX = 24  # a page holds no more rows
+
+
+def blocks(material: Material) -> list[Block]:
+    """The first sessions' streams, silences and events; nothing for a study of tables alone."""
+    rates = tables.read("stream_rates", material.assessed[:_SESSIONS_MAX])
+    if rates.empty:
+        return []
+    events = tables.read("events", material.ingested[:_SESSIONS_MAX])
+    exclusions = tables.frame("exclusions", material.rows("exclusions"))
+    more = first_of(_SESSIONS_MAX, len(material.sessions), "sessions")
+    return [material.drawn("timeline", figures.timeline, captions.timeline, rates, events, exclusions, more=more)]
