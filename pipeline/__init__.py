@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pipeline.loading import Tables
+    from pipeline.notebook import Tables
 
 __all__ = ["load"]
 
@@ -18,6 +18,6 @@ def load(study: str | Path, *, cache: str | Path | None = None, jobs: int = 1, e
     or a script whose own work stands under `if __name__ == "__main__":`. What befell sessions is a warning. Raises
     PipelineError where nothing can be done.
     """
-    from pipeline import loading  # pandas and the rest only when there is something to load
+    from pipeline import notebook as loading  # pandas and the rest only when there is something to load
 
     return loading.load(Path(study), None if cache is None else Path(cache), jobs, executor)

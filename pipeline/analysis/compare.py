@@ -23,7 +23,7 @@ from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.tables import results
 from pipeline.tables import table as tables
-from pipeline.wording import measure_order
+from pipeline.words import measure_order
 
 Row = dict[str, Any]
 _SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones", "calibration")

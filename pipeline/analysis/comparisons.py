@@ -29,7 +29,7 @@ from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import FloatArray, Result
 from pipeline.study.settings import Study
-from pipeline.wording import measure_order
+from pipeline.words import measure_order
 
 Row = dict[str, Any]
 Answer = tuple[list[Row], list[Row]]

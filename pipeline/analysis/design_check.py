@@ -19,7 +19,7 @@ from pipeline.statistics.crossover import crossover
 from pipeline.statistics.mixed import mixed_model
 from pipeline.statistics.result import Result
 from pipeline.study.settings import Comparison, Session, Study
-from pipeline.wording import counted, listing, p_phrase, statistic
+from pipeline.words import counted, listing, p_phrase, statistic
 
 Row = dict[str, Any]
 Order = tuple[str, ...]

@@ -17,7 +17,7 @@ from pipeline.explanation import Explanation, Made
 from pipeline.study.settings import SETTINGS_FILE
 from pipeline.tables import differences, results
 from pipeline.tables.differences import ABSENT, Change, Differences, Identified
-from pipeline.wording import counted
+from pipeline.words import counted
 
 _RESULTS = "results.json"
 _CELL_LENGTH = 80

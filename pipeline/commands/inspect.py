@@ -12,7 +12,7 @@ from pipeline.errors import PipelineError, SessionError
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.stream_quality import quality_row
 from pipeline.tables import table as tables
-from pipeline.wording import number
+from pipeline.words import number
 
 
 def inspect(files: Sequence[Path], as_json: bool) -> None:

@@ -12,7 +12,7 @@ from pipeline.commands import console
 from pipeline.errors import PipelineError
 from pipeline.statistics.counterbalancing import Order, assigned, balance, williams_design
 from pipeline.study.settings import identifier, load_study
-from pipeline.wording import counted
+from pipeline.words import counted
 
 _NAMED_AS = "name them as study.yaml does, as in: steadyhand plan kinect fusion --participants 12"
 

@@ -12,7 +12,7 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.power import TESTS, Design, closed_form, difference_of_dz, difference_of_f
 from pipeline.statistics.power_simulation import simulate
 from pipeline.statistics.sample_size import sample_size
-from pipeline.wording import number, share
+from pipeline.words import number, share
 
 _ASSUMED_CORRELATION = 0.5
 _LARGEST_EFFECT = 100.0

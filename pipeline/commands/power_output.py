@@ -11,7 +11,7 @@ from typing import Any
 from pipeline.statistics.counterbalancing import williams_design
 from pipeline.statistics.power import Design
 from pipeline.statistics.sample_size import Needed, SampleSize
-from pipeline.wording import number, share
+from pipeline.words import number, share
 
 FILES = ("power.svg", "power.csv", "power.json")
 _NAMES = {

@@ -28,7 +28,7 @@ from pipeline.stages import INGEST, REPLAY
 from pipeline.study.settings import Session, load_study
 from pipeline.tables import results
 from pipeline.tables import table as tables
-from pipeline.wording import interval, number, seconds
+from pipeline.words import interval, number, seconds
 
 _PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"
 _TABLES = ("accuracy", "replay_trials", "replay_means", "replay_exclusions")

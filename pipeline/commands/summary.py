@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pipeline.analysis.audit.finding import CONTRADICTION
-from pipeline.wording import comparison_sentence, counted, measure_label, number
+from pipeline.words import comparison_sentence, counted, measure_label, number
 
 Row = Mapping[str, Any]
 

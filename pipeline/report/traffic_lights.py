@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any, Literal
 
 from pipeline.study.settings import QualityLimits, Study
-from pipeline.wording import number, percent
+from pipeline.words import number, percent
 
 Row = Mapping[str, Any]
 Light = Literal["not judged", "green", "amber", "red"]

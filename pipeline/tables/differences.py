@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pipeline.wording import NOTHING
+from pipeline.words import NOTHING
 
 Row = Mapping[str, Any]
 Figures = Mapping[str, Any]

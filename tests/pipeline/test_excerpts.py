@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import pipeline
-from pipeline.loading import Tables
+from pipeline.notebook import Tables
 from pipeline.sessions import excerpts
 from pipeline.sessions.logs.mcap import Message
 from pipeline.tables import table as tables

@@ -15,7 +15,7 @@ import pytest
 
 import pipeline
 from pipeline.errors import PipelineError
-from pipeline.loading import STAGE_OF, Tables
+from pipeline.notebook import STAGE_OF, Tables
 from pipeline.tables import results
 from pipeline.tables import table as stored
 from tests.conftest import CLONE, STREAMS, session_messages, write_session

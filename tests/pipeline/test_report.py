@@ -32,7 +32,7 @@ from pipeline.report.document.model import (
     Strong,
     Table,
 )
-from pipeline.wording import TESTS, interval, number, p_phrase, percent
+from pipeline.words import TESTS, interval, number, p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.wording import (
+from pipeline.words import (
     effect_size,
     interval,
     measure_label,

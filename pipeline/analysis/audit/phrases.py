@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.analysis.audit.p_values import Symbol
 from pipeline.study.printed import Measure, PrintedTest
 from pipeline.study.rounded import Rounded
-from pipeline.wording import TESTS
+from pipeline.words import TESTS
 
 
 def label(measure: Measure, test: PrintedTest) -> str:

@@ -13,7 +13,7 @@ from pipeline.report.figures.canvas import XY, Plane, Task, ellipse_95, offsets_
 from pipeline.report.figures.sensors import errors_in, peak_s
 from pipeline.report.figures.style import FloatArray, finite, mean_and_interval
 from pipeline.report.figures.timeline import set_aside, silences
-from pipeline.wording import (
+from pipeline.words import (
     MINUS,
     counted,
     interval,

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import showable
 from pipeline.simulation.what_pays import MOST, Tracker
-from pipeline.wording import NOTHING, number
+from pipeline.words import NOTHING, number
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
-from pipeline.wording import MINUS, measure_label, short_label, unit_of
+from pipeline.words import MINUS, measure_label, short_label, unit_of
 
 _CLOUD = 0.3  # of the way to the next condition
 _BOX = 0.07

@@ -25,7 +25,7 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
-from pipeline.wording import MINUS, seconds
+from pipeline.words import MINUS, seconds
 
 LEAD_RANGE_S = 0.5
 _TIME = "Time since the session's start (s)"

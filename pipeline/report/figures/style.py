@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import showable
-from pipeline.wording import MINUS, THIN
+from pipeline.words import MINUS, THIN
 
 FloatArray = npt.NDArray[np.float64]
 Drawn = ParamSpec("Drawn")

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.sessions.estimators import build_estimator
 from pipeline.study.settings import Comparison, Sensing, Study
-from pipeline.wording import adjustment, counted, listing, number, subject, unit_of
+from pipeline.words import adjustment, counted, listing, number, subject, unit_of
 
 Row = Mapping[str, Any]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
-from pipeline.wording import (
+from pipeline.words import (
     EFFECTS_OF_CONDITION,
     contrast,
     decisive_p,

@@ -10,7 +10,7 @@ from pipeline.report.figures import captions
 from pipeline.report.sections.material import Material, Row
 from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
-from pipeline.wording import NOTHING, counted, number, percent, seconds
+from pipeline.words import NOTHING, counted, number, percent, seconds
 
 _ROWS_MAX = 40
 

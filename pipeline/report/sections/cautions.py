@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pipeline.report.document.model import Strong, Text
 from pipeline.report.sections.material import Material, Row
-from pipeline.wording import counted, listing, measure_label
+from pipeline.words import counted, listing, measure_label
 
 _REST_ON_NORMAL = ("rm_anova", "t_paired", "tost", "bayes_t", "crossover")
 _REMARKS_MAX = 3

@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections.material import Material, Row
 from pipeline.statistics.diagnostics import OUTLIER_RULE
-from pipeline.wording import (
+from pipeline.words import (
     NOTHING,
     TESTS,
     adjustment,

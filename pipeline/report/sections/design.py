@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipeline.report.document.model import Block, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.report.sections.material import ORIGINS, Material, conditions_text
-from pipeline.wording import counted, listing, measure_label, number
+from pipeline.words import counted, listing, measure_label, number
 
 
 def section(material: Material) -> Section:

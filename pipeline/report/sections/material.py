@@ -17,7 +17,7 @@ from pipeline.report.document.model import Figure
 from pipeline.report.figures import captions
 from pipeline.study.settings import Session, Study
 from pipeline.tables import table as tables
-from pipeline.wording import listing
+from pipeline.words import listing
 
 Row = Mapping[str, Any]
 

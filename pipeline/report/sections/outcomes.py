@@ -10,7 +10,7 @@ from pipeline.report.document.model import Block, Column, Paragraph, Section, St
 from pipeline.report.figures import captions
 from pipeline.report.figures.canvas import offsets_mm
 from pipeline.report.sections.material import Material, Row, first_of, safe_name
-from pipeline.wording import (
+from pipeline.words import (
     TESTS,
     adjustment,
     comparison_sentence,

@@ -20,7 +20,7 @@ from pipeline.report.document.model import (
 from pipeline.report.sections import traces
 from pipeline.report.sections.cautions import cautions
 from pipeline.report.sections.material import ORIGINS, Material, Row
-from pipeline.wording import (
+from pipeline.words import (
     EFFECTS_OF_CONDITION,
     MINUS,
     NOTHING,

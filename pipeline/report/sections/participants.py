@@ -14,7 +14,7 @@ from pipeline.report.document import html
 from pipeline.report.document.model import Block, Document, Link, Pages, Paragraph, Section, Table, columns
 from pipeline.report.sections.material import ORIGINS, Material, Row
 from pipeline.report.sections.traces import PAGE as TRACES
-from pipeline.wording import NOTHING, counted, measure_label, number, percent, seconds
+from pipeline.words import NOTHING, counted, measure_label, number, percent, seconds
 
 FOLDER = "participants"
 _MANY = 40  # of sessions or participants: the report's own tables show no more than the first rows then

@@ -8,7 +8,7 @@ from pipeline.engine.cache import versions
 from pipeline.engine.provenance import LIBRARIES
 from pipeline.report.document.model import Column, Paragraph, Section, Table
 from pipeline.report.sections.material import Material
-from pipeline.wording import counted
+from pipeline.words import counted
 
 _FILES_MAX = 60
 

@@ -15,7 +15,7 @@ from pipeline.report.sections.material import Material, Row
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
 from pipeline.tables import table as tables
-from pipeline.wording import NOTHING, counted, listing, measure_label, number
+from pipeline.words import NOTHING, counted, listing, measure_label, number
 
 _ROWS_MAX = 40  # a page stays readable; tables/quality.csv has them all
 

@@ -26,7 +26,7 @@ from pipeline.report.sections.material import ORIGINS
 from pipeline.report.sections.provenance import libraries
 from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
-from pipeline.wording import NOTHING, counted, interval, number, percent, seconds
+from pipeline.words import NOTHING, counted, interval, number, percent, seconds
 
 Row = Mapping[str, Any]
 _ROWS_MAX = 120

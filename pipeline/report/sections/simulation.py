@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table
 from pipeline.report.sections.material import Material, Row
 from pipeline.study.simulation import SelectionSimulation, Trait
-from pipeline.wording import counted, measure_label, number, percent
+from pipeline.words import counted, measure_label, number, percent
 
 _MODELS = {
     "intermittent": "minimum-jerk movements that are planned anew after a refractory time (Flash and Hogan 1985)",

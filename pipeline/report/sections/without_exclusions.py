@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from pipeline.report.document.model import Block, Paragraph, Strong, Table, columns
 from pipeline.report.sections.material import Material, Row
-from pipeline.wording import (
+from pipeline.words import (
     NOTHING,
     TESTS,
     contrast,
