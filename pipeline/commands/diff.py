@@ -9,11 +9,10 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from pipeline import explanation
-from pipeline.commands import console
+from pipeline.commands import console, explanation
 from pipeline.commands.check import MOVED
+from pipeline.commands.explanation import Explanation, Made
 from pipeline.errors import PipelineError
-from pipeline.explanation import Explanation, Made
 from pipeline.study.settings import SETTINGS_FILE
 from pipeline.tables import differences, results
 from pipeline.tables.differences import ABSENT, Change, Differences, Identified

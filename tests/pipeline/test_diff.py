@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import explanation
-from pipeline.commands import replay
+from pipeline.commands import explanation, replay
 from pipeline.tables import differences, results
 from pipeline.tables.differences import ABSENT, OF_A_REPLAY, OF_A_STUDY, between, changes
 from pipeline.tables.table import TABLES
