@@ -18,7 +18,8 @@ from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.stages import COMPARE
-from pipeline.study.settings import Session, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 
 STAGE_OF: Mapping[str, str] = {

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from fusion_core import ESTIMATORS
+from pipeline.study.comparison import Comparison
 from pipeline.study.csv_tables import (
     MEASURE_REQUIRED,
     MEASURE_RESERVED,
@@ -18,7 +19,10 @@ from pipeline.study.csv_tables import (
     TRIAL_REQUIRED,
 )
 from pipeline.study.fields import Frozen
-from pipeline.study.settings import KINDS, Comparison, Display, OperatorTerm, QualityLimits, Study, load_study, parse
+from pipeline.study.folder import load_study
+from pipeline.study.settings import Display, QualityLimits, Study
+from pipeline.study.streams import KINDS, OperatorTerm
+from pipeline.study.yaml_text import parse
 from pipeline.tables import table as tables
 from tests.conftest import CLONE
 

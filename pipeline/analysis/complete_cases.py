@@ -12,7 +12,8 @@ import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.result import FloatArray
-from pipeline.study.settings import Comparison, Study
+from pipeline.study.comparison import Comparison
+from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 
 Row = dict[str, Any]

@@ -18,7 +18,9 @@ from pipeline.statistics.counterbalancing import balance
 from pipeline.statistics.crossover import crossover
 from pipeline.statistics.mixed import mixed_model
 from pipeline.statistics.result import Result
-from pipeline.study.settings import Comparison, Session, Study
+from pipeline.study.comparison import Comparison
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 from pipeline.words import counted, listing, p_phrase, statistic
 
 Row = dict[str, Any]

@@ -9,7 +9,8 @@ from typing import Any
 import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study.settings import Session, identifier
+from pipeline.study.fields import identifier
+from pipeline.study.session import Session
 from pipeline.tables import table as tables
 
 Row = dict[str, Any]

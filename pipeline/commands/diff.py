@@ -13,7 +13,7 @@ from pipeline.commands import console, explanation
 from pipeline.commands.check import MOVED
 from pipeline.commands.explanation import Explanation, Made
 from pipeline.errors import PipelineError
-from pipeline.study.settings import SETTINGS_FILE
+from pipeline.study.folder import SETTINGS_FILE
 from pipeline.tables import differences, results
 from pipeline.tables.differences import ABSENT, Change, Differences, Identified
 from pipeline.words import counted

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from pipeline.commands import console
 from pipeline.commands.run import executor_of, reports_folder, short
 from pipeline.errors import PipelineError
-from pipeline.study.settings import Study, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 
 if TYPE_CHECKING:

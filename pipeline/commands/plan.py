@@ -11,7 +11,8 @@ from pathlib import Path
 from pipeline.commands import console
 from pipeline.errors import PipelineError
 from pipeline.statistics.counterbalancing import Order, assigned, balance, williams_design
-from pipeline.study.settings import identifier, load_study
+from pipeline.study.fields import identifier
+from pipeline.study.folder import load_study
 from pipeline.words import counted
 
 _NAMED_AS = "name them as study.yaml does, as in: steadyhand plan kinect fusion --participants 12"

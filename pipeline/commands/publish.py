@@ -18,7 +18,8 @@ from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
 from pipeline.stages import COMPARE, INGEST, REPLAY
-from pipeline.study.settings import SETTINGS_FILE, Study
+from pipeline.study.folder import SETTINGS_FILE
+from pipeline.study.settings import Study
 
 _RESULTS = "results.json"
 _ARCHIVE = "report.zip"

@@ -25,7 +25,8 @@ from pipeline.report.document import html, pdf
 from pipeline.report.sections.replay import document
 from pipeline.sessions.variants import Variant, read_changes, read_estimators, variants
 from pipeline.stages import INGEST, REPLAY
-from pipeline.study.settings import Session, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.session import Session
 from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.words import interval, number, seconds

@@ -11,7 +11,8 @@ from pipeline.commands import console
 from pipeline.commands.run import PROCESS, executor_of
 from pipeline.errors import PipelineError
 from pipeline.simulation.up_to_date import is_made
-from pipeline.study.settings import Study, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.settings import Study
 from pipeline.study.simulation import ReachSimulation
 
 
@@ -35,7 +36,7 @@ def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: boo
 
 def _reach(folder: Path, study: Study, if_needed: bool) -> None:
     """The paper's Experiment 1, whose logs are small and come with the study."""
-    from pipeline.study.settings import find_sessions
+    from pipeline.study.folder import find_sessions
 
     if if_needed and find_sessions(folder, study).sessions:
         return

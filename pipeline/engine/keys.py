@@ -11,7 +11,8 @@ from typing import Any
 from pipeline.engine.cache import Entry, code_digest, digest_of
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage, Work
-from pipeline.study.settings import Session, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 
 
 @dataclass(frozen=True)

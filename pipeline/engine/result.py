@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.engine.cache import Entry
-from pipeline.study.settings import Session, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 
 
 @dataclass

@@ -15,7 +15,8 @@ from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage
 from pipeline.engine.usable_sessions import found_in, require_something, still_usable
 from pipeline.errors import PipelineError
-from pipeline.study.settings import Session, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 
 
 def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Result:

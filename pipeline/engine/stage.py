@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pipeline.study.settings import Session, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 
 
 @dataclass(frozen=True)

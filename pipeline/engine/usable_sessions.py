@@ -11,7 +11,9 @@ from pipeline.engine.input_digests import remembered
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Outcome
 from pipeline.errors import PipelineError
-from pipeline.study.settings import TABLE_FIELDS, Session, Study, find_sessions, load_study
+from pipeline.study.folder import TABLE_FIELDS, find_sessions, load_study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 
 
 def found_in(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:

@@ -10,7 +10,8 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from fusion_core import ESTIMATORS, Estimator, Sensor, Term
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study.settings import AccelerationStream, LinearStream, PositionStream, Sensing, Study
+from pipeline.study.settings import Study
+from pipeline.study.streams import AccelerationStream, LinearStream, PositionStream, Sensing
 
 
 def sensor(study: Study, stream: Sensing) -> Sensor:

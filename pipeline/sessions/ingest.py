@@ -14,7 +14,9 @@ from pipeline.errors import SessionError, did_you_mean
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log, Readings, Wanted
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
-from pipeline.study.settings import Session, Stream, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
+from pipeline.study.streams import Stream
 from pipeline.tables import table as tables
 
 Row = dict[str, Any]

@@ -9,7 +9,7 @@ import numpy as np
 from fusion_core import FloatArray, Samples, Sensor
 from fusion_core.alignment import carried, headed, heading, level, nearest, rotate, rotations
 from fusion_core.calibration import Body, Calibration, calibrate, mounted
-from pipeline.study.settings import AccelerationStream
+from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns
 
 _MM_PER_M = 1000.0

@@ -16,14 +16,14 @@ from fusion_core.alignment import nearest, rotate
 from fusion_core.calibration import Body
 from pipeline.sessions.estimators import build_estimator, sensor, sensors
 from pipeline.sessions.phone import Phone, aligned, phone
-from pipeline.study.settings import (
+from pipeline.study.settings import Study
+from pipeline.study.streams import (
     AccelerationStream,
     DisplayStream,
     LinearStream,
     PositionStream,
     ReferenceStream,
     Stream,
-    Study,
     VelocityStream,
 )
 from pipeline.tables import table as tables

@@ -10,7 +10,9 @@ from typing import Any
 
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.sessions.estimators import build_estimator
-from pipeline.study.settings import Estimator, Estimators, Study, known, parse, read_values, read_yaml
+from pipeline.study.fields import known
+from pipeline.study.settings import Estimator, Estimators, Study
+from pipeline.study.yaml_text import parse, read_values, read_yaml
 
 
 @dataclass(frozen=True)

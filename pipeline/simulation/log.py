@@ -12,7 +12,7 @@ from pipeline.simulation.hand_steps import FloatArray, IntArray
 from pipeline.simulation.loop_steps import STEP_NS, TAP_S, TAP_X, TAP_Y
 from pipeline.simulation.sensing import gyroscope
 from pipeline.simulation.session import Outcome, Setting, reference_ns
-from pipeline.study.settings import PositionStream, ReferenceStream
+from pipeline.study.streams import PositionStream, ReferenceStream
 
 EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
 _MM_PER_M = 1000.0

@@ -14,8 +14,10 @@ from pipeline.sessions.logs.log import Content
 from pipeline.sessions.logs.mcap import Message, in_order, write
 from pipeline.sessions.recording import seeded
 from pipeline.simulation.motion import minimum_jerk
-from pipeline.study.settings import AccelerationStream, PositionStream, ReferenceStream, Study, inside
+from pipeline.study.folder import inside
+from pipeline.study.settings import Study
 from pipeline.study.simulation import ReachSimulation
+from pipeline.study.streams import AccelerationStream, PositionStream, ReferenceStream
 
 _EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
 _MM_PER_M = 1000.0

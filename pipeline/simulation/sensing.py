@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.simulation.hand_steps import FloatArray
-from pipeline.study.settings import AccelerationStream, PositionStream
 from pipeline.study.simulation import Instruments
+from pipeline.study.streams import AccelerationStream, PositionStream
 
 IntArray = npt.NDArray[np.int64]
 Draws = Callable[[str], np.random.Generator]

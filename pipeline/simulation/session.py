@@ -19,8 +19,9 @@ from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, Int
 from pipeline.simulation.live import Readings, live
 from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
 from pipeline.simulation.motion import minimum_jerk
-from pipeline.study.settings import AccelerationStream, PositionStream, Study
+from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
+from pipeline.study.streams import AccelerationStream, PositionStream
 
 _NS = 1e-9
 _USUAL_S = 120.0  # most sessions are done by then; a longer one is run again from its begin with more room

@@ -20,7 +20,8 @@ from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.up_to_date import MADE, files_made, made_from
 from pipeline.simulation.workload import ratings
 from pipeline.statistics.counterbalancing import assigned
-from pipeline.study.settings import Study, inside
+from pipeline.study.folder import inside
+from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 
 _BEING_MADE = ".being-simulated"

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study.settings import identifier
+from pipeline.study.fields import identifier
 
 MISSING = ("", "NA", "N/A")
 _SHOWN_FAULTS = 5

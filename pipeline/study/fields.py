@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import unicodedata
+from collections.abc import Mapping
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from pipeline.errors import did_you_mean
 
 Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
@@ -14,3 +18,40 @@ class Frozen(BaseModel):
     """Immutable, and every key is known."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def identifier(value: object) -> object:
+    """An id as text in Unicode NFC: 7 and "7" are one, and so are the two ways to write "é"."""
+    if isinstance(value, bool):
+        raise ValueError(f'is read as true/false; put it in quotes: "{value}"')
+    if isinstance(value, int | float):
+        value = str(value)
+    return unicodedata.normalize("NFC", value) if isinstance(value, str) else value
+
+
+Id = Annotated[str, BeforeValidator(identifier), Field(min_length=1)]
+
+
+Vector = tuple[Finite, Finite, Finite]
+
+
+Seconds = Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)]
+
+
+Axis = Literal["x", "y", "z"]
+
+
+Axes = Annotated[tuple[Axis, ...], Field(min_length=1)]
+
+
+def unique(field: str, values: tuple[str, ...]) -> None:
+    """ValueError where one of the values stands there twice."""
+    for value in values:
+        if values.count(value) > 1:
+            raise ValueError(f'{field}: "{value}" stands there twice')
+
+
+def known(field: str, value: str, names: Mapping[str, object] | tuple[str, ...]) -> None:
+    """ValueError where a value is none of the names, with the one that was meant."""
+    if value not in names:
+        raise ValueError(f'{field}: "{value}" is not known{did_you_mean(value, names)}')

@@ -17,11 +17,13 @@ from pydantic import (
     model_validator,
 )
 
-from pipeline.analysis.audit.p_values import DEGREES_OF_FREEDOM, Symbol
 from pipeline.errors import did_you_mean
-from pipeline.study.fields import Frozen
+from pipeline.study.fields import Frozen, Id, known, unique
 from pipeline.study.rounded import Rounded, Rounding
-from pipeline.study.settings import Id, known, parse, read_yaml, unique
+from pipeline.study.yaml_text import parse, read_yaml
+
+Symbol = Literal["t", "F", "chi2", "z", "r"]
+DEGREES_OF_FREEDOM: Mapping[Symbol, int] = {"t": 1, "F": 2, "chi2": 1, "z": 0, "r": 1}
 
 BETWEEN = ("t_independent", "welch", "anova")
 """Tests of groups: each has participants of its own."""

@@ -185,3 +185,6 @@ class ReachSimulation(Frozen):
 
 
 Simulation = Annotated[ReachSimulation | SelectionSimulation, Field(discriminator="kind")]
+
+
+SIMULATIONS = ("reach", "selection")

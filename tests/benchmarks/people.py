@@ -12,7 +12,8 @@ import numpy as np
 from scipy.stats import binomtest, ttest_rel
 
 from pipeline.simulation.session import Setting, simulate
-from pipeline.study.settings import Study, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.settings import Study
 from tests.conftest import CLONE
 
 STUDIES, PEOPLE = 200, 8

@@ -25,7 +25,8 @@ from pipeline.engine.run import bring_up_to_date, over_settings
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError, WorkerLostError
 from pipeline.stages import COMPARE, REPLAY, STAGES
-from pipeline.study.settings import Study, parse, read_yaml
+from pipeline.study.settings import Study
+from pipeline.study.yaml_text import parse, read_yaml
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.dying import POISONED
 from tests.pipeline.helpers import run

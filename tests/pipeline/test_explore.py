@@ -20,7 +20,7 @@ from pipeline.errors import WorkerLostError
 from pipeline.simulation.exploration import Grid, explore, stated, with_tracker
 from pipeline.simulation.session import Setting
 from pipeline.simulation.what_pays import MEASURES, Tracker, differences, means, what_pays
-from pipeline.study.settings import load_study
+from pipeline.study.folder import load_study
 from pipeline.tables import table as tables
 from tests.conftest import CLONE
 from tests.pipeline.helpers import Ran, run

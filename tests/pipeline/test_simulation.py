@@ -17,7 +17,8 @@ from pipeline.simulation import hand_steps, layout, people, study_files
 from pipeline.simulation.motion import minimum_jerk
 from pipeline.simulation.session import Setting, simulate
 from pipeline.simulation.workload import ratings
-from pipeline.study.settings import Study, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation, Task, Workload
 from tests.pipeline.helpers import Steadyhand, run
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import PipelineError
-from pipeline.study.settings import find_sessions, load_study
+from pipeline.study.folder import find_sessions, load_study
 from tests.conftest import STREAMS
 from tests.pipeline.helpers import Steadyhand
 

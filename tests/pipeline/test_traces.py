@@ -20,7 +20,8 @@ from pipeline.engine.stage import Work
 from pipeline.report.document import traces
 from pipeline.report.document.traces import Series, Traces
 from pipeline.sessions import ingest, recording
-from pipeline.study.settings import Session, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.session import Session
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 

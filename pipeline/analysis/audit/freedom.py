@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 from pipeline.analysis.audit.finding import Finding, Statement
-from pipeline.analysis.audit.p_values import DEGREES_OF_FREEDOM
 from pipeline.analysis.audit.phrases import label, written
-from pipeline.study.printed import Measure, PrintedTest, Publication
+from pipeline.study.printed import DEGREES_OF_FREEDOM, Measure, PrintedTest, Publication
 from pipeline.study.rounded import Interval, Rounded
 
 WITHIN = ("rm_anova", "art_anova")

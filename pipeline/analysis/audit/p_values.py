@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.study.printed import Symbol
 from pipeline.study.rounded import Interval
 
-Symbol = Literal["t", "F", "chi2", "z", "r"]
 Bounds = tuple[float, float]
 FloatArray = npt.NDArray[np.float64]
 
-DEGREES_OF_FREEDOM = {"t": 1, "F": 2, "chi2": 1, "z": 0, "r": 1}
 
 _PATH = 33  # points between the bounds of a degree of freedom that is itself rounded
 _SMALLEST_DF = 1e-3

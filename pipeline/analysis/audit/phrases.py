@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.analysis.audit.p_values import Symbol
-from pipeline.study.printed import Measure, PrintedTest
+from pipeline.study.printed import Measure, PrintedTest, Symbol
 from pipeline.study.rounded import Rounded
 from pipeline.words import TESTS
 

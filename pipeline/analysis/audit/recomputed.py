@@ -7,9 +7,9 @@ from fractions import Fraction
 
 from pipeline.analysis.audit.finding import Finding, Statement
 from pipeline.analysis.audit.freedom import WITHIN, freedom, rounded_after_correction
-from pipeline.analysis.audit.p_values import Bounds, Symbol, meets, p_bounds, p_bounds_corrected
+from pipeline.analysis.audit.p_values import Bounds, meets, p_bounds, p_bounds_corrected
 from pipeline.analysis.audit.phrases import label, written, written_p
-from pipeline.study.printed import Measure, PrintedTest, Publication
+from pipeline.study.printed import Measure, PrintedTest, Publication, Symbol
 from pipeline.study.rounded import Interval, Rounded
 
 Reading = tuple[str, Bounds]

@@ -7,7 +7,9 @@ from dataclasses import fields
 from typing import Any
 
 from pipeline.sessions.estimators import build_estimator
-from pipeline.study.settings import Comparison, Sensing, Study
+from pipeline.study.comparison import Comparison
+from pipeline.study.settings import Study
+from pipeline.study.streams import Sensing
 from pipeline.words import adjustment, counted, listing, number, subject, unit_of
 
 Row = Mapping[str, Any]

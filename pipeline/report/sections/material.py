@@ -15,7 +15,8 @@ from pipeline.engine.two_processes import Job
 from pipeline.report import figures
 from pipeline.report.document.model import Figure
 from pipeline.report.figures import captions
-from pipeline.study.settings import Session, Study
+from pipeline.study.session import Session
+from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.words import listing
 

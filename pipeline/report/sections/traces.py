@@ -11,7 +11,7 @@ from pipeline.report.document import traces
 from pipeline.report.document.traces import Kind, Series, Traces
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.sessions import recording
-from pipeline.study.settings import Session
+from pipeline.study.session import Session
 from pipeline.tables import table as tables
 
 PAGE = "traces.html"

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from pipeline.analysis.audit.p_values import Symbol, meets, p_bounds, p_bounds_corrected, p_two_sided
+from pipeline.analysis.audit.p_values import meets, p_bounds, p_bounds_corrected, p_two_sided
+from pipeline.study.printed import Symbol
 from pipeline.study.rounded import Interval, Rounded
 
 

@@ -1,0 +1,81 @@
+"""An entry of `comparisons:` in study.yaml: which measure, which test, which options."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.study.fields import Finite, Frozen, Id
+
+Adjustment = Literal["holm", "bonferroni", "benjamini_hochberg"]
+
+
+class Comparison(Frozen):
+    """What to test. A key that the test has no use for is an error, for something else was meant."""
+
+    measure: Id
+    test: Literal[
+        "rm_anova",
+        "t_paired",
+        "wilcoxon",
+        "friedman",
+        "art_anova",
+        "mixed_model",
+        "crossover",
+        "tost",
+        "bayes_t",
+    ]
+    within: tuple[Id, ...] = ("condition",)
+    adjust: Literal["none"] | Adjustment = "none"
+    follow_up: Literal["none"] | Adjustment = "holm"
+    zeros: Literal["dropped", "pratt"] = "dropped"
+    bounds: tuple[Finite, Finite] | None = None
+    prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
+    fixed: tuple[Id, ...] = ("condition",)
+
+    @model_validator(mode="after")
+    def _fits_the_test(self) -> Comparison:
+        for key, tests in _ONLY_FOR.items():
+            if getattr(self, key) != type(self).model_fields[key].default and self.test not in tests:
+                raise ValueError(f"{self.test} does not take {key}; it is for {' and '.join(tests)}")
+        if self.test == "tost" and self.bounds is None:
+            raise ValueError("tost needs bounds, in the unit of the measure, such as bounds: [-5, 5]")
+        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
+            raise ValueError(f"bounds need the lower one first, found {list(self.bounds)}")
+        for key, names in (("within", self.within), ("fixed", self.terms)):
+            if "condition" not in names or len(set(names)) < len(names):
+                raise ValueError(f'{key} of "{self.measure}" needs "condition", and no name twice')
+        if len(self.within) > 3:
+            raise ValueError(f"{self.test} does not take within: {list(self.within)}; three factors are the most")
+        for term in self.terms:
+            parts = term.split(":")
+            for name in parts:
+                if len(parts) > 1 and name not in self.terms:
+                    raise ValueError(f'fixed: "{term}" needs "{name}" as a term too')
+            if len(parts) > 1 and "period" in parts and self.period_is_slope:
+                raise ValueError(f'fixed: "{term}" needs factor(period) in the place of period')
+        return self
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """The names in `fixed`; factor(period) is the period too."""
+        return tuple(term.replace(_PERIOD_AS_FACTOR, "period") for term in self.fixed)
+
+    @property
+    def period_is_slope(self) -> bool:
+        """Is the period a number, each counting as much more as the last one?"""
+        return _PERIOD_AS_FACTOR not in self.fixed
+
+
+_PERIOD_AS_FACTOR = "factor(period)"
+
+
+_ONLY_FOR = {
+    "within": ("rm_anova", "art_anova"),
+    "follow_up": ("rm_anova", "mixed_model"),
+    "zeros": ("wilcoxon",),
+    "bounds": ("tost",),
+    "prior_scale": ("bayes_t",),
+    "fixed": ("mixed_model",),
+}

@@ -1,0 +1,128 @@
+"""A study's folder: its settings read and checked, its sessions found, and no path that leads out of it."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.errors import PipelineError
+from pipeline.study.session import PLACEHOLDER, Session
+from pipeline.study.settings import Study
+from pipeline.study.yaml_text import parse, read_yaml
+
+SETTINGS_FILE = "study.yaml"
+
+
+TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed", "repeats")  # files of a study
+
+
+def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
+    """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy.
+
+    With `to_be_made` its tables need not be there yet.
+    """
+    if not folder.is_dir():
+        raise PipelineError(f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it")
+    path = folder / SETTINGS_FILE
+    if not path.is_file():
+        raise PipelineError(f"{folder}: holds no {SETTINGS_FILE}; studies/README.md shows what goes into one")
+    inside(folder, SETTINGS_FILE, str(folder))
+    content = read_yaml(path)
+    content.setdefault("title", folder.resolve().name)
+    study = parse(Study, content, path)
+    for field in TABLE_FIELDS:
+        name = getattr(study, field)
+        if name is not None:
+            file = inside(folder, name, f"{path}: {field}", must_exist=False)
+            if not file.is_file() and not to_be_made:
+                made = f"; it is made by: steadyhand simulate {folder}" if study.simulation is not None else ""
+                raise PipelineError(f'{path}: {field}: there is no file "{name}" in the study folder{made}')
+    if study.sessions is not None:
+        inside(folder, study.sessions, f"{path}: sessions", must_exist=False)
+    return study
+
+
+def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path:
+    """A path of the study, refused if it leads out of its folder by `..`, a root or a link."""
+    root = folder.resolve()
+    path = root / name
+    try:
+        leads_out = Path(name).is_absolute() or ".." in Path(name).parts or not path.resolve().is_relative_to(root)
+        exists = path.is_file()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise PipelineError(f"{field}: {name!r} cannot be a path: {error}") from None
+    if leads_out:
+        raise PipelineError(f'{field}: "{name}" leads out of the study folder; put the file into it')
+    if must_exist and not exists:
+        raise PipelineError(f'{field}: there is no file "{name}" in the study folder')
+    return path
+
+
+@dataclass(frozen=True)
+class Found:
+    """A study's logs by id; what has a log's name and cannot be read; what lies beside them and has not."""
+
+    sessions: list[Session]
+    set_aside: list[tuple[Session, str]]
+    unused: list[tuple[str, str]]
+
+
+def find_sessions(folder: Path, study: Study) -> Found:
+    """The logs that match the study's pattern, sorted by id, and what is there beside them, with the reason.
+
+    Two equal ids, or a link that leads out of the folder, are a PipelineError.
+    """
+    if study.sessions is None:
+        return Found([], [], [])
+    root = folder.resolve()
+    pieces = PLACEHOLDER.split(Path(study.sessions).as_posix())
+    pattern = "".join(
+        re.escape(piece) if index % 2 == 0 else f"(?P<{piece}>[^_/]+)" for index, piece in enumerate(pieces)
+    )
+    fixed = Path(pieces[0]).parent if not pieces[0].endswith("/") else Path(pieces[0])
+    sessions: dict[str, Session] = {}
+    set_aside: list[tuple[Session, str]] = []
+    unused: list[tuple[str, str]] = []
+    for path in sorted((root / fixed).rglob("*")):
+        relative = unicodedata.normalize("NFC", path.relative_to(root).as_posix())
+        match = re.fullmatch(pattern, relative)
+        reason = _cannot_be_a_log(path, relative, match is not None, Path(study.sessions).suffix)
+        if reason is not None:
+            name = relative.encode("utf-8", "backslashreplace").decode()
+            if match is None:
+                unused.append((name, reason))
+            else:
+                set_aside.append((Session(name, None, None, path), reason))
+        if match is None or reason is not None:
+            continue
+        inside(folder, path.relative_to(root).as_posix(), f"{folder / SETTINGS_FILE}: sessions")
+        found = match.groupdict()
+        session = Session(Path(relative).stem, found.get("participant"), found.get("condition"), path)
+        if session.id in sessions:
+            other = sessions[session.id].path.relative_to(root)
+            raise PipelineError(
+                f'{folder / SETTINGS_FILE}: sessions: "{other}" and "{path.relative_to(root)}" are both session '
+                f"\"{session.id}\"; a session's id is its file's name, rename one"
+            )
+        sessions[session.id] = session
+    return Found([sessions[key] for key in sorted(sessions)], set_aside, unused)
+
+
+def _cannot_be_a_log(path: Path, relative: str, matches: bool, suffix: str) -> str | None:
+    """Why a file among the sessions is not used; None for one that is, or that has nothing to do with them."""
+    if path.is_symlink() and path.is_dir():
+        return "a link to a folder is not followed"
+    if path.is_dir() and not matches:
+        return None
+    if not matches:
+        near = Path(relative).suffix.casefold() == suffix.casefold()
+        return "its name does not fit the pattern of study.yaml" if near else None
+    if not path.is_file():
+        return "it is not a file that can be read"
+    try:
+        relative.encode("utf-8")
+    except UnicodeEncodeError:
+        return "its name is not UTF-8; rename it"
+    return None

@@ -1,0 +1,46 @@
+"""A session, and the pattern that its file's name follows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.errors import did_you_mean
+from pipeline.study.fields import unique
+
+PLACEHOLDER = re.compile(r"\{(\w+)\}")
+
+
+PLACEHOLDERS = ("participant", "condition", "session")
+
+
+def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
+    names = PLACEHOLDER.findall(pattern)
+    for name in names:
+        if name not in PLACEHOLDERS:
+            raise ValueError(f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, PLACEHOLDERS)}')
+    unique("sessions: placeholder", tuple(names))
+    if not names:
+        raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
+    for condition in conditions:
+        if "condition" in names and ("_" in condition or "/" in condition):
+            raise ValueError(
+                f'sessions: {{condition}} stands for text without "_" and "/", so no log can be of "{condition}"; '
+                "rename the condition, or use {session} and let the logs' metadata say it"
+            )
+
+
+@dataclass(frozen=True)
+class Session:
+    """One participant in one condition, one log. Null where the file's name does not say."""
+
+    id: str
+    participant: str | None
+    condition: str | None
+    path: Path
+
+    @property
+    def ids(self) -> dict[str, str | None]:
+        """Its columns in tables: participant, condition, session."""
+        return {"participant": self.participant, "condition": self.condition, "session": self.id}

@@ -1,0 +1,116 @@
+"""The kinds of sensor streams in study.yaml, and what each must say of itself."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.study.fields import Axes, Finite, Frozen, Positive, Seconds, Vector
+
+
+class _Stream(Frozen):
+    topic: str
+    stamp: Literal["arrival", "measurement"] = "measurement"
+    latency_s: Seconds = 0.0
+
+
+class _Sensor(_Stream):
+    rate_hz: Positive | None = None
+
+
+class PositionStream(_Sensor):
+    """A tracker. `stamp: arrival` says that it stamps on delivery: measured at stamp − latency_s."""
+
+    kind: Literal["position"]
+    noise_sd_mm: Positive = 8.0
+    axes: Axes | None = None
+
+
+class VelocityStream(_Sensor):
+    """A sensor of the hand's velocity, such as optical flow."""
+
+    kind: Literal["velocity"]
+    noise_sd_mm_s: Positive
+    axes: Axes | None = None
+
+
+class OperatorTerm(Frozen):
+    """`weight` times a derivative of the position, `at_s` after the reading's own time."""
+
+    weight: Finite
+    derivative: Annotated[int, Field(ge=0, le=2)] = 0
+    at_s: Finite = 0.0
+
+
+class LinearStream(_Sensor):
+    """A sensor of a sum of terms: an operator of the user's own."""
+
+    kind: Literal["linear"]
+    noise_sd: Positive
+    operator: Annotated[tuple[OperatorTerm, ...], Field(min_length=1)]
+    axes: Axes | None = None
+
+
+class AccelerationStream(_Sensor):
+    """A phone's IMU: body-frame specific force, turned into the tracker frame by its orientation.
+
+    How it is mounted is given (`mounting_xyzw`, `lever_arm_mm`), or learned from each session's first `calibrate_s`.
+    """
+
+    kind: Literal["acceleration"]
+    gravity_mm_s2: Vector
+    noise_sd_mm_s2: Positive = 100.0
+    mounting_xyzw: tuple[Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 1.0)
+    lever_arm_mm: Vector = (0.0, 0.0, 0.0)
+    calibrate_s: Seconds = 0.0
+
+    @model_validator(mode="after")
+    def _one_way(self) -> AccelerationStream:
+        if not sum(part**2 for part in self.mounting_xyzw) > 0:
+            raise ValueError("mounting_xyzw is all zeros; no rotation is [0, 0, 0, 1]")
+        if not sum(part**2 for part in self.gravity_mm_s2) > 0:
+            raise ValueError("gravity_mm_s2 is all zeros; at rest it is some 9807 mm/s² downwards")
+        given = any(self.mounting_xyzw[:3]) or any(self.lever_arm_mm)
+        if self.calibrate_s and given:
+            raise ValueError("gives mounting_xyzw or lever_arm_mm, and calibrate_s to learn them; keep one")
+        return self
+
+
+class ReferenceStream(_Stream):
+    """Ground truth, brought into the tracker's frame by a rotation and a translation."""
+
+    kind: Literal["reference"]
+    rotation_xyzw: tuple[Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 1.0)
+    translation_mm: Vector = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _turns(self) -> ReferenceStream:
+        if not sum(part**2 for part in self.rotation_xyzw) > 0:
+            raise ValueError("rotation_xyzw is all zeros; no rotation is [0, 0, 0, 1]")
+        return self
+
+
+class DisplayStream(_Stream):
+    """What the participant saw."""
+
+    kind: Literal["display"]
+
+
+Sensing = PositionStream | VelocityStream | LinearStream | AccelerationStream
+
+
+Stream = Annotated[
+    PositionStream | VelocityStream | LinearStream | AccelerationStream | ReferenceStream | DisplayStream,
+    Field(discriminator="kind"),
+]
+
+
+KINDS: dict[object, type[Frozen]] = {
+    "position": PositionStream,
+    "velocity": VelocityStream,
+    "linear": LinearStream,
+    "acceleration": AccelerationStream,
+    "reference": ReferenceStream,
+    "display": DisplayStream,
+}

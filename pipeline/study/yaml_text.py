@@ -1,0 +1,140 @@
+"""YAML text as values and models, with errors that name the file, the field and the remedy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.study.simulation import SIMULATIONS
+from pipeline.study.streams import KINDS
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """A key that stands twice in one mapping is an error, not the last one's victory."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """No aliases: a few lines of them can stand for gigabytes."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem="aliases (*name) are not understood; write it out", problem_mark=mark)
+        return super().compose_node(parent, index)
+
+
+def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, object]:
+    seen: set[str] = set()
+    for key, _ in node.value:
+        if isinstance(key, yaml.ScalarNode):
+            if key.value in seen:
+                raise yaml.MarkedYAMLError(problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark)
+            seen.add(key.value)
+    return dict(loader.construct_mapping(node, deep=True))
+
+
+_UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+
+
+class _TextLoader(_UniqueKeyLoader):
+    """Numbers stay text: 0.050 keeps its last digit."""
+
+
+_TextLoader.yaml_implicit_resolvers = {}
+
+
+def read_yaml(path: Path, as_text: bool = False) -> dict[str, Any]:
+    """A YAML file that holds a mapping; PipelineError that names the file and line where it does not.
+
+    `as_text` leaves every value as it is written, numbers too.
+    """
+    loader = _TextLoader if as_text else _UniqueKeyLoader
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=loader)  # noqa: S506 - safe
+    except FileNotFoundError:
+        raise PipelineError(f"{path}: there is no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise PipelineError(f"{path}: cannot be read: {error}") from None
+    except yaml.MarkedYAMLError as error:
+        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        raise PipelineError(f"{path}{line}: not valid YAML: {error.problem}") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise PipelineError(f"{path}: not valid YAML: {error}") from None
+    try:
+        json.dumps(content, ensure_ascii=False, default=str).encode("utf-8")
+    except UnicodeEncodeError:
+        raise PipelineError(
+            f"{path}: holds half of a surrogate pair (\\ud800 and the like); write the character"
+        ) from None
+    if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
+        raise PipelineError(f"{path}: holds no settings; it needs lines like `title: My study`")
+    return content
+
+
+def read_values(text: str) -> list[Any]:
+    """A list in YAML without its brackets, "3, 5"; ValueError where it is none."""
+    try:
+        found = yaml.load(f"[{text}]", Loader=_UniqueKeyLoader)  # noqa: S506 - safe
+    except (yaml.YAMLError, RecursionError) as error:
+        fault = error.problem if isinstance(error, yaml.MarkedYAMLError) else error
+        raise ValueError(f"not a list of values: {fault}") from None
+    if not isinstance(found, list) or any(value is None for value in found):
+        raise ValueError("a value is missing")
+    return found
+
+
+def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Model:
+    """Content as a model; every fault in one PipelineError, a line each."""
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise PipelineError("\n".join(f"{path}: {_explained(fault, model)}" for fault in error.errors())) from None
+
+
+def _explained(fault: Any, model: type[BaseModel]) -> str:
+    """One fault of pydantic's in the user's words."""
+    location = [part for part in fault["loc"] if part not in (*KINDS, *SIMULATIONS) or part is fault["loc"][0]]
+    field = ".".join(str(part) for part in location)
+    if fault["type"] == "extra_forbidden":
+        return f'unknown key "{field}"{did_you_mean(str(location[-1]), _keys_at(model, fault["loc"][:-1]))}'
+    if fault["type"] == "missing":
+        return f'"{field}" is missing'
+    if fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        kinds = SIMULATIONS if location[:1] == ["simulation"] else KINDS
+        return f'"{field}" needs a kind: {", ".join(str(kind) for kind in kinds)}'
+    message = fault["msg"].removeprefix("Value error, ")
+    message = message[0].lower() + message[1:]
+    found = fault.get("input")
+    shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
+    return f'"{field}": {message}{shown}' if field else f"{message}{shown}"
+
+
+def _keys_at(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
+    """The keys that are known where an unknown one stood."""
+    models = [model]
+    for part in location:
+        inner = [kind for outer in models for kind in _models_of(outer, part)]
+        models = inner or [kind for kind in models if part in _kinds(kind)] or models
+    return [field.alias or name for name, field in models[0].model_fields.items()]
+
+
+def _models_of(model: type[BaseModel], key: object) -> list[type[BaseModel]]:
+    """The models that a key of a model holds, in a list or a mapping or by itself."""
+    field = next((field for name, field in model.model_fields.items() if key in (name, field.alias)), None)
+    pending, found = [] if field is None else [field.annotation], []
+    while pending:
+        annotation: Any = pending.pop()
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            found.append(annotation)
+        pending += get_args(annotation)
+    return found
+
+
+def _kinds(model: type[BaseModel]) -> tuple[object, ...]:
+    """The kinds by which a union of models tells this one."""
+    field = model.model_fields.get("kind")
+    return get_args(field.annotation) if field else ()
