@@ -23,7 +23,7 @@ from pipeline.study.folder import load_study
 from pipeline.study.settings import Display, QualityLimits, Study
 from pipeline.study.streams import KINDS, OperatorTerm
 from pipeline.study.yaml_text import parse
-from pipeline.tables import table as tables
+from pipeline.tables.columns import TABLES
 from tests.conftest import CLONE
 
 REFERENCE = (CLONE / "studies" / "README.md").read_text(encoding="utf-8")
@@ -106,7 +106,7 @@ def test_units_are_in_the_names_of_columns() -> None:
         "published_reduction",
     }
     units = ("_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95", "_deg")
-    for name, schema in tables.TABLES.items():
+    for name, schema in TABLES.items():
         for column in schema:
             if str(column.type) == "double" and column.name not in bare | dimensionless:
                 known = column.name.endswith(units) or column.name in ("qx", "qy", "qz", "qw")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,9 +22,10 @@ from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.tables import results
 from pipeline.tables import table as tables
+from pipeline.tables.columns import TABLES
+from pipeline.tables.table import Row
 from pipeline.words import measure_order
 
-Row = dict[str, Any]
 _SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones", "calibration")
 
 
@@ -157,7 +157,7 @@ def _root_rows(rows: Iterable[Row]) -> list[Row]:
 
 def accuracy_means(accuracy: pd.DataFrame) -> list[Row]:
     """Each estimator's accuracy, means over sessions, as far as a session has the figure."""
-    columns = [name for name in tables.TABLES["accuracy_means"].names if name not in ("estimator", "n")]
+    columns = [name for name in TABLES["accuracy_means"].names if name not in ("estimator", "n")]
     return [
         {"estimator": str(estimator), "n": len(rows), **{column: float(rows[column].mean()) for column in columns}}
         for estimator, rows in accuracy.groupby("estimator", sort=False)

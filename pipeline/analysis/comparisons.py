@@ -7,7 +7,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,6 +17,7 @@ from pipeline.analysis.complete_cases import Asked, Cells
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics import OK, diagnostics, pairs
 from pipeline.statistics.anova import rm_anova
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.art import art_anova
 from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.crossover import crossover
@@ -27,11 +27,11 @@ from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
-from pipeline.statistics.result import FloatArray, Result
+from pipeline.statistics.result import Result
 from pipeline.study.settings import Study
+from pipeline.tables.table import Row
 from pipeline.words import measure_order
 
-Row = dict[str, Any]
 Answer = tuple[list[Row], list[Row]]
 """Rows of `comparisons`, and the exclusions that came of incomplete participants."""
 

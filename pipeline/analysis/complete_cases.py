@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.statistics.result import FloatArray
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.comparison import Comparison
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
-
-Row = dict[str, Any]
+from pipeline.tables.table import Row
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import pandas as pd
 
@@ -21,9 +20,9 @@ from pipeline.statistics.result import Result
 from pipeline.study.comparison import Comparison
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
+from pipeline.tables.table import Row
 from pipeline.words import counted, listing, p_phrase, statistic
 
-Row = dict[str, Any]
 Order = tuple[str, ...]
 _NAMED = 5
 

@@ -11,10 +11,9 @@ import pandas as pd
 from pipeline.analysis import complete_cases as cells
 from pipeline.analysis.complete_cases import Asked
 from pipeline.errors import PipelineError
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column, Covariate, Factor
-from pipeline.statistics.result import FloatArray
-
-Row = dict[str, Any]
+from pipeline.tables.table import Row
 
 CARRY_OVER = "carry_over"
 _WHERE = (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
 import pandas as pd
 
@@ -12,8 +11,7 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.fields import identifier
 from pipeline.study.session import Session
 from pipeline.tables import table as tables
-
-Row = dict[str, Any]
+from pipeline.tables.table import Row
 
 LOGS, MEASURES, PARTICIPANTS = "the logs", "the measures", "the participants table"
 SOURCES = (LOGS, MEASURES, PARTICIPANTS)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from pipeline.statistics.descriptive import described
+from pipeline.tables.table import Row
 
-Row = dict[str, Any]
 _POSSIBLE = {
     "rmse_mm": (0.0, np.inf),
     "sd_mm": (0.0, np.inf),

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipeline.study.simulation import SelectionSimulation
-
-Row = dict[str, Any]
+from pipeline.tables.table import Row
 
 
 def reductions(settings: SelectionSimulation, conditions: tuple[str, ...], repeats: pd.DataFrame) -> Iterator[Row]:

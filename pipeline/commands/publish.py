@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline.engine.cache import code_digest, file_digest, versions
+from pipeline.engine.cache import file_digest
+from pipeline.engine.code_digest import code_digest, versions
 from pipeline.engine.provenance import LIBRARIES, PROVENANCE
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage

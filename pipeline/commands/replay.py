@@ -7,7 +7,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -29,12 +28,12 @@ from pipeline.study.folder import load_study
 from pipeline.study.session import Session
 from pipeline.tables import results
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 from pipeline.words import interval, number, seconds
 
 _PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"
 _TABLES = ("accuracy", "replay_trials", "replay_means", "replay_exclusions")
 _IN_RESULTS = ("accuracy", "replay_means", "replay_exclusions")
-Row = dict[str, Any]
 
 
 @dataclass

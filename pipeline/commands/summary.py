@@ -8,8 +8,6 @@ from typing import Any
 from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.words import comparison_sentence, counted, measure_label, number
 
-Row = Mapping[str, Any]
-
 
 def summary(results: Mapping[str, Any]) -> Iterator[str]:
     """Title and origin, then every comparison, and each estimator's mean error."""

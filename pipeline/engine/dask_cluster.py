@@ -15,7 +15,7 @@ from distributed import Client, LocalCluster, WorkerPlugin
 from distributed.scheduler import KilledWorker
 
 from pipeline.engine import threads
-from pipeline.engine.cache import code_digest
+from pipeline.engine.code_digest import code_digest
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, WorkerLostError
 

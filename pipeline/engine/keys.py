@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.engine.cache import Entry, code_digest, digest_of
+from pipeline.engine.cache import Entry, digest_of
+from pipeline.engine.code_digest import code_digest
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage, Work
 from pipeline.study.session import Session

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from statistics import median
-from typing import Any, Literal
+from typing import Literal
 
 from pipeline.study.settings import QualityLimits, Study
+from pipeline.tables.table import Row
 from pipeline.words import number, percent
 
-Row = Mapping[str, Any]
 Light = Literal["not judged", "green", "amber", "red"]
 
 LIGHTS: tuple[Light, ...] = ("not judged", "green", "amber", "red")

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusion_core import FloatArray, Samples, accuracy, noise
+from fusion_core import Samples, accuracy, noise
 from pipeline.engine.stage import Outcome, Work
 from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors
 from pipeline.sessions.phone import described
-from pipeline.sessions.recording import Recording, Shown
+from pipeline.sessions.recording import SETTLED_S, Recording, Shown
 from pipeline.sessions.trials import coordinates, selections_by_trial, told, with_movements
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
+from pipeline.tables.table import Row
 
 _UNITS = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s²", "linear": "its own"}
-_SETTLED_S = 1.0  # after the first frame's arrival: the grid of accuracy begins there
 _PERCENT_OF_SD = (*range(25, 200, 25), 196, *range(200, 401, 50))  # at which errors are counted
-Row = dict[str, Any]
 
 
 def run(work: Work) -> Outcome:
@@ -104,7 +105,7 @@ def _on_grid(
         return None
     time = loaded.to_s(shown.time_ns)
     truth = accuracy.interpolate(named[1], time)
-    on_grid = (time >= loaded.samples[tracker].arrival[0] + _SETTLED_S) & np.isfinite(truth).all(axis=1)
+    on_grid = (time >= loaded.samples[tracker].arrival[0] + SETTLED_S) & np.isfinite(truth).all(axis=1)
     if not on_grid.any():
         return None
     return time[on_grid], shown.mean[on_grid], shown.sd[on_grid], truth[on_grid]
@@ -230,7 +231,7 @@ def trial_rows(work: Work, events: Sequence[Row], tracks: Mapping[str, Shown]) -
         if selected is None:
             yield trial | {"estimator": "recorded"}
             continue
-        duration_s = float(selected["time_ns"] - start["time_ns"]) * tables.NANOSECONDS
+        duration_s = float(selected["time_ns"] - start["time_ns"]) * S_PER_NS
         shown: dict[str, Row] = {"recorded": {axis: selected[f"{axis}_mm"] for axis in "xyz"}}
         for name, track in tracks.items():
             at = int(np.searchsorted(track.time_ns, selected["time_ns"], side="right")) - 1

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from fusion_core import FloatArray, Samples, accuracy
-from pipeline.sessions.recording import Recording, Shown
+from fusion_core import Samples, accuracy
+from pipeline.sessions.recording import SETTLED_S, Recording, Shown
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
 
 EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
-_SETTLED_S = 1.0
 _STRETCHES = 120  # of a session at the most
 _STRETCH_NS = 1_000_000_000  # at the least
 
@@ -81,7 +82,7 @@ def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[s
     tracker = loaded.samples[name]
     for estimator, shown in tracks.items():
         time, mean = loaded.to_s(shown.time_ns), shown.mean
-        settled = time >= tracker.arrival[0] + _SETTLED_S
+        settled = time >= tracker.arrival[0] + SETTLED_S
         curve = accuracy.lead_curve(time[settled], mean[settled], tracker)
         if curve is None or not np.max(np.abs(curve[1])) > 0:
             continue
@@ -104,13 +105,13 @@ def rates(ingested: Path) -> Iterator[dict[str, Any]]:
         arrival = np.sort(rows["arrival_ns"].to_numpy(np.int64))
         stretch = np.searchsorted(edges, arrival, side="right") - 1
         silence = np.zeros(count)
-        np.maximum.at(silence, stretch, np.diff(arrival, prepend=first) * tables.NANOSECONDS)
+        np.maximum.at(silence, stretch, np.diff(arrival, prepend=first) * S_PER_NS)
         for index, messages in enumerate(np.bincount(stretch, minlength=count)):
             yield {
                 "session": session,
                 "stream": stream,
                 "time_ns": int(edges[index]),
-                "duration_s": float(edges[index + 1] - edges[index]) * tables.NANOSECONDS,
+                "duration_s": float(edges[index + 1] - edges[index]) * S_PER_NS,
                 "messages": int(messages),
                 "gap_max_s": float(silence[index]),
             }

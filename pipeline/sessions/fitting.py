@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, WindowGP
+from fusion_core import Estimator, FusionKalman, Samples, Sensor, WindowGP
 from fusion_core.accuracy import interpolate, rmse
 from fusion_core.likelihood import Fitted, foretold, foretold_by, maximise
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
-from pipeline.sessions.recording import Recording
+from pipeline.sessions.recording import SETTLED_S, Recording
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 
 _IMU_PRIOR = 0.7  # SD of the logarithm: a factor of two. Smooth motion alone cannot tell an accelerometer's noise
 _FREE = float("inf")
-_SETTLED_S = 1.0  # before it no estimate is scored, as in the table `accuracy`
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def fit(study: Study, recordings: Mapping[str, Recording], first_s: float) -> Fi
         fitted += rows
     scores = []
     for session, loaded in recordings.items():
-        later = loaded.times[loaded.times >= _begin(study, loaded) + first_s + _SETTLED_S]
+        later = loaded.times[loaded.times >= _begin(study, loaded) + first_s + SETTLED_S]
         scores += _scores(study, session, loaded, estimators, later, _late(study, loaded.samples, latency))
     return Fit(tuple(fitted), tuple(scores), _gravity(recordings, first_s))
 

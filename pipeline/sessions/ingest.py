@@ -18,8 +18,9 @@ from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.study.streams import Stream
 from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
+from pipeline.tables.table import Row
 
-Row = dict[str, Any]
 MM_PER_M = 1000.0
 _NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
 _DAY_NS = 86_400e9
@@ -134,13 +135,13 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
         in_time &= off <= _DAY_NS
     if not in_time.all():
         notes.append(f"{int((~in_time).sum())} samples left out: their time is more than a day off")
-    late_s = float(np.median(readings.arrival_ns - readings.stamp_ns)) * tables.NANOSECONDS
+    late_s = float(np.median(readings.arrival_ns - readings.stamp_ns)) * S_PER_NS
     if stream.kind in _NEEDED and abs(late_s) > _SAME_CLOCK_S:
         raise SessionError(
             f"topic {stream.topic}: stamps and arrivals are {abs(late_s):.0f} s apart, so they are not of one clock"
         )
     keep = finite & in_time
-    delay_s = (readings.arrival_ns - readings.stamp_ns)[keep] * tables.NANOSECONDS
+    delay_s = (readings.arrival_ns - readings.stamp_ns)[keep] * S_PER_NS
     delay_s = delay_s + (stream.latency_s if stream.stamp == "arrival" else 0.0)
     if np.any(delay_s > _LATE_S):
         notes.append(

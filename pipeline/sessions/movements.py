@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from pipeline.statistics.arrays import FloatArray
 
 CUTOFF_HZ = 5.0
 GAP_S = 1.0 / CUTOFF_HZ  # what lies further apart than a period of the fastest motion that is kept is not one path

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fusion_core import FloatArray, Samples, Sensor
+from fusion_core import Samples, Sensor
 from fusion_core.alignment import carried, headed, heading, level, nearest, rotate, rotations
 from fusion_core.calibration import Body, Calibration, calibrate, mounted
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns
 

@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, Track, smooth
+from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.alignment import nearest, rotate
 from fusion_core.calibration import Body
 from pipeline.sessions.estimators import build_estimator, sensor, sensors
 from pipeline.sessions.phone import Phone, aligned, phone
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.study.streams import (
     AccelerationStream,
@@ -27,7 +29,11 @@ from pipeline.study.streams import (
     VelocityStream,
 )
 from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Columns
+
+SETTLED_S = 1.0
+"""After the first frame's arrival: what estimates say before it is neither scored nor shown."""
 
 SMOOTHED = "smoothed"  # the name of the reference that a study without one gets
 _AXES = ("x", "y", "z")
@@ -65,11 +71,11 @@ class Recording:
 
     def to_ns(self, time: FloatArray) -> np.ndarray[Any, np.dtype[np.int64]]:
         """Seconds since the origin as the tables' nanoseconds."""
-        return np.rint(time / tables.NANOSECONDS).astype(np.int64) + self.origin_ns
+        return np.rint(time / S_PER_NS).astype(np.int64) + self.origin_ns
 
     def to_s(self, time_ns: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
         """The tables' nanoseconds as seconds since the origin."""
-        return np.asarray(time_ns - self.origin_ns, dtype=np.float64) * tables.NANOSECONDS
+        return np.asarray(time_ns - self.origin_ns, dtype=np.float64) * S_PER_NS
 
 
 @dataclass(frozen=True)
@@ -135,11 +141,11 @@ def _vectors(rows: Columns, stream: Stream, origin_ns: int) -> Samples:
     if isinstance(stream, ReferenceStream) and len(value):
         value = rotate(np.array(stream.rotation_xyzw), value) + np.array(stream.translation_mm)
     late = stream.stamp == "arrival" or stream.kind in ("reference", "display")
-    return tables.samples(*_times(rows, stream.latency_s if late else 0.0), value, origin_ns)
+    return samples(*_times(rows, stream.latency_s if late else 0.0), value, origin_ns)
 
 
 def _times(rows: Columns, latency_s: float) -> tuple[Any, Any]:
-    return rows["time_ns"] - round(latency_s / tables.NANOSECONDS), rows["arrival_ns"]
+    return rows["time_ns"] - round(latency_s / S_PER_NS), rows["arrival_ns"]
 
 
 def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Samples]) -> dict[str, Phone]:
@@ -152,7 +158,7 @@ def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Sample
         if isinstance(stream, AccelerationStream):
             rows = tables.of_stream(imu, name)
             time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamp == "arrival" else 0.0)
-            times = (time_ns - origin_ns) * tables.NANOSECONDS, (arrival_ns - origin_ns) * tables.NANOSECONDS
+            times = (time_ns - origin_ns) * S_PER_NS, (arrival_ns - origin_ns) * S_PER_NS
             imu_readings = phone(rows, times, _of_space(sensor(study, stream)))
             logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])
             found[name] = aligned(imu_readings, logged, stream, tracker)
@@ -252,7 +258,7 @@ def _instants(study: Study, imu: pa.Table, positions: pa.Table, origin_ns: int) 
     accelerations, frames = study.stream_of_kind("acceleration"), study.stream_of_kind("position")
     rows = tables.of_stream(imu, accelerations) if accelerations else tables.of_stream(positions, frames or "")
     arrival = np.unique(rows["arrival_ns"])
-    times: FloatArray = (arrival - origin_ns) * tables.NANOSECONDS
+    times: FloatArray = (arrival - origin_ns) * S_PER_NS
     return times
 
 
@@ -260,3 +266,25 @@ def seeded(*names: str) -> np.random.Generator:
     """Random numbers that depend on names alone, so that a result does not depend on order or on other sessions."""
     digest = hashlib.sha256("\x1f".join(names).encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:8], "big"))
+
+
+def samples(
+    time_ns: np.ndarray[Any, Any],
+    arrival_ns: np.ndarray[Any, Any],
+    value: np.ndarray[Any, Any],
+    origin_ns: int,
+) -> Samples:
+    """The crossing into fusion_core: readings by arrival, in seconds since `origin_ns`, each reading once.
+
+    A reading whose stamp and values another one already had is a copy of it and left out (`quality` counts them).
+    """
+    order = np.lexsort((time_ns, arrival_ns))
+    time_ns, arrival_ns, value = time_ns[order], arrival_ns[order], value[order]
+    kept = np.flatnonzero(~pd.DataFrame(value).assign(stamp=time_ns).duplicated())
+    from fusion_core.samples import Samples  # and with it the compiler, which most commands never need
+
+    return Samples(
+        (time_ns[kept] - origin_ns) * S_PER_NS,
+        (arrival_ns[kept] - origin_ns) * S_PER_NS,
+        np.ascontiguousarray(value[kept], dtype=np.float64),
+    )

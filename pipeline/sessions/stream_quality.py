@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.sessions.logs.log import FloatArray, IntArray, Readings
+from pipeline.sessions.logs.log import IntArray, Readings
+from pipeline.statistics.arrays import FloatArray
+from pipeline.tables.columns import S_PER_NS
 
-_SECONDS = 1e-9
 _STEP_BACK_MIN = 10  # messages: a clock that went back stays back; a late message comes alone
 _FORWARDS = 0.8  # of the steps in a run; in shuffled messages half of them are
 
@@ -31,16 +32,16 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
         remarks.append("how many messages the log lost cannot be known")
     if np.any(np.diff(readings.arrival_ns) < 0):
         remarks.append("messages are not in order of arrival in the file; sorted")
-    steps: FloatArray = apart_ns[apart_ns > 0].astype(np.float64) * _SECONDS
+    steps: FloatArray = apart_ns[apart_ns > 0].astype(np.float64) * S_PER_NS
     if len(steps):
         usual = float(np.median(steps))
         missing = int(np.sum(np.round(steps[steps > 1.5 * usual] / usual) - 1))
-        intervals = np.diff(arrival) * _SECONDS
+        intervals = np.diff(arrival) * S_PER_NS
         regular = intervals[intervals <= 1.5 * usual]
         row["rate_hz"] = len(steps) / float(steps.sum())
         row["gap_max_s"] = float(steps.max())
         row["jitter_ms"] = float(np.std(regular) * 1e3) if len(regular) > 1 else None
-        row["latency_s"] = float(np.median(arrival - stamp) * _SECONDS)
+        row["latency_s"] = float(np.median(arrival - stamp) * S_PER_NS)
         if missing and readings.sampled:
             remarks.append(f"{missing} samples missing ({missing / (missing + len(steps) + 1):.1%})")
     row["note"] = "; ".join(remarks) or None
@@ -71,5 +72,5 @@ def clock_went_back(readings: Readings) -> float | None:
                 continue
             apart = _STEP_BACK_MIN // 2  # single late messages within the run do not turn its direction
             if np.mean(run[apart:] > run[:-apart]) > _FORWARDS:
-                return float((newest[begin - 1] - run[0]) * _SECONDS)
+                return float((newest[begin - 1] - run[0]) * S_PER_NS)
     return None

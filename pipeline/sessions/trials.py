@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
 from pipeline.sessions import movements
-from pipeline.sessions.movements import FloatArray
-from pipeline.tables import table as tables
+from pipeline.statistics.arrays import FloatArray
+from pipeline.tables.columns import S_PER_NS
+from pipeline.tables.table import Row
 
-Row = Mapping[str, Any]
 _TOLD = ["trial", "start_s", "selection_s", "left_s"]
 
 
@@ -50,7 +49,7 @@ def told(events: Sequence[Row], origin_ns: int) -> pd.DataFrame:
         first, last = (own[0], own[-1]) if own else ({}, {})
         row = {"trial": index + 1 if start["trial"] is None else start["trial"]}
         for name, event in (("start_s", start), ("selection_s", first), ("left_s", last)):
-            row[name] = (event["time_ns"] - origin_ns) * tables.NANOSECONDS if event else np.nan
+            row[name] = (event["time_ns"] - origin_ns) * S_PER_NS if event else np.nan
         for axis in "xyz":
             target = first.get(f"target_{axis}_mm")
             row[f"target_{axis}_mm"] = start[f"target_{axis}_mm"] if target is None else target

@@ -15,8 +15,7 @@ from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.study_files import participants, with_other_people
 from pipeline.simulation.what_pays import Tracker
 from pipeline.study.settings import Study
-
-Row = dict[str, Any]
+from pipeline.tables.table import Row
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-FloatArray = npt.NDArray[np.float64]
+from pipeline.statistics.arrays import FloatArray
+
 IntArray = npt.NDArray[np.int64]
 
 STEP_S = 0.0025  # sensors are read in between; a hand hardly bends in it

@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.simulation.hand_steps import FloatArray, Layout
+from pipeline.simulation.hand_steps import Layout
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.simulation import Ring, Task
 
 _POINT_APART_MM = 1.0

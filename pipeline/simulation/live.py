@@ -17,7 +17,8 @@ from fusion_core.event_replay import arrive
 from fusion_core.event_steps import History, Model, expect
 from fusion_core.event_time import EventTime
 from fusion_core.window_gp import Schedule
-from pipeline.simulation.hand_steps import FloatArray, IntArray
+from pipeline.simulation.hand_steps import IntArray
+from pipeline.statistics.arrays import FloatArray
 
 _RAW, _POSITION_KALMAN, _WINDOW, _EVENT_TIME = 0, 1, 2, 3
 _UPCOMING, _OLDEST, _COUNT = 0, 1, 2

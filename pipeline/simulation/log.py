@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.sessions.logs.mcap import Message, in_order, write
-from pipeline.simulation.hand_steps import FloatArray, IntArray
+from pipeline.simulation.hand_steps import IntArray
 from pipeline.simulation.loop_steps import STEP_NS, TAP_S, TAP_X, TAP_Y
 from pipeline.simulation.sensing import gyroscope
 from pipeline.simulation.session import Outcome, Setting, reference_ns
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import PositionStream, ReferenceStream
 
 EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today

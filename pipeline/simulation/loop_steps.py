@@ -13,7 +13,6 @@ from pipeline.simulation.hand_steps import (
     STEP,
     STEP_S,
     TARGET,
-    FloatArray,
     Hand,
     IntArray,
     Layout,
@@ -22,6 +21,7 @@ from pipeline.simulation.hand_steps import (
     advance,
 )
 from pipeline.simulation.live import Live, Readings, show
+from pipeline.statistics.arrays import FloatArray
 
 STEP_NS = round(STEP_S * 1e9)
 # Columns of Session.taps.

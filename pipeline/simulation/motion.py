@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusion_core import FloatArray
+from pipeline.statistics.arrays import FloatArray
 
 
 def minimum_jerk(time: FloatArray, begin_s: float, duration_s: float) -> tuple[FloatArray, FloatArray]:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion_core import FloatArray
 from pipeline.errors import PipelineError
 from pipeline.sessions.logs.log import Content
 from pipeline.sessions.logs.mcap import Message, in_order, write
 from pipeline.sessions.recording import seeded
 from pipeline.simulation.motion import minimum_jerk
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.folder import inside
 from pipeline.study.settings import Study
 from pipeline.study.simulation import ReachSimulation

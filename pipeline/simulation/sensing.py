@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.simulation.hand_steps import FloatArray
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.simulation import Instruments
 from pipeline.study.streams import AccelerationStream, PositionStream
+from pipeline.tables.columns import NS_PER_S
 
 IntArray = npt.NDArray[np.int64]
 Draws = Callable[[str], np.random.Generator]
-_NS = 1e9
 _WOBBLE_S = 0.5
 
 
@@ -48,7 +48,7 @@ def frames(stream: PositionStream, instruments: Instruments, length_s: float, dr
     """A tracker over a session."""
     time_ns = _times(instruments.tracker_rate_hz, instruments, length_s, draws, "tracker")
     noise = draws("tracker noise").normal(0.0, stream.noise_sd_mm, (len(time_ns), 3))
-    return Frames(time_ns, time_ns + round(stream.latency_s * _NS), noise)
+    return Frames(time_ns, time_ns + round(stream.latency_s * NS_PER_S), noise)
 
 
 def phone(stream: AccelerationStream, instruments: Instruments, length_s: float, draws: Draws) -> Phone:
@@ -68,7 +68,7 @@ def phone(stream: AccelerationStream, instruments: Instruments, length_s: float,
     noise = draws("imu noise").normal(0.0, stream.noise_sd_mm_s2, (count, 3))
     return Phone(
         time_ns,
-        time_ns + round(stream.latency_s * _NS),
+        time_ns + round(stream.latency_s * NS_PER_S),
         true.inv().as_matrix(),
         noise + bias,
         logged.as_quat(),
@@ -82,7 +82,7 @@ def gyroscope(held: Phone) -> FloatArray:
     found = np.zeros((len(held.time_ns), 3))
     if len(found) > 1:
         turns = held.to_body[:-1] @ held.to_body[1:].transpose(0, 2, 1)
-        found[1:] = Rotation.from_matrix(turns).as_rotvec() / np.diff(held.time_ns)[:, None] * _NS
+        found[1:] = Rotation.from_matrix(turns).as_rotvec() / np.diff(held.time_ns)[:, None] * NS_PER_S
         found[0] = found[1]
     return found
 
@@ -97,7 +97,7 @@ def _times(rate_hz: float, instruments: Instruments, length_s: float, draws: Dra
         time += np.clip(strayed, -0.4 / rate_hz, 0.4 / rate_hz)  # none overtakes another
     if instruments.lost:
         time = time[draws(f"{name} losses").random(count) >= instruments.lost]
-    return np.rint(np.maximum(time, 0.0) * _NS).astype(np.int64)
+    return np.rint(np.maximum(time, 0.0) * NS_PER_S).astype(np.int64)
 
 
 def _smooth(random: np.random.Generator, count: int, step_s: float) -> FloatArray:

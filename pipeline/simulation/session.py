@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fusion_core import Estimator, FloatArray, Samples, Sensor, accuracy
+from fusion_core import Estimator, Samples, Sensor, accuracy
 from fusion_core.alignment import rotate, rotations
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
@@ -19,11 +19,12 @@ from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, Int
 from pipeline.simulation.live import Readings, live
 from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
 from pipeline.simulation.motion import minimum_jerk
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.study.streams import AccelerationStream, PositionStream
+from pipeline.tables.columns import S_PER_NS
 
-_NS = 1e-9
 _USUAL_S = 120.0  # most sessions are done by then; a longer one is run again from its begin with more room
 _TREMOR_HZ, _TREMOR_DAMPING = 8.0, 0.1
 _DRIFT_HZ, _DRIFT_DAMPING = 0.3, 0.7
@@ -195,10 +196,10 @@ def _attempt(
     turn, offset, rotation = _in_tracker_frame(phone, np.array(imu.gravity_mm_s2), len(setting.study.axes))
     dimension = len(setting.study.axes)
     readings = Readings(
-        frame_time=_since(frames.arrival_ns - round(tracker.latency_s / _NS), origin_ns),
+        frame_time=_since(frames.arrival_ns - round(tracker.latency_s / S_PER_NS), origin_ns),
         frame_arrival=_since(frames.arrival_ns, origin_ns),
         frame_mm=np.zeros((len(frames.time_ns), dimension)),
-        force_time=_since(phone.arrival_ns - round(imu.latency_s / _NS), origin_ns),
+        force_time=_since(phone.arrival_ns - round(imu.latency_s / S_PER_NS), origin_ns),
         force_arrival=_since(phone.arrival_ns, origin_ns),
         force_mm_s2=np.zeros((len(phone.time_ns), dimension)),
     )
@@ -283,14 +284,14 @@ def _first(found: Any, count: int) -> Any:
 
 def _since(time_ns: IntArray, origin_ns: int) -> FloatArray:
     """As the pipeline reckons a log's times, to the last bit."""
-    found: FloatArray = np.asarray((time_ns - origin_ns) * _NS, dtype=np.float64)
+    found: FloatArray = np.asarray((time_ns - origin_ns) * S_PER_NS, dtype=np.float64)
     return found
 
 
 def reference_ns(setting: Setting, length_s: float) -> IntArray:
     """When the true position is written down, in ns."""
     rate_hz = setting.simulation.instruments.reference_rate_hz
-    return np.rint(np.arange(0.0, length_s, 1.0 / rate_hz) / _NS).astype(np.int64)
+    return np.rint(np.arange(0.0, length_s, 1.0 / rate_hz) / S_PER_NS).astype(np.int64)
 
 
 def _sways(settings: SelectionSimulation) -> tuple[Sway, Sway]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from pipeline.engine.cache import code_digest, digest_of
+from pipeline.engine.cache import digest_of
+from pipeline.engine.code_digest import code_digest
 from pipeline.study.settings import Study
 
 MADE = "simulated.json"

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.descriptive import described
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.power import Design, difference_of_dz
 from pipeline.statistics.sample_size import FEWEST, fewest
-
-FloatArray = npt.NDArray[np.float64]
-Row = dict[str, Any]
+from pipeline.tables.table import Row
 
 MEASURES = ("selection_mse_mm2", "completion_time_s")
 """What estimators are compared by, a value a person."""

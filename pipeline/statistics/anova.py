@@ -12,9 +12,10 @@ import numpy as np
 from scipy import stats
 
 from pipeline.statistics import NO_ERROR, OK
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.diagnostics import normality
 from pipeline.statistics.effect_size import partial_eta_squared_interval
-from pipeline.statistics.result import FloatArray, Result, degenerate, negligible, too_few
+from pipeline.statistics.result import Result, degenerate, negligible, too_few
 
 
 def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:

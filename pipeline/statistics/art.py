@@ -11,7 +11,8 @@ from scipy import stats
 
 from pipeline.statistics import OK
 from pipeline.statistics.anova import rm_anova
-from pipeline.statistics.result import FloatArray, Result, rounded
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import Result, rounded
 
 _METHOD = "aligned rank transform, F in the effect's own error stratum, uncorrected"
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy import special
 
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.effect_size import dz_interval
 from pipeline.statistics.paired import differences_of
-from pipeline.statistics.result import FloatArray, Result
+from pipeline.statistics.result import Result
 
 PRIOR_SCALE = 0.707
 _STEP = 0.01  # of ln g; the integrand is smooth and dies out on both sides, so sums converge faster than any power

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NO_COMPLETE, NO_ERROR, ONE_ORDER, TOO_FEW_VALUES
-from pipeline.statistics.result import FloatArray, Result, negligible, rounded, rounded_differences
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import Result, negligible, rounded, rounded_differences
 
 EFFECTS = ("treatment", "period", "carry-over")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from pipeline.statistics.result import FloatArray
+from pipeline.statistics.arrays import FloatArray
 
 
 def described(values: FloatArray) -> dict[str, float]:

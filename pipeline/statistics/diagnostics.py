@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from pipeline.statistics.result import FloatArray, negligible, rounded_differences
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import negligible, rounded_differences
 
 OUTLIER_RULE = "modified z beyond 3.5 (Iglewicz and Hoaglin 1993)"
 _FAR_OUT = 3.5

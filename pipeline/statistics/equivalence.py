@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from scipy import stats
 
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.effect_size import dz_interval
 from pipeline.statistics.paired import differences_of
-from pipeline.statistics.result import FloatArray, Result
+from pipeline.statistics.result import Result
 
 
 def tost(first: FloatArray, second: FloatArray, bounds: tuple[float, float], effect: str = "condition") -> Result:

@@ -21,9 +21,10 @@ from pipeline.statistics import (
     ONE_COMPLETE,
     TOO_FEW_VALUES,
 )
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.effect_size import partial_eta_squared_interval
 from pipeline.statistics.random_intercept import Fit, Rows, degrees_of_freedom, f_test, fit
-from pipeline.statistics.result import FloatArray, IntArray, Result, negligible
+from pipeline.statistics.result import IntArray, Result, negligible
 
 _METHOD = "linear mixed model, random intercept, REML, Satterthwaite degrees of freedom"
 

@@ -8,8 +8,9 @@ import numpy as np
 from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NO_ERROR
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.effect_size import cohen_dz, dz_interval, hedges_correction
-from pipeline.statistics.result import FloatArray, Result, negligible, rounded_differences, too_few
+from pipeline.statistics.result import Result, negligible, rounded_differences, too_few
 
 
 @dataclass(frozen=True)

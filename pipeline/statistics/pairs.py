@@ -8,7 +8,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from pipeline.statistics.result import FloatArray
+from pipeline.statistics.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.effect_size import noncentral_t_cdf
-from pipeline.statistics.result import FloatArray
 
 TESTS = ("t_paired", "wilcoxon", "rm_anova")
 

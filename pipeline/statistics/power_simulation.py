@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg, stats
 
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.power import Design
 from pipeline.statistics.rank import signed_rank_p
-from pipeline.statistics.result import FloatArray
 from pipeline.statistics.search import smallest
 
 BoolArray = npt.NDArray[np.bool_]

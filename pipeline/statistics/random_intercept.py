@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy import optimize
 
-from pipeline.statistics.result import FloatArray, IntArray
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import IntArray
 
 _RATIOS = np.concatenate([[0.0], np.logspace(-6, 25, 125)])  # of σ_b² to σ_e²: among them the search begins
 _SINGULAR = 1e-8  # a ratio so small is zero, as in lme4

@@ -9,7 +9,8 @@ import numpy as np
 from scipy import optimize, signal, special, stats
 
 from pipeline.statistics import ALL_ZERO
-from pipeline.statistics.result import FloatArray, IntArray, Result, degenerate, rounded, rounded_differences, too_few
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import IntArray, Result, degenerate, rounded, rounded_differences, too_few
 
 EXACT_UP_TO = 3000  # pairs: beyond, the Walsh averages alone would fill the memory
 _BLOCK = 256

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.statistics import ALL_ZERO, NO_COMPLETE, NO_VARIATION, OK, ONE_COMPLETE
+from pipeline.statistics.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _ROUND_OFF = 1e-12  # of the largest value: what arithmetic on decimal data leaves behind

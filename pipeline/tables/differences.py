@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from pipeline.tables.table import Row
 from pipeline.words import NOTHING
 
-Row = Mapping[str, Any]
 Figures = Mapping[str, Any]
 
 OF_A_STUDY: Mapping[str, tuple[str, ...]] = {

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion_core import Estimator, FloatArray, FusionKalman, Samples, Sensor, WindowGP
+from fusion_core import Estimator, FusionKalman, Samples, Sensor, WindowGP
+from pipeline.statistics.arrays import FloatArray
 
 RUNS = 200
 LENGTH_S, MOVES_AT_S = 12.0, 8.0

@@ -11,7 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from fusion_core import FloatArray, Samples, Sensor, WindowGP
+from fusion_core import Samples, Sensor, WindowGP
+from pipeline.statistics.arrays import FloatArray
 from tests.fusion_core.reference import wiener_acceleration
 
 JERK_PSD_MM2_S5, BIAS_WALK = 1e7, 30.0

@@ -8,7 +8,7 @@ import pytest
 from fusion_core import Samples, accuracy, noise
 from fusion_core.alignment import rotate, rotations
 from fusion_core.calibration import Body
-from fusion_core.samples import FloatArray
+from pipeline.statistics.arrays import FloatArray
 
 
 def moving(time: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from scipy import stats
 
 from fusion_core import FusionKalman, Samples, WindowGP
 from fusion_core.likelihood import foretold, foretold_by, maximise
-from fusion_core.samples import FloatArray
+from pipeline.statistics.arrays import FloatArray
 from tests.fusion_core.test_kalman import IMU, TRACKER
 from tests.fusion_core.test_smoother import small
 from tests.fusion_core.test_window_gp import RATED, regular

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fusion_core import FusionKalman, Samples, fixed_lag, smooth
-from fusion_core.samples import FloatArray
+from pipeline.statistics.arrays import FloatArray
 from tests.benchmarks import floor
 from tests.fusion_core.test_conformance import recording
 from tests.fusion_core.test_fusion_kalman import PLAIN, SPACE

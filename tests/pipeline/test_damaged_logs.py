@@ -306,7 +306,7 @@ READ_AND_WEIGH = """
 import sys
 from pathlib import Path
 from pipeline.errors import SessionError
-from pipeline.formats import read_log
+from pipeline.sessions.logs import read_log
 from tests.pipeline.test_mcap import WANTED
 
 def peak_mb():

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from pipeline.commands import explanation, replay
 from pipeline.tables import differences, results
+from pipeline.tables.columns import TABLES
 from pipeline.tables.differences import ABSENT, OF_A_REPLAY, OF_A_STUDY, between, changes
-from pipeline.tables.table import TABLES
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, run
 

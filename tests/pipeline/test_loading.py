@@ -18,6 +18,7 @@ from pipeline.errors import PipelineError
 from pipeline.notebook import STAGE_OF, Tables
 from pipeline.tables import results
 from pipeline.tables import table as stored
+from pipeline.tables.columns import TABLES
 from tests.conftest import CLONE, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
@@ -78,14 +79,14 @@ def test_the_tables_are_those_of_the_command_and_of_its_cache(study: Path, stead
 def test_every_table_of_a_study_is_there(loaded: Tables) -> None:
     never_stored = {"sequences"}
     of_other_commands = ("replay_", "explore")  # whose tables are not a study's
-    assert set(STAGE_OF) == {
-        name for name in stored.TABLES if not name.startswith(of_other_commands)
-    } - never_stored | {"replay_agreement"}
+    assert set(STAGE_OF) == {name for name in TABLES if not name.startswith(of_other_commands)} - never_stored | {
+        "replay_agreement"
+    }
     assert list(loaded) == list(STAGE_OF)
     assert len(loaded) == len(STAGE_OF)
     assert set(STAGE_OF) <= set(dir(loaded))
     for name, table in loaded.items():
-        assert list(table.columns) == stored.TABLES[name].names
+        assert list(table.columns) == TABLES[name].names
     filled = {name for name, table in loaded.items() if len(table)}
     assert filled >= {
         "positions",

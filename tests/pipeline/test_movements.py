@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusion_core import FloatArray
 from pipeline.sessions import movements
 from pipeline.sessions.logs.mcap import Message
 from pipeline.sessions.movements import Path as HandPath
 from pipeline.sessions.trials import selections_by_trial
+from pipeline.statistics.arrays import FloatArray
 from pipeline.tables import table as tables
 from pipeline.words import measure_label, unit_of
 from tests.conftest import STREAMS, session_messages, write_session

@@ -11,7 +11,8 @@ import pytest
 
 from pipeline.commands.console import PlainLines
 from pipeline.engine import cache as cache_module
-from pipeline.engine.cache import Cache, code_digest
+from pipeline.engine.cache import Cache
+from pipeline.engine.code_digest import code_digest
 from pipeline.engine.processes import InThisProcess
 from pipeline.engine.resources import Means
 from pipeline.engine.result import Result
@@ -118,11 +119,11 @@ def test_edited_code_invalidates_what_it_touches(monkeypatch: pytest.MonkeyPatch
         return {name for name in before if before[name] != after[name]}
 
     assert touched("fusion_core/window_gp.py") == {"fuse", "assess", "compare", "report"}
-    assert touched("pipeline/formats/mcap/container.py") == {"ingest"}
-    assert touched("pipeline/formats/mcap/protobuf_template.py") == {"ingest"}
+    assert touched("pipeline/sessions/logs/mcap/container.py") == {"ingest"}
+    assert touched("pipeline/sessions/logs/mcap/protobuf_template.py") == {"ingest"}
     assert touched("pipeline/statistics/rank.py") == {"compare"}
-    assert touched("pipeline/document/style.css") == {"report"}
-    assert touched("pipeline/wording.py") >= {"compare", "report"}
+    assert touched("pipeline/report/document/style.css") == {"report"}
+    assert touched("pipeline/words.py") >= {"compare", "report"}
     code_digest.cache_clear()
 
 

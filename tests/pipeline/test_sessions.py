@@ -16,7 +16,7 @@ from pipeline.sessions import ingest, recording
 from pipeline.sessions.estimators import build_estimator
 from pipeline.sessions.logs.mcap import Message
 from pipeline.study.folder import find_sessions, load_study
-from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
@@ -73,7 +73,7 @@ def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, stea
     out.mkdir()
     ingest.run(Work("t", loaded_study, study, out, (session,)))
     loaded = recording.load(loaded_study, out)
-    selected = (EPOCH_NS + 1_800_000_000 - loaded.origin_ns) * tables.NANOSECONDS
+    selected = (EPOCH_NS + 1_800_000_000 - loaded.origin_ns) * S_PER_NS
     emitted = loaded.times[loaded.times <= selected + 1e-9].max()
     track = replay_loop(build_estimator(loaded_study, "fusion"), loaded.samples, np.array([emitted]))
     expected = np.hypot(track.mean[0, 0] - 100, track.mean[0, 1] - 500)

@@ -2,5 +2,5 @@
 
 No module here knows a study's data. `rounded` and `finding` are what the checks speak in; `granularity`, `p_values`
 and `signed_rank` are the mathematics, on plain numbers; `cells`, `arithmetic`, `recomputed`, `freedom`, `from_means`,
-`wilcoxon` and `claims` are the checks, on the models of `pipeline.publication`; `audit` runs them all.
+`wilcoxon` and `claims` are the checks, on the models of `pipeline.study.printed`; `audit` runs them all.
 """

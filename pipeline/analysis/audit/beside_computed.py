@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,8 +15,8 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.printed import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
 from pipeline.study.rounded import Rounded
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 
-Row = dict[str, Any]
 _STATISTIC_NAMES = {"t": "t", "F": "F", "chi2": "chi2", "W": "W+"}
 _ROUND_OFF = Fraction(1, 10**6)  # of a unit in the last digit: what arithmetic leaves of a value halfway
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.printed import Symbol
 from pipeline.study.rounded import Interval
 
 Bounds = tuple[float, float]
-FloatArray = npt.NDArray[np.float64]
 
 
 _PATH = 33  # points between the bounds of a degree of freedom that is itself rounded

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from pipeline.report.document.html import write_page
 from pipeline.report.document.model import Link
+from pipeline.statistics.arrays import FloatArray
 
 BUDGET_BYTES = 4_500_000  # of all sessions' data, as text; a page of less than 5 MB still goes by mail
 _TENTHS = 10
@@ -24,7 +25,6 @@ _STEPS_S = tuple(
 _SCRIPT_ENDS = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
 
 Kind = Literal["tracker", "estimator", "display", "reference"]
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from pipeline.report.figures.style import (
     GREY,
     MARKS_MAX,
     PALE,
-    FloatArray,
     arms,
     colour,
     finite,
@@ -32,6 +31,7 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
+from pipeline.statistics.arrays import FloatArray
 
 _LABEL_APART = 10  # points (1/72 inch), as are these: closer marks have one label
 _LABEL_GAP = 4  # beside a label

@@ -19,7 +19,6 @@ from pipeline.report.figures.style import (
     MARKS_MAX,
     PALE,
     WIDTH,
-    FloatArray,
     as_pixels,
     colour,
     finite,
@@ -33,6 +32,7 @@ from pipeline.report.figures.style import (
     styled,
     thinned,
 )
+from pipeline.statistics.arrays import FloatArray
 
 Plane = tuple[str, str]
 XY: Plane = ("x", "y")

@@ -11,8 +11,9 @@ import pandas as pd
 from pipeline.report.figures.accuracy import LINES_MAX, shares
 from pipeline.report.figures.canvas import XY, Plane, Task, ellipse_95, offsets_mm, targets_of, way
 from pipeline.report.figures.sensors import errors_in, peak_s
-from pipeline.report.figures.style import FloatArray, finite, mean_and_interval
+from pipeline.report.figures.style import finite, mean_and_interval
 from pipeline.report.figures.timeline import set_aside, silences
+from pipeline.statistics.arrays import FloatArray
 from pipeline.words import (
     MINUS,
     counted,

@@ -17,9 +17,8 @@ from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import showable
 from pipeline.simulation.what_pays import MOST, Tracker
+from pipeline.statistics.arrays import FloatArray
 from pipeline.words import NOTHING, number
-
-FloatArray = npt.NDArray[np.float64]
 
 _COLOURS = colormaps["cividis"]  # read alike by the colour-blind (Nuñez, Anderton and Renslow 2018)
 _EMPTY, _OWN = "#e3e6e8", "#D55E00"

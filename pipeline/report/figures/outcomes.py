@@ -15,7 +15,6 @@ from pipeline.report.figures.style import (
     COLOURS,
     GREY,
     MARKS_MAX,
-    FloatArray,
     as_pixels,
     colour,
     finite,
@@ -29,6 +28,7 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
+from pipeline.statistics.arrays import FloatArray
 from pipeline.words import MINUS, measure_label, short_label, unit_of
 
 _CLOUD = 0.3  # of the way to the next condition

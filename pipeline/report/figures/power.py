@@ -12,7 +12,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.style import GREY, FloatArray, colour, legend, marker, panels, styled
+from pipeline.report.figures.style import GREY, colour, legend, marker, panels, styled
+from pipeline.statistics.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from pipeline.report.figures.style import (
     COLOURS,
     GREY,
     WIDTH,
-    FloatArray,
     colour,
     finite,
     grouped,
@@ -25,6 +24,7 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
+from pipeline.statistics.arrays import FloatArray
 from pipeline.words import MINUS, seconds
 
 LEAD_RANGE_S = 0.5

@@ -10,15 +10,14 @@ from typing import Any, Literal, ParamSpec
 import matplotlib as mpl
 import matplotlib.ticker
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import showable
+from pipeline.statistics.arrays import FloatArray
 from pipeline.words import MINUS, THIN
 
-FloatArray = npt.NDArray[np.float64]
 Drawn = ParamSpec("Drawn")
 Place = Literal["outside upper left", "outside lower left", "outside right center"]
 

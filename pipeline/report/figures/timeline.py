@@ -10,10 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, FloatArray, legend, name, panels, styled
+from pipeline.report.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, legend, name, panels, styled
+from pipeline.statistics.arrays import FloatArray
+from pipeline.tables.columns import S_PER_NS
 
 _GAP_TIMES = 5  # a silence this many times as long as usual is marked
-_NS = 1e-9
 _ROW = 0.17  # inches
 _SHADES = 20  # told apart
 _PALE = 0.93
@@ -76,7 +77,7 @@ def _shares(stream_rates: pd.DataFrame) -> pd.DataFrame:
     rate = stream_rates["messages"].astype("float64") / stream_rates["duration_s"]
     usual = rate.groupby([stream_rates["session"], stream_rates["stream"]]).transform("median")
     return stream_rates.assign(
-        begin_s=(stream_rates["time_ns"] - first).astype("float64") * _NS,
+        begin_s=(stream_rates["time_ns"] - first).astype("float64") * S_PER_NS,
         share=(rate / usual.where(usual > 0)).clip(0, 1).fillna(0.0),
         usual_s=1 / usual.where(usual > 0),
     )
@@ -119,7 +120,7 @@ def _events(
     """Trials' starts as lines over the session's rows, selections as marks above them."""
     mine = events[events["session"] == session]
     first = stream_rates.loc[stream_rates["session"] == session, "time_ns"].min()
-    time = (mine["time_ns"] - first).astype("float64") * _NS
+    time = (mine["time_ns"] - first).astype("float64") * S_PER_NS
     many: dict[str, Any] = {"rasterized": len(events) > MARKS_MAX}
     starts, chosen = time[mine["type"] == "trial_start"], time[mine["type"] == "selection"]
     axes.vlines(starts, rows[0], rows[1], color=BLACK, linewidth=0.7, zorder=2, **many)

@@ -10,9 +10,8 @@ from pipeline.sessions.estimators import build_estimator
 from pipeline.study.comparison import Comparison
 from pipeline.study.settings import Study
 from pipeline.study.streams import Sensing
+from pipeline.tables.table import Row
 from pipeline.words import adjustment, counted, listing, number, subject, unit_of
-
-Row = Mapping[str, Any]
 
 _TESTS = {
     "rm_anova": "repeated-measures ANOVA (generalized η²)",

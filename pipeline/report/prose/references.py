@@ -7,11 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from pipeline.study.settings import Study
-
-Row = Mapping[str, Any]
+from pipeline.tables.table import Row
 
 PAPER = "feng2017"
 _OF_TEST = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
+from pipeline.tables.table import Row
 from pipeline.words import (
     EFFECTS_OF_CONDITION,
     contrast,
@@ -21,8 +21,6 @@ from pipeline.words import (
     subject,
     unit_of,
 )
-
-Row = Mapping[str, Any]
 
 _BEFORE_INTERVAL = ", 95 % CI "
 _ROUND_OFF = 1e-12  # of the mean: what is left where two means are the same

@@ -7,9 +7,10 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures import captions
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
 from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, number, percent, seconds
 
 _ROWS_MAX = 40

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from pipeline.report.document.model import Strong, Text
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
+from pipeline.tables.table import Row
 from pipeline.words import counted, listing, measure_label
 
 _REST_ON_NORMAL = ("rm_anova", "t_paired", "tost", "bayes_t", "crossover")

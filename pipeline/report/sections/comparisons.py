@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
 from pipeline.statistics.diagnostics import OUTLIER_RULE
+from pipeline.tables.table import Row
 from pipeline.words import (
     NOTHING,
     TESTS,

@@ -17,9 +17,9 @@ from pipeline.report.sections.provenance import libraries
 from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, interval, listing, number, percent, reduction_phrase, short_label
 
-Row = Mapping[str, Any]
 ORIGIN = "Simulated participants; direction and rough size only."
 _ROWS_MAX = 150
 _UNITS = dict(zip(MEASURES, ("mm", "s"), strict=True))

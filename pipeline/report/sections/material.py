@@ -18,9 +18,8 @@ from pipeline.report.figures import captions
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 from pipeline.words import listing
-
-Row = Mapping[str, Any]
 
 _NAME_LENGTH = 60
 

@@ -9,7 +9,8 @@ from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures import captions
 from pipeline.report.figures.canvas import offsets_mm
-from pipeline.report.sections.material import Material, Row, first_of, safe_name
+from pipeline.report.sections.material import Material, first_of, safe_name
+from pipeline.tables.table import Row
 from pipeline.words import (
     TESTS,
     adjustment,

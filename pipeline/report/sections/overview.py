@@ -19,7 +19,8 @@ from pipeline.report.document.model import (
 )
 from pipeline.report.sections import traces
 from pipeline.report.sections.cautions import cautions
-from pipeline.report.sections.material import ORIGINS, Material, Row
+from pipeline.report.sections.material import ORIGINS, Material
+from pipeline.tables.table import Row
 from pipeline.words import (
     EFFECTS_OF_CONDITION,
     MINUS,

@@ -12,8 +12,9 @@ import pandas as pd
 
 from pipeline.report.document import html
 from pipeline.report.document.model import Block, Document, Link, Pages, Paragraph, Section, Table, columns
-from pipeline.report.sections.material import ORIGINS, Material, Row
+from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.report.sections.traces import PAGE as TRACES
+from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, measure_label, number, percent, seconds
 
 FOLDER = "participants"

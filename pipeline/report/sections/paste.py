@@ -10,8 +10,9 @@ from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
 from pipeline.report.prose.sentences import Told, means_sentence, sentence, tells_means, told_of
 from pipeline.report.sections.comparisons import anchor
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import used_versions
+from pipeline.tables.table import Row
 
 BIBLIOGRAPHY = "references.bib"
 """The file beside the report."""

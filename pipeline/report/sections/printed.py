@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED
 from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table, Text, columns
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
+from pipeline.tables.table import Row
 from pipeline.words import counted
 
 _VERDICTS = {AGREEMENT: "Agree", CONTRADICTION: "Contradict", REMARK: "Remarks", UNCHECKED: "Cannot be checked"}

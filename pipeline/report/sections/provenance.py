@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 
-from pipeline.engine.cache import versions
+from pipeline.engine.code_digest import versions
 from pipeline.engine.provenance import LIBRARIES
 from pipeline.report.document.model import Column, Paragraph, Section, Table
 from pipeline.report.sections.material import Material

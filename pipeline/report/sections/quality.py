@@ -11,10 +11,11 @@ from pipeline.report import traffic_lights as session_quality
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures import captions
 from pipeline.report.sections import timeline
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, listing, measure_label, number
 
 _ROWS_MAX = 40  # a page stays readable; tables/quality.csv has them all

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -26,9 +25,9 @@ from pipeline.report.sections.material import ORIGINS
 from pipeline.report.sections.provenance import libraries
 from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
+from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, interval, number, percent, seconds
 
-Row = Mapping[str, Any]
 _ROWS_MAX = 120
 _TITLES = (
     "Estimator",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
 from pipeline.study.simulation import SelectionSimulation, Trait
+from pipeline.tables.table import Row
 from pipeline.words import counted, measure_label, number, percent
 
 _MODELS = {

@@ -13,6 +13,7 @@ from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.sessions import recording
 from pipeline.study.session import Session
 from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
 
 PAGE = "traces.html"
 _KINDS: dict[str, Kind] = {"position": "tracker", "display": "display", "reference": "reference"}
@@ -44,6 +45,6 @@ def _of_session(material: Material, session: Session, ingested: Path, fused: Pat
             found.append(Series(name, kind, recording.shown_axes(study, name), time_s[order], samples.value[order]))
     columns = [f"{axis}_mm" for axis in study.axes]
     for estimator, rows in tables.read("tracks", fused).groupby("estimator", sort=False):
-        time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * tables.NANOSECONDS
+        time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
         found.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
     return Traces(session.id, session.participant, session.condition, tuple(found))

@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from pipeline.report.document.model import Block, Paragraph, Strong, Table, columns
-from pipeline.report.sections.material import Material, Row
+from pipeline.report.sections.material import Material
+from pipeline.tables.table import Row
 from pipeline.words import (
     NOTHING,
     TESTS,

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from pipeline.statistics.arrays import FloatArray
+
 IntArray = npt.NDArray[np.int64]
 
 Content = Literal["position", "acceleration", "events", "anything"]

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.sessions.logs.log import FloatArray, IntArray
+from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.logs.mcap.container import BROKEN
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.statistics.arrays import FloatArray
 
 WIDTHS: Mapping[str, int] = {"position": 3, "acceleration": 11}
 """How many figures are kept: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""

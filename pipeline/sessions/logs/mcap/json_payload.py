@@ -18,7 +18,7 @@ import numpy as np
 import orjson
 from mcap.records import Channel, Schema
 
-from pipeline.sessions.logs.log import FloatArray, IntArray
+from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.logs.mcap.fields import (
     COVARIANCE,
     FORCE,
@@ -39,6 +39,7 @@ from pipeline.sessions.logs.mcap.fields import (
     holds_stamps,
 )
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.statistics.arrays import FloatArray
 
 _BLOCK = 256  # messages: few enough that one unusual message does not cost much, and that objects do not pile up
 _UNUSUAL = (ValueError, TypeError, LookupError, OverflowError)

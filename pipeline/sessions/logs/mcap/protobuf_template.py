@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
-from pipeline.sessions.logs.log import FloatArray, IntArray
+from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.logs.mcap.cdr import Bytes
 from pipeline.sessions.logs.mcap.fields import Fields, Path, Reading, holds_stamps
+from pipeline.statistics.arrays import FloatArray
 
 _VARINT, _FIXED64, _LENGTH, _FIXED32 = 0, 1, 2, 5
 _DEPTH_LIMIT = 8

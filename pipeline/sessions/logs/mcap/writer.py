@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.sessions.logs.log import Content, FloatArray
+from pipeline.sessions.logs.log import Content
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
+from pipeline.statistics.arrays import FloatArray
 
 _HEADER = """std_msgs/Header header
 {body}

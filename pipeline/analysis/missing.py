@@ -1,0 +1,154 @@
+"""What is not in the values, and why: decided, incomplete, not finite, or not there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.analysis.values import CELL, _path
+from pipeline.engine.stage import Work
+from pipeline.errors import PipelineError, did_you_mean
+from pipeline.study import csv_tables as study_tables
+from pipeline.study.settings import Exclusion, Study
+from pipeline.tables.table import Row
+
+
+def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
+    """Which rows a decision to exclude takes out."""
+    hit = pd.Series(True, index=rows.index)
+    for column in ("participant", "condition", "session", "measure"):
+        wanted = getattr(excluded, column)
+        if wanted is not None and column in rows:
+            hit &= (rows[column] == wanted).fillna(False)
+    return hit.astype(bool)
+
+
+def _known(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
+    """Every combination of ids that an exclusion may name: what is in the data, totals, and sessions set aside."""
+    told = [session.ids for session in (*work.sessions, *(aside for aside, _ in work.set_aside))]
+    columns = [*CELL, "session", "measure"]
+    totals = values[values["measure"].str.contains("/")].copy()
+    totals["measure"] = totals["measure"].str.partition("/")[0] + "/total" if len(totals) else totals["measure"]
+    sessions = pd.DataFrame(told, columns=columns).astype("object")
+    return pd.concat(
+        [
+            values[columns].astype("object"),
+            totals[columns].astype("object"),
+            sessions,
+            trials.reindex(columns=columns).astype("object"),
+        ]
+    )
+
+
+def _check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
+    """An exclusion that fits nothing in the data is an error, for it is likely misspelt."""
+    for column in ("participant", "session", "measure"):
+        wanted, there = getattr(excluded, column), sorted(set(known[column].dropna()))
+        if wanted is not None and wanted not in there:
+            hint = did_you_mean(wanted, there)
+            raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
+    if not _matches(excluded, known).any():
+        named = ", ".join(f"{key} {value}" for key, value in excluded.model_dump().items() if value and key != "reason")
+        raise PipelineError(f"study.yaml: exclusions: nothing in the data fits {named}; there is nothing to exclude")
+
+
+def _incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
+    """Trials without a measurable selection, a duration or a path of the hand, counted by session or cell."""
+    recorded = trials[trials["estimator"] == "recorded"]
+    timed = moved[moved["duration_s"].notna()]
+    rows = []
+    cell: Any
+    for measure, column, what, all_trials in (
+        ("selection_mse_mm2", "squared_error_mm2", "trials without a measurable selection", recorded),
+        ("trial_time_s", "duration_s", "trials without a duration", recorded),
+        ("path_efficiency", "path_length_mm", "trials without a path of the hand", timed),
+    ):
+        missing = all_trials[all_trials[column].isna()]
+        if len(missing) == len(all_trials):
+            continue  # a study that does not measure this at all
+        for cell, found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
+            participant, condition, session = cell
+            named = ", ".join(str(trial) for trial in found["trial"][:10]) + (", …" if len(found) > 10 else "")
+            rows.append(
+                {
+                    "participant": participant,
+                    "condition": condition,
+                    "session": None if pd.isna(session) else session,
+                    "measure": measure,
+                    "what": what,
+                    "reason": f"{len(found)} of the cell's trials: {named}",
+                }
+            )
+    return rows
+
+
+def _finite(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
+    """Values that are numbers; the others are listed."""
+    bad = values[~np.isfinite(values["value"])]
+    for row in bad.itertuples():
+        what = "missing value" if pd.isna(row.value) else "infinite value"
+        at = f" ({row.factors})" if isinstance(row.factors, str) else ""
+        exclusions.append(
+            {
+                "participant": row.participant,
+                "condition": row.condition,
+                "measure": row.measure,
+                "what": what,
+                "reason": f"the cell is empty or not a finite number{at}",
+            }
+        )
+    kept: pd.DataFrame = values.drop(index=bad.index)
+    return kept
+
+
+def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
+    """Participants without a condition, and cells without a measure that others have."""
+    listed = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
+    rows: list[Row] = []
+    path = _path(work, "participants")
+    if path is not None:
+        named = study_tables.read_participants(path)["participant"]
+        for participant in sorted(listed - set(named)):
+            hint = did_you_mean(participant, sorted(named)) if len(named) else ""
+            reason = f"kept; check its spelling{hint}"
+            rows.append({"participant": participant, "what": "not in participants", "reason": reason})
+        listed |= set(named)
+    seen = set(zip(measures["participant"], measures["condition"], strict=True))
+    seen |= {(session.participant, session.condition) for session in work.sessions}
+    for participant in sorted(listed):
+        for condition in work.study.conditions:
+            if (participant, condition) not in seen and not _decided(work.study, participant, condition, None):
+                cell = {"participant": participant, "condition": condition}
+                rows.append({**cell, "what": "no data", "reason": "the participant has nothing in this condition"})
+    return rows + _missing_cells(work.study, measures, seen)
+
+
+def _decided(study: Study, participant: str, condition: str, measure: str | None) -> bool:
+    """Is the cell empty because study.yaml excludes it?"""
+    return any(
+        excluded.session is None and excluded.covers(participant=participant, condition=condition, measure=measure)
+        for excluded in study.exclusions
+    )
+
+
+def _missing_cells(study: Study, measures: pd.DataFrame, seen: set[Any]) -> list[Row]:
+    """Cells, and cells of a further factor, that others have."""
+    rows = []
+    for measure, values in measures.groupby("measure", sort=True):
+        every = sorted({factors for factors in values["factors"] if isinstance(factors, str)})
+        have: dict[Any, set[str]] = {}
+        for row in values.itertuples():
+            have.setdefault((row.participant, row.condition), set()).add(str(row.factors))
+        for participant, condition in sorted(seen):
+            if _decided(study, participant, condition, str(measure)):
+                continue
+            lacking = [factors for factors in every if factors not in have.get((participant, condition), set())]
+            if (participant, condition) in have and not lacking:
+                continue
+            whole = (participant, condition) not in have
+            at = "" if whole else f" ({'; '.join(lacking)})"
+            cell = {"participant": participant, "condition": condition, "measure": measure}
+            rows.append({**cell, "what": "missing cell", "reason": f"others have this measure{at}"})
+    return rows

@@ -1,0 +1,182 @@
+"""The values of every dependent variable, a row each: from logs, and from the study's own tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.engine.stage import Work
+from pipeline.errors import PipelineError
+from pipeline.sessions import movements
+from pipeline.sessions.trials import selections_by_trial, with_movements
+from pipeline.study import csv_tables as study_tables
+from pipeline.study.settings import Study
+from pipeline.tables import table as tables
+from pipeline.tables.columns import S_PER_NS
+from pipeline.tables.table import Row
+
+CELL = ["participant", "condition"]
+
+
+def _path(work: Work, field: str) -> Any:
+    name = getattr(work.study, field)
+    return None if name is None else work.folder / name
+
+
+def _trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown; selections."""
+    trials = tables.read("trials", work.entries["assess"])
+    path = _path(work, "trials")
+    if path is None:
+        return trials, tables.read("selections", work.entries["assess"])
+    if len(trials):
+        raise PipelineError(
+            f"{path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:` out of "
+            "study.yaml"
+        )
+    table = study_tables.read_trials(path, work.study.conditions)
+    squared = np.zeros(len(table))
+    for axis in "xyz":
+        # A trial counts over the axes its target has; a selection that lacks one of them cannot be measured.
+        aimed = table[f"target_{axis}_mm"].notna() if axis == "z" else pd.Series(True, index=table.index)
+        apart = (table[f"selected_{axis}_mm"] - table[f"target_{axis}_mm"]) ** 2
+        squared = squared + apart.where(aimed, 0.0).to_numpy()
+    duration_s = table["selection_s"] - table["start_s"]
+    tabled = table[[*CELL, "trial"]].assign(
+        session=table["session"].replace("", None),
+        estimator="recorded",
+        squared_error_mm2=squared,
+        position_error_mm=np.sqrt(squared),
+        duration_s=duration_s.where(duration_s >= 0),
+    )
+    targets = table[["trial", *CELL, *(f"target_{axis}_mm" for axis in "xyz")]]
+    selected = targets.assign(
+        session=tabled["session"], **{f"{axis}_mm": table[f"selected_{axis}_mm"] for axis in "xyz"}
+    )
+    return tables.as_table("trials", tabled), tables.as_table("selections", selected)
+
+
+def _movements(work: Work) -> pd.DataFrame:
+    """The movements of all sessions, or of trials.csv in the order of their starts, and whose they are."""
+    people = pd.DataFrame([session.ids for session in work.sessions], columns=[*CELL, "session"])
+    logged = tables.read("movements", work.entries["assess"]).merge(people.astype("string"), on="session")
+    path = _path(work, "trials")
+    if path is None:
+        return logged
+    table = study_tables.read_trials(path, work.study.conditions).sort_values("start_s", kind="stable")
+    table["left_s"] = table["selection_s"]
+    for axis in "xyz":
+        table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
+    cells = [with_movements(rows) for _, rows in table.groupby([*CELL, "session"], sort=True)]
+    told = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
+    return pd.concat([tables.as_table("movements", told), told[CELL].astype("string")], axis=1)
+
+
+def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
+    """Rows of one measure: participant, condition, session, factors, period, measure, value, and where it stands."""
+    return pd.DataFrame(
+        {
+            "participant": rows["participant"],
+            "condition": rows["condition"],
+            "session": rows["session"],
+            "factors": None,
+            "period": pd.NA,
+            "measure": measure,
+            "value": rows[column].astype("float64"),
+            "source": source,
+        }
+    ).astype({"factors": "object", "period": "Int64"})
+
+
+def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
+    """Squared selection errors and durations, a row a trial; a cell's mean is its measure."""
+    recorded = trials[trials["estimator"] == "recorded"]
+    selected = recorded[recorded["squared_error_mm2"].notna()]
+    timed = recorded[recorded["duration_s"].notna()]
+    parts = [
+        _values(selected, "selection_mse_mm2", "squared_error_mm2", "the trials"),
+        _values(timed, "trial_time_s", "duration_s", "the trials"),
+    ]
+    if study.display is not None and study.display.unit == "px":
+        in_px = parts[0].assign(measure="selection_mse_px2")
+        parts.append(in_px.assign(value=in_px["value"] * study.display.px_per_mm**2))
+    return pd.concat(parts)
+
+
+def _movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """Throughput, a row a sequence of a session, and what the hand's path says, a row a trial."""
+    rows = [
+        (*cell, throughput)
+        for cell, trials in moved.groupby([*CELL, "session"], dropna=False, sort=True)
+        for throughput in movements.throughputs(
+            *(trials[name].to_numpy(np.float64) for name in ("amplitude_mm", "moved_mm", "along_mm", "duration_s"))
+        )
+    ]
+    sequences = pd.DataFrame(rows, columns=[*CELL, "session", "throughput"])
+    yield _values(sequences, "throughput_bits_s", "throughput", "the trials")
+    covered = moved["path_length_mm"].where(moved["path_length_mm"] > 0)
+    for_measures = moved.assign(efficiency=moved["shortest_mm"] / covered)
+    for measure, column in (
+        ("path_efficiency", "efficiency"),
+        ("overshoot_mm", "overshoot_mm"),
+        ("corrections", "corrections"),
+    ):
+        yield _values(for_measures[for_measures[column].notna()], measure, column, "the trials")
+
+
+def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
+    """From session_start to the last selection, a row a session that has both; what does not fit is listed."""
+    rows = []
+    for session, folder in sorted(zip(work.sessions, work.entries["ingest"], strict=True), key=lambda one: one[0].id):
+        happened = tables.read_arrow("events", folder).to_pylist()
+        who: Row = session.ids
+        begins, selections = (
+            [event["time_ns"] for event in happened if event["type"] == kind] for kind in ("session_start", "selection")
+        )
+        stray = sum(place < 0 for _, place in selections_by_trial(happened)[1])
+        if stray:
+            reason = f"{stray} without the trial_start of their trial"
+            exclusions.append({**who, "what": "selections outside any trial", "reason": reason})
+        if begins and selections:
+            seconds = float(max(selections) - min(begins)) * S_PER_NS
+            if seconds < 0:
+                reason = "the last selection comes before session_start"
+                exclusions.append({**who, "measure": "completion_time_s", "what": "impossible time", "reason": reason})
+            else:
+                rows.append((session.participant, session.condition, session.id, seconds))
+    found = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
+    return _values(found, "completion_time_s", "seconds", "the events")
+
+
+def _rated_values(work: Work) -> Iterator[pd.DataFrame]:
+    """Ratings from questionnaires."""
+    path = _path(work, "questionnaires")
+    if path is not None:
+        ratings = study_tables.read_questionnaires(path, work.study.conditions)
+        ratings["session"] = ratings.get("session")
+        names = ratings["questionnaire"] + "/" + ratings["scale"]
+        yield _values(ratings, "", "rating", str(work.study.questionnaires)).assign(measure=names)
+
+
+def _measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
+    """The table of measures and its further factors, if the study has one."""
+    path = _path(work, "measures")
+    return None if path is None else study_tables.read_measures(path, work.study.conditions)
+
+
+def _tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:
+    """Further dependent variables from the study's table of measures."""
+    if tabled is None:
+        return
+    table, factors = tabled
+    rows = _values(table.assign(session=None), "", "value", str(work.study.measures)).assign(measure=table["measure"])
+    if "period" in table:
+        rows["period"] = table["period"]
+    if factors:
+        told = [{k: v for k, v in zip(factors, row, strict=True) if v} for row in table[factors].to_numpy()]
+        rows["factors"] = [json.dumps(facts) if facts else None for facts in told]
+    yield rows
