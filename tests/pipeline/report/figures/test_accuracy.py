@@ -14,7 +14,7 @@ from pipeline.report import figures
 from pipeline.report.figures import captions
 from pipeline.report.figures.accuracy import nine_of_ten, shares
 from pipeline.tables import table as tables
-from tests.pipeline.figures.drawn import pictures, saved, texts
+from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
 
 def accuracy(**estimators: tuple[list[float], list[float]]) -> pd.DataFrame:

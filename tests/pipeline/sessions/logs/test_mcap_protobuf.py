@@ -24,7 +24,7 @@ from pipeline.sessions.logs.log import Content, Readings, Wanted
 from pipeline.sessions.logs.mcap import protobuf
 from pipeline.sessions.logs.mcap.protobuf_template import Declined, Template
 from tests.pipeline.protobuf_types import FOXGLOVE, ROS, changed, message_class, schema_of
-from tests.pipeline.test_mcap_fast import assert_same, figures
+from tests.pipeline.sessions.logs.test_mcap_fast import assert_same, figures
 
 POINT = message_class("foxglove.Point3InFrame", FOXGLOVE)
 POSE = message_class("foxglove.PoseInFrame", FOXGLOVE)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.commands.console import PlainLines
-from pipeline.engine import cache as cache_module
+from pipeline.engine import code_digest as code_digest_module
 from pipeline.engine.cache import Cache
 from pipeline.engine.code_digest import code_digest
 from pipeline.engine.processes import InThisProcess
@@ -104,8 +104,8 @@ def test_a_new_session_computes_that_session(study: Path, update: Callable[[], R
 def test_edited_code_invalidates_what_it_touches(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A stage's digest follows every module of ours it reaches, also those named as text, and the libraries."""
     for package in ("pipeline", "fusion_core"):
-        shutil.copytree(Path(cache_module.__file__).parents[1] / package, tmp_path / package)
-    monkeypatch.setattr(cache_module, "_ROOT", tmp_path)
+        shutil.copytree(Path(code_digest_module.__file__).parents[2] / package, tmp_path / package)
+    monkeypatch.setattr(code_digest_module, "_ROOT", tmp_path)
 
     def digests() -> dict[str, str]:
         code_digest.cache_clear()

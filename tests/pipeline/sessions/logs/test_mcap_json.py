@@ -16,7 +16,7 @@ from mcap.writer import Writer
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Content, Readings, Wanted
 from pipeline.sessions.logs.mcap import json_payload
-from tests.pipeline.test_mcap_fast import assert_same
+from tests.pipeline.sessions.logs.test_mcap_fast import assert_same
 
 CONTENTS: tuple[Content, ...] = ("position", "acceleration")
 Row = tuple[int, int, list[float]]

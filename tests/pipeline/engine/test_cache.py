@@ -30,7 +30,7 @@ SETTINGS = (
 SESSIONS = ("P1_a", "P1_b")
 # Forked from one process that has imported everything, so that a run costs what it computes.
 APART = multiprocessing.get_context("forkserver")
-APART.set_forkserver_preload(["tests.pipeline.test_cache", "pipeline.commands.run", "pipeline.analysis.compare"])
+APART.set_forkserver_preload(["tests.pipeline.engine.test_cache", "pipeline.commands.run", "pipeline.analysis.compare"])
 
 
 @pytest.fixture(scope="module")

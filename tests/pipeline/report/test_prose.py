@@ -24,7 +24,7 @@ from pipeline.tables import table as tables
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.hostile import HOSTILE
 from tests.pipeline.reference import TASKS, compared, expected, study_of, the
-from tests.pipeline.test_report import checked
+from tests.pipeline.report.test_report import checked
 
 Folder = Callable[..., Path]
 Row = dict[str, Any]

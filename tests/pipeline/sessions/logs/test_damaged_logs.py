@@ -22,7 +22,7 @@ from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log
 from pipeline.sessions.logs.mcap import MAGIC
 from tests.conftest import session_messages, write_session
-from tests.pipeline.test_mcap import WANTED, chunk_spans, counts, faulty
+from tests.pipeline.sessions.logs.test_mcap import WANTED, chunk_spans, counts, faulty
 
 Rows = dict[str, set[tuple[int, int, str, str]]]
 
@@ -307,7 +307,7 @@ import sys
 from pathlib import Path
 from pipeline.errors import SessionError
 from pipeline.sessions.logs import read_log
-from tests.pipeline.test_mcap import WANTED
+from tests.pipeline.sessions.logs.test_mcap import WANTED
 
 def peak_mb():
     status = Path("/proc/self/status").read_text()

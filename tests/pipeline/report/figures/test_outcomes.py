@@ -13,7 +13,7 @@ from scipy import stats
 from pipeline.report import figures
 from pipeline.report.figures import captions
 from pipeline.tables import table as tables
-from tests.pipeline.figures.drawn import pictures, saved, texts
+from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
 TIMES = pd.DataFrame(
     {"kinect": [44.0, 51.5, 38.2, 60.1, 29.9], "fusion": [31.0, 40.5, 39.2, 41.1, 22.4]},

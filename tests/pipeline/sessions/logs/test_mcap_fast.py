@@ -22,7 +22,7 @@ from pipeline.sessions.logs.mcap import cdr, ros2
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 from pipeline.sessions.logs.mcap.writer import _IMU, _POINT_STAMPED
 from tests.conftest import CLONE, write_session
-from tests.pipeline.test_mcap import faulty
+from tests.pipeline.sessions.logs.test_mcap import faulty
 
 TEXTS = {"position": _POINT_STAMPED, "acceleration": _IMU}
 CONTENTS: dict[str, Content] = {"geometry_msgs/msg/PointStamped": "position", "sensor_msgs/msg/Imu": "acceleration"}

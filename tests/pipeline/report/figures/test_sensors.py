@@ -12,7 +12,7 @@ from pipeline.report import figures
 from pipeline.report.figures import captions
 from pipeline.report.figures.sensors import errors_in
 from pipeline.tables import table as tables
-from tests.pipeline.figures.drawn import saved, texts
+from tests.pipeline.report.figures.drawn import saved, texts
 
 
 def signal(kind: str, name: str, time: np.ndarray, value: np.ndarray, sd: float | None = None) -> pd.DataFrame:

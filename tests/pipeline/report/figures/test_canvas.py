@@ -15,7 +15,7 @@ from pipeline.report import figures
 from pipeline.report.figures import captions
 from pipeline.report.figures.canvas import ellipse_95, offsets_mm, targets_of, way
 from pipeline.tables import table as tables
-from tests.pipeline.figures.drawn import pictures, saved, texts
+from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
 
 def task(**changed: Any) -> Any:

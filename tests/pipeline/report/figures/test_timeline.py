@@ -10,7 +10,7 @@ from pipeline.report import figures
 from pipeline.report.figures import captions
 from pipeline.report.figures.timeline import silences
 from pipeline.tables import table as tables
-from tests.pipeline.figures.drawn import pictures, saved, texts
+from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
 SECOND = 1_000_000_000
 
