@@ -6,34 +6,15 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from pipeline.study.measures import MEASURES, measure
+from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
+
 Row = Mapping[str, Any]
 
 MINUS = "\u2212"
 THIN = "\u2009"
 NOTHING = "–"
 
-_LABELS = {
-    "selection_mse_px2": "Selection error, MSE (px²)",
-    "selection_mse_mm2": "Selection error, MSE (mm²)",
-    "selection_rmse_px": "Selection error, RMSE (px)",
-    "selection_rmse_mm": "Selection error, RMSE (mm)",
-    "completion_time_s": "Completion time (s)",
-    "trial_time_s": "Time per trial (s)",
-    "throughput_bits_s": "Throughput (bit/s)",
-    "corrections": "Corrections per trial",
-}
-_UNITS = {
-    "_px2": " (px²)",
-    "_mm2": " (mm²)",
-    "_mm_s2": " (mm/s²)",
-    "_mm_s": " (mm/s)",
-    "_px": " (px)",
-    "_mm": " (mm)",
-    "_ms": " (ms)",
-    "_s": " (s)",
-    "_percent": " (%)",
-}
-_QUESTIONNAIRES = {"nasa_tlx": "NASA-TLX", "sus": "SUS", "ueq": "UEQ"}
 _EFFECT_SIZES = {
     "generalized eta squared": "η²G",
     "partial eta squared": "η²p",
@@ -42,74 +23,35 @@ _EFFECT_SIZES = {
     "Kendall's W": "W",
 }
 _NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W")  # printed without a leading zero, as APA has it
-_SCALES = {
-    "nasa_tlx": ("mental", "physical", "temporal", "performance", "effort", "frustration"),
-}
-TESTS = {
-    "rm_anova": "rm ANOVA",
-    "t_paired": "paired t",
-    "wilcoxon": "Wilcoxon",
-    "friedman": "Friedman",
-    "art_anova": "ART ANOVA",
-    "mixed_model": "mixed model",
-    "crossover": "crossover",
-    "tost": "equivalence (TOST)",
-    "bayes_t": "Bayes factor",
-}
 EFFECTS_OF_CONDITION = ("condition", "treatment")
 """What a test calls the effect of the conditions."""
-_KNOWN_BY_STATISTIC = ("rm_anova", "t_paired", "wilcoxon", "friedman")
 _SEVERAL = "the differences between conditions are"
 _STATISTICS = {"chi2": "χ²", "BF10": "BF₁₀", "W+": "W₊"}
 
 
-def measure_label(measure: str) -> str:
+def measure_label(name: str) -> str:
     """A measure's name for people, with its unit."""
-    if measure in _LABELS:
-        return _LABELS[measure]
-    questionnaire, slash, scale = measure.partition("/")
-    if slash:
-        return f"{_QUESTIONNAIRES.get(questionnaire, _spaced(questionnaire))}: {_spaced(scale).lower()}"
-    for suffix, unit in _UNITS.items():
-        if measure.endswith(suffix):
-            return _spaced(measure.removesuffix(suffix)) + unit
-    return _spaced(measure)
+    return measure(name).full_label
 
 
-def measure_order(measure: str) -> tuple[str, int, str]:
-    """What to sort measures by: a questionnaire's scales stand in their own order, its total last."""
-    questionnaire, _, scale = measure.partition("/")
-    scales = _SCALES.get(questionnaire, ())
-    if scale == "total":
-        return questionnaire, 1000, scale
-    return questionnaire, scales.index(scale) if scale in scales else len(scales), scale
-
-
-def short_label(measure: str) -> str:
+def short_label(name: str) -> str:
     """A measure's name without its unit or its questionnaire."""
-    label = measure_label(measure)
-    return label.partition(": ")[2].capitalize() if "/" in measure else label.partition(" (")[0]
+    label = measure(name).label
+    return label.partition(": ")[2].capitalize() if measure(name).questionnaire else label
 
 
-def subject(measure: str) -> str:
+def subject(name: str) -> str:
     """A measure as the subject of a sentence: without its unit, a scale behind its questionnaire."""
-    unit = unit_of(measure)
-    label = measure_label(measure).removesuffix(f" ({unit})")
-    if measure in _LABELS:
-        name, comma, kind = label.partition(", ")
-        return f"{name} ({kind})" if comma else label
-    return label.replace(": ", " ", 1) if "/" in measure else label
+    label = measure(name).label
+    if measure(name).questionnaire:
+        return label.replace(": ", " ", 1)
+    head, comma, kind = label.partition(", ")
+    return f"{head} ({kind})" if comma and name in MEASURES else label
 
 
-def unit_of(measure: str) -> str:
-    """The unit in a measure's label, or nothing."""
-    label = measure_label(measure)
-    return label[label.rindex("(") + 1 : -1] if label.endswith(")") else ""
-
-
-def _spaced(name: str) -> str:
-    words = name.replace("_", " ").strip()
-    return words[:1].upper() + words[1:]
+def unit_of(name: str) -> str:
+    """A measure's unit, or nothing."""
+    return measure(name).unit
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -282,14 +224,19 @@ def decisive_p(row: Row) -> float | None:
     return details.get("p_gg") if details.get("p_gg") is not None else row["p"]
 
 
+def test_label(row: Row) -> str:
+    """A row's test as tables name it: `paired t`."""
+    return TESTS[row["test"]].label
+
+
 def comparison_sentence(row: Row, with_reduction: bool = True) -> str:
     """One row in APA's manner, without the measure's name."""
     head = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f"{contrast(row)}, "
     if row["status"] != "ok":
-        return f"{head}{TESTS[row['test']]}: {row['status']} (n = {row['n']})"
-    named = "" if row["test"] in _KNOWN_BY_STATISTIC else f"{TESTS[row['test']]}: "
-    if row["test"] == "bayes_t":
-        named = f"{TESTS['bayes_t']} (JZS, prior scale {row['details']['prior_scale']:g}): "
+        return f"{head}{test_label(row)}: {row['status']} (n = {row['n']})"
+    named = "" if TESTS[row["test"]].symbol_tells else f"{test_label(row)}: "
+    if TESTS[row["test"]].question == "evidence":
+        named = f"{test_label(row)} (JZS, prior scale {row['details']['prior_scale']:g}): "
     parts = [f"{named}{head}{evidence(row)}", f"n = {row['n']}"]
     if (row["details"] or {}).get("singular"):
         parts.append("singular fit: no variance between participants is found")
@@ -314,20 +261,20 @@ def evidence(row: Row, digits: int = 4, before_interval: str = " ") -> str:
 
 def adjustment(method: str) -> str:
     """A way of adjusting p values by its authors' names."""
-    return {"benjamini_hochberg": "Benjamini-Hochberg"}.get(method, method.capitalize())
+    return ADJUSTMENTS[method].label
 
 
 def verdict(row: Row, alpha: float) -> str:
     """What a row says at a level of significance."""
     level = f"at the {100 * alpha:g} % level"
     p = decisive_p(row)
-    if row["test"] == "bayes_t" and row["statistic"] is not None:
+    if TESTS[row["test"]].question == "evidence" and row["statistic"] is not None:
         times = row["statistic"] if row["statistic"] >= 1 else 1 / row["statistic"]
         likelier, other = ("a difference", "none") if row["statistic"] >= 1 else ("no difference", "one")
         return f"the data are {number(times)} times as likely under {likelier} as under {other}"
     if p is None:
         return "no test is defined"
-    if row["test"] == "tost":
+    if TESTS[row["test"]].question == "equivalence":
         return f"the conditions are {'' if p < alpha else 'not shown to be '}equivalent within the bounds {level}"
     named = "the difference is" if row["contrast"] is not None or row["reduction"] is not None else _SEVERAL
     return f"{named} {'' if p < alpha else 'not '}statistically significant {level}"

@@ -18,13 +18,13 @@ from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator
 from pipeline.statistics.descriptive import described
 from pipeline.study import csv_tables as study_tables
+from pipeline.study.measures import measure_order
 from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.columns import TABLES
 from pipeline.tables.table import Row
-from pipeline.words import measure_order
 
 _SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones", "calibration")
 

@@ -28,9 +28,9 @@ from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import Result
+from pipeline.study.measures import measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
-from pipeline.words import measure_order
 
 Answer = tuple[list[Row], list[Row]]
 """Rows of `comparisons`, and the exclusions that came of incomplete participants."""
@@ -45,7 +45,7 @@ def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -
     for asked in everything_asked(study, measures, observations):
         found: list[Row] = []
         for one in asked:
-            answer, incomplete = _TESTS[one.entry.test](one)
+            answer, incomplete = RUN[one.entry.test](one)
             found += answer
             left_out += incomplete
         _adjust(found)
@@ -137,7 +137,7 @@ def _crossover(asked: Asked) -> Answer:
     return [_row(asked, result) for result in results], found.left_out
 
 
-_TESTS: Mapping[str, Callable[[Asked], Answer]] = {
+RUN: Mapping[str, Callable[[Asked], Answer]] = {
     "rm_anova": _anova,
     "art_anova": _art,
     "friedman": _friedman,
@@ -148,7 +148,7 @@ _TESTS: Mapping[str, Callable[[Asked], Answer]] = {
     "mixed_model": _mixed,
     "crossover": _crossover,
 }
-"""Every test by its name in study.yaml."""
+"""What computes each test of study.yaml."""
 
 
 def _row(asked: Asked, result: Result) -> Row:

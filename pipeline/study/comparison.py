@@ -4,31 +4,38 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from pipeline.study.fields import Finite, Frozen, Id
+from pipeline.study.fields import Finite, Frozen, Id, known
+from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS, tests_that_take
 
-Adjustment = Literal["holm", "bonferroni", "benjamini_hochberg"]
+
+def _known_test(name: str) -> str:
+    known("test", name, TESTS)
+    return name
+
+
+def _known_adjustment(name: str) -> str:
+    known("adjustment", name, ("none", *ADJUSTMENTS))
+    return name
+
+
+TestName = Annotated[str, AfterValidator(_known_test)]
+AdjustmentName = Annotated[str, AfterValidator(_known_adjustment)]
+
+
+_PERIOD_AS_FACTOR = "factor(period)"
+_OPTIONS = {option for test in TESTS.values() for option in test.options}
 
 
 class Comparison(Frozen):
     """What to test. A key that the test has no use for is an error, for something else was meant."""
 
     measure: Id
-    test: Literal[
-        "rm_anova",
-        "t_paired",
-        "wilcoxon",
-        "friedman",
-        "art_anova",
-        "mixed_model",
-        "crossover",
-        "tost",
-        "bayes_t",
-    ]
+    test: TestName
     within: tuple[Id, ...] = ("condition",)
-    adjust: Literal["none"] | Adjustment = "none"
-    follow_up: Literal["none"] | Adjustment = "holm"
+    adjust: AdjustmentName = "none"
+    follow_up: AdjustmentName = "holm"
     zeros: Literal["dropped", "pratt"] = "dropped"
     bounds: tuple[Finite, Finite] | None = None
     prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
@@ -36,9 +43,9 @@ class Comparison(Frozen):
 
     @model_validator(mode="after")
     def _fits_the_test(self) -> Comparison:
-        for key, tests in _ONLY_FOR.items():
-            if getattr(self, key) != type(self).model_fields[key].default and self.test not in tests:
-                raise ValueError(f"{self.test} does not take {key}; it is for {' and '.join(tests)}")
+        for key in _OPTIONS - set(TESTS[self.test].options):
+            if getattr(self, key) != type(self).model_fields[key].default:
+                raise ValueError(f"{self.test} does not take {key}; it is for {' and '.join(tests_that_take(key))}")
         if self.test == "tost" and self.bounds is None:
             raise ValueError("tost needs bounds, in the unit of the measure, such as bounds: [-5, 5]")
         if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
@@ -66,16 +73,3 @@ class Comparison(Frozen):
     def period_is_slope(self) -> bool:
         """Is the period a number, each counting as much more as the last one?"""
         return _PERIOD_AS_FACTOR not in self.fixed
-
-
-_PERIOD_AS_FACTOR = "factor(period)"
-
-
-_ONLY_FOR = {
-    "within": ("rm_anova", "art_anova"),
-    "follow_up": ("rm_anova", "mixed_model"),
-    "zeros": ("wilcoxon",),
-    "bounds": ("tost",),
-    "prior_scale": ("bayes_t",),
-    "fixed": ("mixed_model",),
-}

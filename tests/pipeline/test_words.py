@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from pipeline.study.measures import measure_order
 from pipeline.words import (
     effect_size,
     interval,
     measure_label,
-    measure_order,
     number,
     p_phrase,
     percent,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pipeline.study.printed import Measure, PrintedTest, Symbol
 from pipeline.study.rounded import Rounded
-from pipeline.words import TESTS
+from pipeline.study.statistical_tests import TESTS
 
 
 def label(measure: Measure, test: PrintedTest) -> str:
     """A test by its measure, and what tells it from the measure's others."""
-    name = TESTS.get(test.test or "", (test.test or "").replace("_", " "))
+    known = TESTS.get(test.test or "")
+    name = known.label if known else (test.test or "").replace("_", " ")
     named = ", ".join(part for part in (test.contrast, test.effect, name) if part)
     return f"{measure.name}: {named}" if named else measure.name
 

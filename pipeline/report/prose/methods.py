@@ -9,23 +9,11 @@ from typing import Any
 from pipeline.sessions.estimators import build_estimator
 from pipeline.study.comparison import Comparison
 from pipeline.study.settings import Study
+from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
 from pipeline.words import adjustment, counted, listing, number, subject, unit_of
 
-_TESTS = {
-    "rm_anova": "repeated-measures ANOVA (generalized η²)",
-    "t_paired": "paired t tests (two-sided; d_z with its noncentral-t interval)",
-    "wilcoxon": "Wilcoxon signed-rank tests (two-sided; rank-biserial correlation)",
-    "friedman": "Friedman's test (Kendall's W)",
-    "art_anova": "ANOVA on aligned ranks (ART; partial η²)",
-    "mixed_model": (
-        "linear mixed models with a random intercept for each participant (REML, Satterthwaite's degrees of freedom)"
-    ),
-    "crossover": "the analysis of a 2 × 2 crossover (treatment, period, carry-over)",
-    "tost": "two one-sided paired t tests of equivalence (TOST)",
-    "bayes_t": "JZS Bayes factors of the paired difference",
-}
 _ORIGINS = {
     "simulated": "The data were simulated by a model, not measured with people.",
     "reconstructed": "The data were reconstructed to fit printed figures; they are not anybody's measurements.",
@@ -140,16 +128,17 @@ def _level(alpha: float) -> str:
 
 def _asked(entry: Comparison, rows: Sequence[Row]) -> str:
     """`Wilcoxon signed-rank tests (…), exact, midranks, zeros dropped, p Holm-adjusted`; rows are of its test."""
-    parts = [_TESTS[entry.test]]
-    if entry.test in ("rm_anova", "art_anova") and len(entry.within) > 1:
+    options = TESTS[entry.test].options
+    parts = [TESTS[entry.test].methods_text]
+    if len(entry.within) > 1:
         parts.append(f"of the factors {listing(list(entry.within))}")
-    if entry.test == "mixed_model":
+    if "fixed" in options:
         parts.append(f"fixed terms {listing(list(entry.fixed))}")
     if entry.bounds is not None:
         parts.append(f"bounds {number(entry.bounds[0])} and {number(entry.bounds[1])}")
-    if entry.test == "bayes_t":
+    if "prior_scale" in options:
         parts.append(f"Cauchy prior of scale {entry.prior_scale:g} on d_z")
-    if entry.test == "wilcoxon":
+    if "zeros" in options:
         zeros = "Pratt" if entry.zeros == "pratt" else "dropped"
         parts += dict.fromkeys(row["method"] for row in rows if zeros in row["method"])
     if entry.adjust != "none":
@@ -160,7 +149,7 @@ def _asked(entry: Comparison, rows: Sequence[Row]) -> str:
 def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
     """How the pairs after an entry's test were adjusted, if there are any; rows are of its test."""
     pairs = [row for row in rows if row["contrast"] is not None]
-    followed = entry.test in ("rm_anova", "mixed_model") and any(row["adjust"] == entry.follow_up for row in pairs)
+    followed = "follow_up" in TESTS[entry.test].options and any(row["adjust"] == entry.follow_up for row in pairs)
     if not followed or entry.follow_up == "none":
         return ""
     return f", followed up pair by pair with {adjustment(entry.follow_up)}-adjusted t tests"

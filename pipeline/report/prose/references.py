@@ -8,27 +8,18 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from pipeline.study.measures import measure
 from pipeline.study.settings import Study
+from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from pipeline.tables.table import Row
 
 PAPER = "feng2017"
-_OF_TEST = {
-    "wilcoxon": ("wilcoxon1945",),
-    "friedman": ("friedman1937",),
-    "art_anova": ("wobbrock2011",),
-    "mixed_model": ("laird1982", "satterthwaite1946"),
-    "crossover": ("jones2014",),
-    "tost": ("schuirmann1987",),
-    "bayes_t": ("rouder2009",),
-}
 _OF_EFFECT_SIZE = {
     "generalized eta squared": "olejnik2003",
     "Cohen's d_z": "lakens2013",
     "matched-pairs rank-biserial": "kerby2014",
     "Kendall's W": "kendall1939",
 }
-_OF_ADJUSTMENT = {"holm": "holm1979", "bonferroni": "dunn1961", "benjamini_hochberg": "benjamini1995"}
-_OF_QUESTIONNAIRE = {"nasa_tlx": "hart1988", "sus": "brooke1996", "ueq": "laugwitz2008"}
 _OF_ESTIMATOR = {
     "one_euro": "casiez2012",
     "holt": "holt2004",
@@ -100,7 +91,7 @@ def used(study: Study, rows: Sequence[Row], measures: Iterable[str], versions: M
     for key, used_for in (*_of_methods(rows), *_of_measures(measures), *_of_estimators(study)):
         if used_for not in found.setdefault(key, []):
             found[key].append(used_for)
-    known = _entries()
+    known = entries()
     source = _source(study)
     listed = [source] if source else []
     found = {PAPER: ["the method that Steadyhand implements", *found.pop(PAPER, [])], **found}
@@ -121,14 +112,15 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
     """Tests, effect sizes, corrections and diagnostics of comparisons."""
     for row in rows:
         details = row["details"] or {}
-        for key in _OF_TEST.get(row["test"], ()):
-            yield key, _TESTS[row["test"]]
+        test = TESTS[row["test"]]
+        for key in test.cite:
+            yield key, test.cited_for or test.long_name
         if "Pratt" in row["method"]:
             yield "pratt1959", "zeros of the signed-rank test"
         if row["effect_size"] is not None and row["effect_size_name"] in _OF_EFFECT_SIZE:
             yield _OF_EFFECT_SIZE[row["effect_size_name"]], row["effect_size_name"]
         if row["p_adjusted"] is not None:
-            yield _OF_ADJUSTMENT[row["adjust"]], "adjusted p values"
+            yield ADJUSTMENTS[row["adjust"]].cite, "adjusted p values"
         if details.get("p_gg") is not None:
             yield "greenhouse1959", "correction for sphericity"
         if details.get("shapiro_w") is not None or details.get("residual_shapiro_w") is not None:
@@ -137,22 +129,12 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield "iglewicz1993", "participants far out"
 
 
-_TESTS = {
-    "wilcoxon": "signed-rank test",
-    "friedman": "Friedman test",
-    "art_anova": "aligned rank transform",
-    "mixed_model": "mixed model",
-    "crossover": "crossover analysis",
-    "tost": "test of equivalence",
-    "bayes_t": "Bayes factor",
-}
-
-
 def _of_measures(measures: Iterable[str]) -> Iterator[tuple[str, str]]:
-    for measure in measures:
-        questionnaire, slash, _ = measure.partition("/")
-        if slash and questionnaire in _OF_QUESTIONNAIRE:
-            yield _OF_QUESTIONNAIRE[questionnaire], "questionnaire"
+    """What measures and questionnaires rest on."""
+    for name in measures:
+        used_for = "questionnaire" if measure(name).questionnaire else measure(name).label.lower()
+        for key in measure(name).cite:
+            yield key, used_for
 
 
 def _of_estimators(study: Study) -> Iterator[tuple[str, str]]:
@@ -165,7 +147,7 @@ def _source(study: Study) -> Reference | None:
     """Where the study is published, as study.yaml cites it; None where that is the paper, which is listed anyway."""
     citation = " ".join(study.citation.split())
     doi = _DOI.search(citation)
-    if not citation or (doi and doi.group() == _entries()[PAPER].fields["doi"]):
+    if not citation or (doi and doi.group() == entries()[PAPER].fields["doi"]):
         return None
     fields = {"title": escaped(study.title), "note": escaped(citation)}
     if doi:
@@ -177,7 +159,7 @@ def _package(name: str, version: str, found: Mapping[str, object]) -> Reference:
     """A package by its paper, where it has one, with its version; one that is listed already is a mere program."""
     key = _OF_PACKAGE.get(name)
     if key is not None and key not in found:
-        return _with(_entries()[key], name, note=f"{name}, version {version}")
+        return _with(entries()[key], name, note=f"{name}, version {version}")
     return Reference("software", f"package_{name}", {"title": name, "version": version}, "software")
 
 
@@ -202,7 +184,7 @@ def _unmarked(text: str) -> str:
 
 
 @cache
-def _entries() -> dict[str, Reference]:
+def entries() -> dict[str, Reference]:
     """The entries of references.bib by their keys."""
     text = Path(__file__).with_suffix(".bib").read_text(encoding="utf-8")
     return {key: Reference(kind, key, dict(_FIELD.findall(fields))) for kind, key, fields in _ENTRY.findall(text)}

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
     EFFECTS_OF_CONDITION,
@@ -25,21 +26,6 @@ from pipeline.words import (
 _BEFORE_INTERVAL = ", 95 % CI "
 _ROUND_OFF = 1e-12  # of the mean: what is left where two means are the same
 _DIGITS = 3  # of p, as APA prints it
-_NAMED = {
-    "art_anova": "aligned rank transform",
-    "mixed_model": "mixed model",
-    "crossover": "crossover analysis",
-    "t_paired": "paired t test",
-}
-"""How the tests are named that F, t, W₊ and χ² alone do not tell."""
-_NAMES = {
-    **_NAMED,
-    "rm_anova": "repeated-measures ANOVA",
-    "wilcoxon": "Wilcoxon signed-rank test",
-    "friedman": "Friedman test",
-    "tost": "test of equivalence",
-    "bayes_t": "Bayes factor",
-}
 
 
 @dataclass(frozen=True)
@@ -72,9 +58,9 @@ def sentence(row: Row, told: Told) -> str:
     if row["status"] != "ok":
         of = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f" of {contrast(row)}"
         return f"{what}: the {_test(row)}{of} is {row['status']} (n = {row['n']})."
-    if row["test"] == "bayes_t":
+    if TESTS[row["test"]].question == "evidence":
         return _bayes(row, told, what)
-    if row["test"] == "tost":
+    if TESTS[row["test"]].question == "equivalence":
         return _equivalence(row, told, what)
     pair, difference = _pair(row, told.conditions), _difference(row)
     if pair is not None and difference is not None:
@@ -84,7 +70,7 @@ def sentence(row: Row, told: Told) -> str:
 
 def _test(row: Row) -> str:
     follows_up = row["test"] == "rm_anova" and row["contrast"] is not None
-    return "follow-up t test" if follows_up else _NAMES[row["test"]]
+    return "follow-up t test" if follows_up else TESTS[row["test"]].long_name
 
 
 def _directed(row: Row, told: Told, what: str, pair: _Pair, difference: float) -> str:
@@ -163,8 +149,8 @@ def _evidence(row: Row, told: Told) -> str:
         named = f"{row['method'].split(', ')[0].split(' ')[0]} Wilcoxon signed-rank test, "
     elif row["test"] == "rm_anova" and row["contrast"] is not None:
         named = "follow-up, "
-    elif row["test"] in _NAMED:
-        named = f"{_NAMED[row['test']]}, "
+    elif not TESTS[row["test"]].symbol_tells:
+        named = f"{_test(row)}, "
     figures = evidence(row, _digits(row, told.alpha), _BEFORE_INTERVAL)
     singular = ", singular fit" if (row["details"] or {}).get("singular") else ""
     return f"{named}{figures}, n = {row['n']}{singular}"
@@ -235,4 +221,4 @@ def means_sentence(measure: str, told: Told) -> str:
 
 def tells_means(row: Row, told: Told) -> bool:
     """Does the row's sentence say the means of all conditions?"""
-    return row["status"] == "ok" and row["test"] not in ("bayes_t", "tost") and any(_means(row, told))
+    return row["status"] == "ok" and TESTS[row["test"]].tests_difference and any(_means(row, told))

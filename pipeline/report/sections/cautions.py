@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from pipeline.report.document.model import Strong, Text
 from pipeline.report.sections.material import Material
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import counted, listing, measure_label
 
-_REST_ON_NORMAL = ("rm_anova", "t_paired", "tost", "bayes_t", "crossover")
 _REMARKS_MAX = 3
 _FEW = 8  # participants
 
@@ -49,11 +49,11 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         found = _details(row, *names)
         return found is not None and found < alpha
 
-    violated = [row for row in rows if row["test"] == "rm_anova" and below(row, "mauchly_p")]
+    violated = [row for row in rows if TESTS[row["test"]].assumes_sphericity and below(row, "mauchly_p")]
     if violated:
         text = f"(the differences between conditions vary unequally) for {_named(violated)}: judge by the"
         yield (Strong("Sphericity is violated "), f"{text} Greenhouse-Geisser p.")
-    resting = [row for row in rows if row["test"] in _REST_ON_NORMAL]
+    resting = [row for row in rows if TESTS[row["test"]].assumes_normality]
     skewed = [row for row in resting if below(row, "shapiro_p", "residual_shapiro_p")]
     if skewed:
         text = f"by Shapiro and Wilk's test, for {_named(skewed)}: see whether a rank test says the same."

@@ -8,10 +8,10 @@ from typing import Any
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections.material import Material
 from pipeline.statistics.diagnostics import OUTLIER_RULE
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
     NOTHING,
-    TESTS,
     adjustment,
     contrast,
     counted,
@@ -25,6 +25,7 @@ from pipeline.words import (
     share,
     statistic_name,
     statistic_value,
+    test_label,
 )
 
 
@@ -57,14 +58,15 @@ def section(material: Material) -> Section | None:
 
 def _who_counts(tests: Sequence[str]) -> str:
     every = "Only participants with a value in every condition count (n)"
-    return f"{every}, but in the mixed model all." if "mixed_model" in tests else f"{every}."
+    of_all = [TESTS[name].label for name in tests if not TESTS[name].complete_cases]
+    return f"{every}, but in the {listing(of_all)} all." if of_all else f"{every}."
 
 
 def _methods(rows: Sequence[Row]) -> str:
     """Every method by name, and how families of p values were adjusted."""
     named: dict[str, list[str]] = {}
     for row in rows:
-        named.setdefault(TESTS[row["test"]], []).append(row["method"])
+        named.setdefault(test_label(row), []).append(row["method"])
     told = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in named.items()]
     return "; ".join(told) + ". Adjusted p: over the measures of an entry of study.yaml, pairs over those of a measure."
 
@@ -130,7 +132,7 @@ def _corrected_p(row: Row) -> str:
 
 _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Measure", lambda row: measure_label(row["measure"])),
-    ("Test", lambda row: TESTS[row["test"]]),
+    ("Test", test_label),
     ("Compared", contrast),
     ("n", lambda row: f"{row['n']}"),
     ("Statistic", _statistic),

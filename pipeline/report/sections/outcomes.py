@@ -10,9 +10,11 @@ from pipeline.report.document.model import Block, Column, Paragraph, Section, St
 from pipeline.report.figures import captions
 from pipeline.report.figures.canvas import offsets_mm
 from pipeline.report.sections.material import Material, first_of, safe_name
+from pipeline.study.measures import MEASURES, measure
+from pipeline.study.measures import Section as SectionName
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
-    TESTS,
     adjustment,
     comparison_sentence,
     contrast,
@@ -26,14 +28,12 @@ from pipeline.words import (
     statistic,
 )
 
-_SELECTION = ("selection_mse_px2", "selection_mse_mm2", "selection_rmse_px", "selection_rmse_mm")
-_TIME = ("completion_time_s", "trial_time_s")
 _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
 
 
 def selection(material: Material) -> Section | None:
     """Accuracy of target selection (the paper's Fig. 12)."""
-    names = [name for name in _SELECTION if name in material.measured()]
+    names = _shown_here(material, "selection")
     if not names:
         return None
     drawn = next(name for name in names if "mse" in name)
@@ -51,7 +51,7 @@ def selection(material: Material) -> Section | None:
 
 def time(material: Material) -> Section | None:
     """Time (the paper's Fig. 13)."""
-    names = [name for name in _TIME if name in material.measured()]
+    names = _shown_here(material, "time")
     if not names:
         return None
     text = (
@@ -66,7 +66,7 @@ def time(material: Material) -> Section | None:
 
 def workload(material: Material) -> Section | None:
     """Questionnaires (the paper's Table 2 and Fig. 14)."""
-    scales = [name for name in material.measured() if "/" in name]
+    scales = _shown_here(material, "ratings")
     if not scales:
         return None
     blocks: list[Block] = []
@@ -78,13 +78,20 @@ def workload(material: Material) -> Section | None:
 
 def others(material: Material) -> Section | None:
     """Every measure that has no section of its own."""
-    names = [name for name in material.measured() if name not in (*_SELECTION, *_TIME) and "/" not in name]
+    names = _shown_here(material, "others")
     if not names:
         return None
     blocks: list[Block] = [_descriptives(material, "table-others", names)]
     for name in names:
         blocks += _measured(material, name)
     return Section("others", "Further measures", tuple(blocks))
+
+
+def _shown_here(material: Material, section_name: SectionName) -> list[str]:
+    """The study's measures that a section shows; those that Steadyhand computes itself stand in their own order."""
+    mine = [name for name in material.measured() if measure(name).section == section_name]
+    ours = [name for name in MEASURES if name in mine]
+    return [*ours, *(name for name in mine if name not in ours)]
 
 
 def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Table:
@@ -160,7 +167,7 @@ def _sentences(rows: Sequence[Row]) -> Iterator[str]:
             yield from (comparison_sentence(row) for row in pairs)
             continue
         told = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
-        yield f"follow-up of the {TESTS[test]}, n = {pairs[0]['n']}: {'; '.join(told)}"
+        yield f"follow-up of the {TESTS[test].label}, n = {pairs[0]['n']}: {'; '.join(told)}"
 
 
 def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:

@@ -20,6 +20,8 @@ from pipeline.report.document.model import (
 from pipeline.report.sections import traces
 from pipeline.report.sections.cautions import cautions
 from pipeline.report.sections.material import ORIGINS, Material
+from pipeline.study.measures import headlines
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
     EFFECTS_OF_CONDITION,
@@ -42,10 +44,8 @@ from pipeline.words import (
     verdict,
 )
 
-_HEADLINES = ("selection_mse_px2", "selection_mse_mm2", "completion_time_s", "trial_time_s")
 _KEY_FIGURES_MAX = 3
 _SENTENCES = 2
-_NOT_OF_CHANCE = ("tost", "bayes_t")  # they answer another question than whether there is a difference
 
 
 def section(material: Material) -> Section:
@@ -201,9 +201,11 @@ def _of_conditions(material: Material) -> list[Row]:
 
 def _headline_rows(material: Material) -> list[Row]:
     """One omnibus row a measure that is no questionnaire's, the well-known measures first."""
-    rows = [row for row in _of_conditions(material) if "/" not in row["measure"] and row["test"] not in _NOT_OF_CHANCE]
+    rows = [
+        row for row in _of_conditions(material) if "/" not in row["measure"] and TESTS[row["test"]].tests_difference
+    ]
     first = {row["measure"]: row for row in reversed(rows)}
-    known = [name for name in _HEADLINES if name in first]
+    known = headlines(first)
     return [first[name] for name in [*known, *sorted(set(first) - set(known))]]
 
 
@@ -252,7 +254,7 @@ def _evidence(material: Material) -> list[Text]:
         said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
         answers.append((Strong(f"{label}: "), f"{change}{said}."))
     for row in _of_conditions(material):
-        if row["test"] in _NOT_OF_CHANCE and row["status"] == "ok":
+        if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
             said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
@@ -279,7 +281,7 @@ def _ratings(material: Material) -> list[Text]:
     alpha = material.study.alpha
     families: dict[tuple[str, str], list[Row]] = {}
     for row in _of_conditions(material):
-        if "/" in row["measure"] and row["test"] not in _NOT_OF_CHANCE:
+        if "/" in row["measure"] and TESTS[row["test"]].tests_difference:
             families.setdefault((row["measure"].partition("/")[0], row["test"]), []).append(row)
     for (questionnaire, _), rows in families.items():
         label = measure_label(f"{questionnaire}/x").partition(":")[0]

@@ -11,7 +11,6 @@ from pipeline.report.sections.material import Material
 from pipeline.tables.table import Row
 from pipeline.words import (
     NOTHING,
-    TESTS,
     contrast,
     counted,
     decisive_p,
@@ -19,6 +18,7 @@ from pipeline.words import (
     measure_label,
     p_value,
     statistic,
+    test_label,
 )
 
 _FIGURES = ("n", "statistic", "p", "p_adjusted", "effect_size", "mean_difference", "status")
@@ -83,7 +83,7 @@ def _significant(row: Row | None, alpha: float) -> bool | None:
 def _cells(row: Row | None, other: Row | None, which: str) -> tuple[str, ...]:
     """A line of the table; a comparison that there is in one of the two only has nothing in the other."""
     named = row or other or {}
-    head = (measure_label(named["measure"]), TESTS[named["test"]], contrast(named), f"{which} exclusions")
+    head = (measure_label(named["measure"]), test_label(named), contrast(named), f"{which} exclusions")
     if row is None:
         return (*head, *(NOTHING,) * 4)
     said = statistic(row) if row["status"] == "ok" else row["status"]

@@ -32,7 +32,8 @@ from pipeline.report.document.model import (
     Strong,
     Table,
 )
-from pipeline.words import TESTS, interval, number, p_phrase, percent
+from pipeline.study.statistical_tests import TESTS
+from pipeline.words import interval, number, p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study
@@ -390,7 +391,7 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
     ):
         assert sentence in text, sentence
     for row in steadyhand.results()["comparisons"]:
-        assert TESTS[row["test"]] in text
+        assert TESTS[row["test"]].label in text
         ranks = row["statistic_name"] == "W+"
         assert (f"W₊ = {row['statistic']:g}" if ranks else f"{abs(row['statistic']):.2f}") in text
         assert row["method"] in text

@@ -1,0 +1,174 @@
+"""What is known of each measure and questionnaire: its name for people, unit, scale, direction and source.
+
+One record per measure. Labels, the order of tables, which section of the report shows a measure, whether a percentage
+may be said of it and which direction is better follow from its record, and from nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+Scale = Literal["ratio", "interval", "ordinal", "binary", "unknown"]
+Better = Literal["lower", "higher", "unknown"]
+Section = Literal["selection", "time", "ratings", "others"]
+
+_LAST = 1000
+_TOTAL = "total"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A dependent variable.
+
+    `unit` is what people read, as in "mm". Only on a ratio scale, whose zero means "none", is a percentage of change
+    meaningful (Stevens 1946). `headline` ranks the measures that the first page looks for, 0 first; None for the
+    others. `cite` are keys of references.bib.
+    """
+
+    name: str
+    label: str
+    unit: str = ""
+    scale: Scale = "unknown"
+    better: Better = "unknown"
+    section: Section = "others"
+    source: str = "measures"
+    cite: tuple[str, ...] = ()
+    headline: int | None = None
+    questionnaire: str = ""
+    order: int = 0
+
+    @property
+    def full_label(self) -> str:
+        """Its name for people, with its unit: `Completion time (s)`."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
+
+
+@dataclass(frozen=True)
+class Questionnaire:
+    """A standard instrument: its name for people, its scales or items in their own order, and who made it."""
+
+    name: str
+    label: str
+    scales: tuple[str, ...] = ()
+    better: Better = "unknown"
+    cite: tuple[str, ...] = ()
+
+
+_FITTS = ("soukoreff2004", "iso9241411")
+
+MEASURES: Mapping[str, Measure] = {
+    measure.name: measure
+    for measure in (
+        Measure(
+            "selection_mse_px2",
+            "Selection error, MSE",
+            "px²",
+            "ratio",
+            "lower",
+            "selection",
+            "the trials",
+            headline=0,
+        ),
+        Measure(
+            "selection_mse_mm2",
+            "Selection error, MSE",
+            "mm²",
+            "ratio",
+            "lower",
+            "selection",
+            "the trials",
+            headline=1,
+        ),
+        Measure("selection_rmse_px", "Selection error, RMSE", "px", "ratio", "lower", "selection", "descriptives"),
+        Measure("selection_rmse_mm", "Selection error, RMSE", "mm", "ratio", "lower", "selection", "descriptives"),
+        Measure("completion_time_s", "Completion time", "s", "ratio", "lower", "time", "the events", headline=2),
+        Measure("trial_time_s", "Time per trial", "s", "ratio", "lower", "time", "the trials", headline=3),
+        Measure("throughput_bits_s", "Throughput", "bit/s", "ratio", "higher", source="the trials", cite=_FITTS),
+        Measure(
+            "path_efficiency", "Path efficiency", "", "ratio", "higher", source="the trials", cite=("williams2008",)
+        ),
+        Measure("overshoot_mm", "Overshoot", "mm", "ratio", "lower", source="the trials", cite=("williams2008",)),
+        Measure("corrections", "Corrections per trial", "", "ratio", "lower", source="the trials", cite=("meyer1988",)),
+    )
+}
+"""The measures that Steadyhand computes itself."""
+
+QUESTIONNAIRES: Mapping[str, Questionnaire] = {
+    questionnaire.name: questionnaire
+    for questionnaire in (
+        Questionnaire(
+            "nasa_tlx",
+            "NASA-TLX",
+            ("mental", "physical", "temporal", "performance", "effort", "frustration"),
+            "lower",
+            ("hart1988",),
+        ),
+        Questionnaire("sus", "SUS", cite=("brooke1996",)),
+        Questionnaire("ueq", "UEQ", cite=("laugwitz2008",)),
+    )
+}
+
+_UNITS: Mapping[str, str] = {
+    "_px2": "px²",
+    "_mm2": "mm²",
+    "_mm_s2": "mm/s²",
+    "_mm_s": "mm/s",
+    "_px": "px",
+    "_mm": "mm",
+    "_ms": "ms",
+    "_s": "s",
+    "_percent": "%",
+}
+"""The unit that the end of a measure's name tells. Longer ends first: `_mm_s` is no time."""
+
+
+@cache
+def measure(name: str) -> Measure:
+    """The record of a measure; of one that is not ours, what its name tells."""
+    if name in MEASURES:
+        return MEASURES[name]
+    questionnaire, slash, scale = name.partition("/")
+    if slash:
+        return _rating(name, questionnaire, scale)
+    for suffix, unit in _UNITS.items():
+        if name.endswith(suffix):
+            return Measure(name, _spaced(name.removesuffix(suffix)), unit, "ratio")
+    return Measure(name, _spaced(name))
+
+
+def _rating(name: str, questionnaire: str, scale: str) -> Measure:
+    """A scale of a questionnaire. Ratings have an order and, by habit, equal steps, but no zero that means none."""
+    known = QUESTIONNAIRES.get(questionnaire, Questionnaire(questionnaire, _spaced(questionnaire)))
+    order = known.scales.index(scale) if scale in known.scales else len(known.scales)
+    return Measure(
+        name,
+        f"{known.label}: {_spaced(scale).lower()}",
+        scale="interval",
+        better=known.better,
+        section="ratings",
+        source="questionnaires",
+        cite=known.cite,
+        questionnaire=questionnaire,
+        order=_LAST if scale == _TOTAL else order,
+    )
+
+
+def measure_order(name: str) -> tuple[str, int, str]:
+    """What to sort measures by: a questionnaire's scales stand in their own order, its total last."""
+    first, _, scale = name.partition("/")
+    return first, measure(name).order, scale
+
+
+def headlines(names: Iterable[str]) -> list[str]:
+    """Those of some measures that people look for first, the first of them first."""
+    ranked = [(rank, name) for name in names if (rank := measure(name).headline) is not None]
+    return [name for _, name in sorted(ranked)]
+
+
+def _spaced(name: str) -> str:
+    """`hit_rate` as `Hit rate`."""
+    words = name.replace("_", " ").strip()
+    return words[:1].upper() + words[1:]

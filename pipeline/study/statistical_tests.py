@@ -1,0 +1,156 @@
+"""What is known of each statistical test: its names for people, its options, what it assumes and whom to cite.
+
+One record per test. The names that study.yaml takes, labels, the methods text, cautions and references follow from
+it. Which function computes it stands in pipeline/analysis/comparisons.py, so that a change of that arithmetic does not
+count as a change of every stage that reads study.yaml; a test holds the two lists against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Question = Literal["difference", "equivalence", "evidence"]
+
+
+@dataclass(frozen=True)
+class StatisticalTest:
+    """A test of study.yaml.
+
+    `label` stands in tables, `long_name` in sentences, `methods_text` in the methods paragraph. `options` are the keys
+    of an entry that only some tests take. `symbol_tells` where the statistic's letter says which test it was. A test
+    of another `question` than "difference" is no evidence for or against a difference by its p.
+    """
+
+    name: str
+    label: str
+    long_name: str
+    methods_text: str
+    options: tuple[str, ...] = ()
+    assumes_normality: bool = False
+    assumes_sphericity: bool = False
+    complete_cases: bool = True
+    symbol_tells: bool = False
+    question: Question = "difference"
+    cite: tuple[str, ...] = ()
+    cited_for: str = ""
+
+    @property
+    def tests_difference(self) -> bool:
+        """Is a small p evidence for a difference?"""
+        return self.question == "difference"
+
+
+TESTS: Mapping[str, StatisticalTest] = {
+    test.name: test
+    for test in (
+        StatisticalTest(
+            "rm_anova",
+            "rm ANOVA",
+            "repeated-measures ANOVA",
+            "repeated-measures ANOVA (generalized η²)",
+            options=("within", "follow_up"),
+            assumes_normality=True,
+            assumes_sphericity=True,
+            symbol_tells=True,
+        ),
+        StatisticalTest(
+            "t_paired",
+            "paired t",
+            "paired t test",
+            "paired t tests (two-sided; d_z with its noncentral-t interval)",
+            assumes_normality=True,
+        ),
+        StatisticalTest(
+            "wilcoxon",
+            "Wilcoxon",
+            "Wilcoxon signed-rank test",
+            "Wilcoxon signed-rank tests (two-sided; rank-biserial correlation)",
+            options=("zeros",),
+            symbol_tells=True,
+            cite=("wilcoxon1945",),
+            cited_for="signed-rank test",
+        ),
+        StatisticalTest(
+            "friedman",
+            "Friedman",
+            "Friedman test",
+            "Friedman's test (Kendall's W)",
+            symbol_tells=True,
+            cite=("friedman1937",),
+        ),
+        StatisticalTest(
+            "art_anova",
+            "ART ANOVA",
+            "aligned rank transform",
+            "ANOVA on aligned ranks (ART; partial η²)",
+            options=("within",),
+            cite=("wobbrock2011",),
+        ),
+        StatisticalTest(
+            "mixed_model",
+            "mixed model",
+            "mixed model",
+            "linear mixed models with a random intercept for each participant"
+            " (REML, Satterthwaite's degrees of freedom)",
+            options=("follow_up", "fixed"),
+            complete_cases=False,
+            cite=("laird1982", "satterthwaite1946"),
+        ),
+        StatisticalTest(
+            "crossover",
+            "crossover",
+            "crossover analysis",
+            "the analysis of a 2 × 2 crossover (treatment, period, carry-over)",
+            assumes_normality=True,
+            cite=("jones2014",),
+        ),
+        StatisticalTest(
+            "tost",
+            "equivalence (TOST)",
+            "test of equivalence",
+            "two one-sided paired t tests of equivalence (TOST)",
+            options=("bounds",),
+            assumes_normality=True,
+            question="equivalence",
+            cite=("schuirmann1987",),
+        ),
+        StatisticalTest(
+            "bayes_t",
+            "Bayes factor",
+            "Bayes factor",
+            "JZS Bayes factors of the paired difference",
+            options=("prior_scale",),
+            assumes_normality=True,
+            question="evidence",
+            cite=("rouder2009",),
+        ),
+    )
+}
+"""Every test by its name in study.yaml, in the order in which they are listed to people."""
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """A way of adjusting the p values of a family of tests, as study.yaml names it and as people do."""
+
+    name: str
+    label: str
+    cite: str
+
+
+ADJUSTMENTS: Mapping[str, Adjustment] = {
+    adjustment.name: adjustment
+    for adjustment in (
+        Adjustment("holm", "Holm", "holm1979"),
+        Adjustment("bonferroni", "Bonferroni", "dunn1961"),
+        Adjustment("benjamini_hochberg", "Benjamini-Hochberg", "benjamini1995"),
+    )
+}
+"""Every adjustment by its name in study.yaml."""
+
+
+def tests_that_take(option: str) -> list[str]:
+    """The tests for which a key of an entry means something."""
+    return [test.name for test in TESTS.values() if option in test.options]
