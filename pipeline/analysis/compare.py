@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.audit.beside_computed import compare_printed
-from pipeline.analysis.comparisons import compared, everything_asked
+from pipeline.analysis.comparisons import all_requests, compared
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.simulated_reductions import reductions
@@ -47,8 +47,8 @@ def run(work: Work) -> Outcome:
     rows, uncomparable = _of_all_data(study, measured / ALL_DATA)
     found["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
-    asked = [one for entry in everything_asked(study, measures, observations) for one in entry]
-    checked = findings(study, asked, tables.read("orders", measured), found["trials"], work.sessions)
+    requests = [one for entry in all_requests(study, measures, observations) for one in entry]
+    checked = findings(study, requests, tables.read("orders", measured), found["trials"], work.sessions)
     found["design_check"] = tables.frame("design_check", checked)
     told = {
         name: tables.read(name, work.entries["ingest" if name == "quality" else "assess"]) for name in _SESSION_TABLES

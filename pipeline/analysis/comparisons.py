@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
 import pandas as pd
 
-from pipeline.analysis import complete_cases as cells
-from pipeline.analysis import model_rows
-from pipeline.analysis.complete_cases import Asked, Cells
+from pipeline.analysis import complete_cases, families, model_rows
+from pipeline.analysis.complete_cases import CompleteCases, Request
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics import OK, diagnostics, pairs
 from pipeline.statistics.anova import rm_anova
@@ -23,7 +21,6 @@ from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.crossover import crossover
 from pipeline.statistics.equivalence import tost
 from pipeline.statistics.mixed import mixed_model
-from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
@@ -39,29 +36,29 @@ Answer = tuple[list[Row], list[Row]]
 def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> Answer:
     """Every row of `comparisons`, and every exclusion that came of them, each once."""
     rows: list[Row] = []
-    left_out: list[Row] = []
+    exclusions: list[Row] = []
     if study.comparisons and len(study.conditions) < 2:
-        raise PipelineError("study.yaml: comparisons: need two conditions or more, and conditions lists one")
-    for asked in everything_asked(study, measures, observations):
-        found: list[Row] = []
-        for one in asked:
-            answer, incomplete = RUN[one.entry.test](one)
-            found += answer
-            left_out += incomplete
-        _adjust(found)
-        rows += found
+        raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
+    for requests in all_requests(study, measures, observations):
+        of_entry: list[Row] = []
+        for request in requests:
+            answer, incomplete = RUN[request.entry.test](request)
+            of_entry += answer
+            exclusions += incomplete
+        families.adjust(of_entry)
+        rows += of_entry
     for row in rows:
         row["details"] = json.dumps(row["details"]) if row["details"] else None
-    unique = {tuple(sorted(row.items())): row for row in left_out}
+    unique = {tuple(sorted(row.items())): row for row in exclusions}
     return rows, list(unique.values())
 
 
-def everything_asked(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> Iterator[list[Asked]]:
-    """What each entry asks, a measure each."""
+def all_requests(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> Iterator[list[Request]]:
+    """What each entry asks, one request per measure."""
     known = sorted(set(measures["measure"]), key=measure_order)
     for entry in study.comparisons:
         named = _matching(entry.measure, known)
-        yield [Asked(study, entry, measure, measures, observations) for measure in named]
+        yield [Request(study, entry, measure, measures, observations) for measure in named]
 
 
 def _matching(wanted: str, known: Sequence[str]) -> list[str]:
@@ -77,85 +74,87 @@ def _matching(wanted: str, known: Sequence[str]) -> list[str]:
     return found
 
 
-def _anova(asked: Asked) -> Answer:
+def _anova(request: Request) -> Answer:
     """A row an effect, and the pairs that follow up those of more than two levels."""
-    found = cells.by_factor(asked) if len(asked.entry.within) > 1 else cells.by_condition(asked)
-    rows = [_row(asked, result) for result in rm_anova(found.values, asked.entry.within)]
-    if found.values.shape[1:] == (2,):
-        (pair,) = pairs.of_conditions(found.values, found.levels[0])
-        rows = [_diagnosed({**rows[0], **_change(pair)}, pair, found)]
-    if asked.entry.follow_up != "none":
-        for pair in pairs.follow_ups(found.values, asked.entry.within, found.levels):
-            row = _pair_row(asked, t_paired(pair.first, pair.second, pair.effect), pair, found)
-            rows.append({**row, "adjust": asked.entry.follow_up})
-    return rows, found.left_out
+    cases = complete_cases.by_factors_of(request)
+    rows = [_row(request, result) for result in rm_anova(cases.values, request.entry.within)]
+    if cases.values.shape[1:] == (2,):
+        (pair,) = pairs.of_conditions(cases.values, cases.levels[0])
+        rows = [_diagnosed({**rows[0], **_change(pair)}, pair, cases)]
+    if request.entry.follow_up != "none":
+        for pair in pairs.follow_ups(cases.values, request.entry.within, cases.levels):
+            row = _pair_row(request, t_paired(pair.first, pair.second, pair.effect), pair, cases)
+            rows.append({**row, "adjust": request.entry.follow_up})
+    return rows, cases.left_out
 
 
-def _art(asked: Asked) -> Answer:
-    found = cells.by_factor(asked) if len(asked.entry.within) > 1 else cells.by_condition(asked)
-    return [_row(asked, result) for result in art_anova(found.values, asked.entry.within)], found.left_out
+def _art(request: Request) -> Answer:
+    cases = complete_cases.by_factors_of(request)
+    return [_row(request, result) for result in art_anova(cases.values, request.entry.within)], cases.left_out
 
 
-def _friedman(asked: Asked) -> Answer:
-    found = cells.by_condition(asked)
-    row = _row(asked, friedman(found.values))
-    compared = pairs.of_conditions(found.values, found.levels[0])
-    return [{**row, **_change(compared[0])} if len(compared) == 1 else row], found.left_out
+def _friedman(request: Request) -> Answer:
+    cases = complete_cases.by_condition(request)
+    row = _row(request, friedman(cases.values))
+    of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
+    return [{**row, **_change(of_conditions[0])} if len(of_conditions) == 1 else row], cases.left_out
 
 
-def _pairwise(test: Callable[[Asked, FloatArray, FloatArray], Result]) -> Callable[[Asked], Answer]:
-    """A row a pair of conditions."""
+def _pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Callable[[Request], Answer]:
+    """What gives a row a pair of conditions."""
 
-    def answer(asked: Asked) -> Answer:
-        found = cells.by_condition(asked)
-        compared = pairs.of_conditions(found.values, found.levels[0])
-        rows = [_pair_row(asked, test(asked, pair.first, pair.second), pair, found) for pair in compared]
-        return rows, found.left_out
+    def answer(request: Request) -> Answer:
+        cases = complete_cases.by_condition(request)
+        of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
+        rows = [_pair_row(request, test(request, pair.first, pair.second), pair, cases) for pair in of_conditions]
+        return rows, cases.left_out
 
     return answer
 
 
-def _mixed(asked: Asked) -> Answer:
+def _mixed(request: Request) -> Answer:
     """A row a term, and the pairs of levels of those that have more than two."""
-    found = model_rows.of_model(asked)
-    rows = [_row(asked, result) for result in mixed_model(found.values, found.participants, found.columns, found.terms)]
-    if model_rows.CARRY_OVER in found.columns:
+    model = model_rows.of_model(request)
+    rows = [
+        _row(request, result) for result in mixed_model(model.values, model.participants, model.columns, model.terms)
+    ]
+    if model_rows.CARRY_OVER in model.columns:
         rows = [{**row, "method": f"{row['method']}; without first periods, before which nothing came"} for row in rows]
     kept: list[Row] = []
     for _, of_term in groupby(rows, key=lambda row: row["effect"]):
         whole, *levels = of_term
         kept.append(whole)
-        if asked.entry.follow_up != "none":
-            kept += [{**row, "adjust": asked.entry.follow_up} for row in levels]
-    return kept, found.left_out
+        if request.entry.follow_up != "none":
+            kept += [{**row, "adjust": request.entry.follow_up} for row in levels]
+    return kept, model.left_out
 
 
-def _crossover(asked: Asked) -> Answer:
+def _crossover(request: Request) -> Answer:
     """The rows treatment, period and carry-over."""
-    found = model_rows.of_crossover(asked)
-    results = crossover(found.values, found.first_came_first, found.conditions, found.sequences)
-    return [_row(asked, result) for result in results], found.left_out
+    cases = model_rows.of_crossover(request)
+    results = crossover(cases.values, cases.first_came_first, cases.conditions, cases.sequences)
+    return [_row(request, result) for result in results], cases.left_out
 
 
-RUN: Mapping[str, Callable[[Asked], Answer]] = {
+RUN: Mapping[str, Callable[[Request], Answer]] = {
     "rm_anova": _anova,
     "art_anova": _art,
     "friedman": _friedman,
     "t_paired": _pairwise(lambda _, first, second: t_paired(first, second)),
-    "wilcoxon": _pairwise(lambda asked, first, second: wilcoxon(first, second, zeros=asked.entry.zeros)),
-    "tost": _pairwise(lambda asked, first, second: tost(first, second, asked.entry.bounds or (0.0, 0.0))),
-    "bayes_t": _pairwise(lambda asked, first, second: bayes_t(first, second, asked.entry.prior_scale)),
+    "wilcoxon": _pairwise(lambda request, first, second: wilcoxon(first, second, zeros=request.entry.zeros)),
+    "tost": _pairwise(lambda request, first, second: tost(first, second, request.entry.bounds or (0.0, 0.0))),
+    "bayes_t": _pairwise(lambda request, first, second: bayes_t(first, second, request.entry.prior_scale)),
     "mixed_model": _mixed,
     "crossover": _crossover,
 }
 """What computes each test of study.yaml."""
 
 
-def _row(asked: Asked, result: Result) -> Row:
+def _row(request: Request, result: Result) -> Row:
     """A result as a row."""
     return {
-        "measure": asked.measure,
-        "test": asked.entry.test,
+        "measure": request.measure,
+        "test": request.entry.test,
         "effect": result.effect,
         "contrast": result.contrast,
         "n": result.n,
@@ -164,7 +163,7 @@ def _row(asked: Asked, result: Result) -> Row:
         "df1": result.df1,
         "df2": result.df2,
         "p": result.p,
-        "adjust": asked.entry.adjust,
+        "adjust": request.entry.adjust,
         "method": result.method,
         "effect_size_name": result.effect_size_name,
         "effect_size": result.effect_size,
@@ -183,26 +182,14 @@ def _change(pair: Pair) -> Row:
     return {"mean_difference": first - second, "reduction": 1 - second / first if first != 0 else None}
 
 
-def _pair_row(asked: Asked, result: Result, pair: Pair, found: Cells) -> Row:
+def _pair_row(request: Request, result: Result, pair: Pair, cases: CompleteCases) -> Row:
     """The row of a test of two conditions."""
-    return _diagnosed({**_row(asked, result), **_change(pair), "contrast": pair.contrast}, pair, found)
+    return _diagnosed({**_row(request, result), **_change(pair), "contrast": pair.contrast}, pair, cases)
 
 
-def _diagnosed(row: Row, pair: Pair, found: Cells) -> Row:
+def _diagnosed(row: Row, pair: Pair, cases: CompleteCases) -> Row:
     """The row with what is to be said of the differences that it rests on."""
     if row["status"] != OK:
         return row
-    told = diagnostics.differences(pair.first, pair.second, found.participants)
-    return {**row, "details": {**row["details"], **told}}
-
-
-def _adjust(rows: list[Row]) -> None:
-    """Adjust over the measures of an entry, effect by effect; of several pairs of a measure over those pairs."""
-    contrasts = Counter((row["measure"], row["effect"]) for row in rows if row["contrast"] is not None)
-    families: dict[tuple[str, str | None], list[Row]] = {}
-    for row in rows:
-        one_of_several = row["contrast"] is not None and contrasts[row["measure"], row["effect"]] > 1
-        families.setdefault((row["effect"], row["measure"] if one_of_several else None), []).append(row)
-    for family in families.values():
-        for row, value in zip(family, adjusted([row["p"] for row in family], family[0]["adjust"]), strict=True):
-            row["p_adjusted"] = value
+    diagnosis = diagnostics.differences(pair.first, pair.second, cases.participants)
+    return {**row, "details": {**row["details"], **diagnosis}}

@@ -10,7 +10,7 @@ from itertools import combinations
 import pandas as pd
 
 from pipeline.analysis import model_rows, orders
-from pipeline.analysis.complete_cases import Asked
+from pipeline.analysis.complete_cases import Request
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
 from pipeline.statistics.counterbalancing import balance
@@ -29,26 +29,26 @@ _NAMED = 5
 
 def findings(
     study: Study,
-    asked: Sequence[Asked],
+    requests: Sequence[Request],
     told: pd.DataFrame,
     trials: pd.DataFrame,
     sessions: Iterable[Session],
 ) -> list[Row]:
-    """The rows of `design_check` for what is asked; a remark says what is not as it should be.
+    """The rows of `design_check` for what the comparisons ask; a remark says what is not as it should be.
 
     `told` is the table `orders`.
     """
-    if len(study.conditions) < 2 or not asked:
+    if len(study.conditions) < 2 or not requests:
         return []
-    one_each = list({one.measure: one for one in asked}.values())
-    people = sorted(set(asked[0].measures["participant"]))
+    one_each = list({one.measure: one for one in requests}.values())
+    people = sorted(set(requests[0].measures["participant"]))
     known = _complete_orders(study.conditions, orders.run_orders(told))
     rows = [*_known_orders(people, known), *_disagreements(told)]
     if known:
         rows += _balance(study.conditions, list(known.values()))
         rows += [row for one in one_each for row in _order_effects(one)]
     rows += [*_complete_people(study, one_each), *_trials(trials, one_each)]
-    return [*rows, *_sessions(asked[0].observations, sessions)]
+    return [*rows, *_sessions(requests[0].observations, sessions)]
 
 
 def _complete_orders(conditions: Sequence[str], run: pd.DataFrame) -> dict[str, Order]:
@@ -128,44 +128,44 @@ def _span(numbers: Iterable[int]) -> str:
     return str(known[0]) if known[0] == known[-1] else f"{known[0]} to {known[-1]}"
 
 
-def _order_effects(asked: Asked) -> list[Row]:
+def _order_effects(request: Request) -> list[Row]:
     """Whether a measure changes with the period, and with what came just before."""
-    tests: tuple[tuple[str, str, Callable[[Asked], Result]], ...] = (
+    tests: tuple[tuple[str, str, Callable[[Request], Result]], ...] = (
         ("effect of the period", "values change with the period", _period_test),
         ("carry-over", "values change with what came just before", _carry_over_test),
     )
     rows: list[Row] = []
     for what, remark, test in tests:
-        row: Row = {"what": what, "measure": asked.measure, "expected": "none"}
+        row: Row = {"what": what, "measure": request.measure, "expected": "none"}
         try:
-            rows.append({**row, **_tested(test(asked), remark, asked.study.alpha)})
+            rows.append({**row, **_tested(test(request), remark, request.study.alpha)})
         except PipelineError:  # an error where a comparison asks for it; here the data just do not say enough
             rows.append({**row, "found": "cannot be tested: too little is known of the order"})
     return rows
 
 
-def _period_test(asked: Asked) -> Result:
-    if len(asked.study.conditions) == 2:
-        return _crossover(asked)[1]
-    return _omnibus(asked, ("condition", "factor(period)"), "period")
+def _period_test(request: Request) -> Result:
+    if len(request.study.conditions) == 2:
+        return _crossover(request)[1]
+    return _omnibus(request, ("condition", "factor(period)"), "period")
 
 
-def _carry_over_test(asked: Asked) -> Result:
-    if len(asked.study.conditions) == 2:
-        return _crossover(asked)[2]
-    return _omnibus(asked, ("condition", "factor(period)", model_rows.CARRY_OVER), model_rows.CARRY_OVER)
+def _carry_over_test(request: Request) -> Result:
+    if len(request.study.conditions) == 2:
+        return _crossover(request)[2]
+    return _omnibus(request, ("condition", "factor(period)", model_rows.CARRY_OVER), model_rows.CARRY_OVER)
 
 
-def _crossover(asked: Asked) -> list[Result]:
+def _crossover(request: Request) -> list[Result]:
     """Treatment, period and carry-over."""
-    entry = Comparison(measure=asked.measure, test="crossover")
-    found = model_rows.of_crossover(replace(asked, entry=entry))
+    entry = Comparison(measure=request.measure, test="crossover")
+    found = model_rows.of_crossover(replace(request, entry=entry))
     return crossover(found.values, found.first_came_first, found.conditions, found.sequences)
 
 
-def _omnibus(asked: Asked, fixed: tuple[str, ...], effect: str) -> Result:
-    entry = Comparison(measure=asked.measure, test="mixed_model", fixed=fixed)
-    found = model_rows.of_model(replace(asked, entry=entry))
+def _omnibus(request: Request, fixed: tuple[str, ...], effect: str) -> Result:
+    entry = Comparison(measure=request.measure, test="mixed_model", fixed=fixed)
+    found = model_rows.of_model(replace(request, entry=entry))
     results = mixed_model(found.values, found.participants, found.columns, found.terms)
     return next(result for result in results if result.effect == effect)
 
@@ -178,11 +178,11 @@ def _tested(result: Result, remark: str, alpha: float) -> Row:
     return {**figures, "found": found, "remark": remark if result.p < alpha else None}
 
 
-def _complete_people(study: Study, asked: Sequence[Asked]) -> Iterator[Row]:
+def _complete_people(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
     """Participants who lack a condition in a measure that is compared."""
     what = "participants with every condition"
     complete: set[int] = set()
-    for one in asked:
+    for one in requests:
         rows = one.measures[one.measures["measure"] == one.measure]
         met = rows.groupby("participant")["condition"].nunique()
         whole = int((met == len(study.conditions)).sum())
@@ -196,13 +196,13 @@ def _complete_people(study: Study, asked: Sequence[Asked]) -> Iterator[Row]:
         yield {"what": what, "found": f"all, {numbers}", "expected": "all"}
 
 
-def _trials(trials: pd.DataFrame, asked: Sequence[Asked]) -> Iterator[Row]:
+def _trials(trials: pd.DataFrame, requests: Sequence[Request]) -> Iterator[Row]:
     """How many trials there are in each cell: of the study's trials, or of measures that have several values a cell."""
     recorded = trials[trials["estimator"] == "recorded"]
     if len(recorded):
         yield _per_cell("trials in each cell", None, recorded.groupby(["participant", "condition"]).size())
         return
-    for one in asked:
+    for one in requests:
         rows = one.observations[one.observations["measure"] == one.measure]
         if (rows["n"] > 1).any():
             yield _per_cell("values in each cell", one.measure, rows.groupby(["participant", "condition"])["n"].sum())

@@ -8,18 +8,18 @@ from typing import Any
 import pandas as pd
 
 from pipeline.analysis import orders
-from pipeline.analysis.missing import _check_exclusion, _finite, _gaps, _incomplete_trials, _known, _matches
+from pipeline.analysis.missing import check_exclusion, excludable, finite_values, gaps, incomplete_trials, matches
 from pipeline.analysis.values import (
     CELL,
-    _completion_values,
-    _measures_table,
-    _movement_values,
-    _movements,
-    _path,
-    _rated_values,
-    _selection_values,
-    _tabled_values,
-    _trials,
+    all_movements,
+    all_trials,
+    completion_values,
+    measures_table,
+    movement_values,
+    rated_values,
+    selection_values,
+    table_path,
+    tabled_values,
 )
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
@@ -36,33 +36,33 @@ def run(work: Work) -> Outcome:
     """The study's trials, measures and exclusions; PipelineError for a bad table."""
     study = work.study
     exclusions: list[Row] = []
-    (trials, selections), moved = _trials(work), _movements(work)
-    tabled = _measures_table(work)
+    (trials, selections), moved = all_trials(work), all_movements(work)
+    tabled = measures_table(work)
     values = pd.concat(
         [
-            _selection_values(study, trials),
-            _completion_values(work, exclusions),
-            *_movement_values(moved),
-            *_rated_values(work),
-            *_tabled_values(work, tabled),
+            selection_values(study, trials),
+            completion_values(work, exclusions),
+            *movement_values(moved),
+            *rated_values(work),
+            *tabled_values(work, tabled),
         ]
     ).reset_index(drop=True)
     _check_sources(values)
-    known, everything = _known(work, values, trials) if study.exclusions else values[:0], values
+    known, everything = excludable(work, values, trials) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
-        _check_exclusion(excluded, known)
-        values = values[~_matches(excluded, values)]
+        check_exclusion(excluded, known)
+        values = values[~matches(excluded, values)]
         if excluded.measure is None:
-            trials, selections, moved = (rows[~_matches(excluded, rows)] for rows in (trials, selections, moved))
+            trials, selections, moved = (rows[~matches(excluded, rows)] for rows in (trials, selections, moved))
         exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
-    exclusions += _incomplete_trials(trials, moved)
-    values = _finite(values, exclusions)
+    exclusions += incomplete_trials(trials, moved)
+    values = finite_values(values, exclusions)
     measures = _with_totals(study, _cells(values, CELL), CELL)
-    exclusions += _gaps(work, measures)
+    exclusions += gaps(work, measures)
     run, sequences = _orders(work, tabled)
     _write_values(study, measures, orders.placed(values, run, sequences), work.out)
     if study.exclusions:
-        whole, unfiltered = study.model_copy(update={"exclusions": ()}), _finite(everything, [])
+        whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(everything, [])
         (work.out / ALL_DATA).mkdir()
         counted = _with_totals(whole, _cells(unfiltered, CELL), CELL)
         _write_values(whole, counted, orders.placed(unfiltered, run, sequences), work.out / ALL_DATA)
@@ -82,7 +82,7 @@ def _write_values(study: Study, measures: pd.DataFrame, placed: pd.DataFrame, fo
 
 def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:
     """In which order people met the conditions, and the labels of their sequences."""
-    path = _path(work, "participants")
+    path = table_path(work, "participants")
     return orders.gathered(
         work.study.conditions,
         work.sessions,
@@ -103,7 +103,7 @@ def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str]) -> pd.DataF
     rows = pd.concat([cells, _totals(cells, cell)]).reset_index(drop=True)
     for excluded in study.exclusions:
         if excluded.session is None:
-            rows = rows[~_matches(excluded, rows)]
+            rows = rows[~matches(excluded, rows)]
     return rows.sort_values(["measure", *CELL, "factors"], kind="stable")
 
 

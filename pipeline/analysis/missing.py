@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.analysis.values import CELL, _path
+from pipeline.analysis.values import CELL, table_path
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study import csv_tables as study_tables
@@ -15,7 +15,7 @@ from pipeline.study.settings import Exclusion, Study
 from pipeline.tables.table import Row
 
 
-def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
+def matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
     """Which rows a decision to exclude takes out."""
     hit = pd.Series(True, index=rows.index)
     for column in ("participant", "condition", "session", "measure"):
@@ -25,7 +25,7 @@ def _matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
     return hit.astype(bool)
 
 
-def _known(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
+def excludable(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     """Every combination of ids that an exclusion may name: what is in the data, totals, and sessions set aside."""
     told = [session.ids for session in (*work.sessions, *(aside for aside, _ in work.set_aside))]
     columns = [*CELL, "session", "measure"]
@@ -42,19 +42,19 @@ def _known(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFra
     )
 
 
-def _check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
+def check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
     """An exclusion that fits nothing in the data is an error, for it is likely misspelt."""
     for column in ("participant", "session", "measure"):
         wanted, there = getattr(excluded, column), sorted(set(known[column].dropna()))
         if wanted is not None and wanted not in there:
             hint = did_you_mean(wanted, there)
             raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
-    if not _matches(excluded, known).any():
+    if not matches(excluded, known).any():
         named = ", ".join(f"{key} {value}" for key, value in excluded.model_dump().items() if value and key != "reason")
         raise PipelineError(f"study.yaml: exclusions: nothing in the data fits {named}; there is nothing to exclude")
 
 
-def _incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
+def incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
     """Trials without a measurable selection, a duration or a path of the hand, counted by session or cell."""
     recorded = trials[trials["estimator"] == "recorded"]
     timed = moved[moved["duration_s"].notna()]
@@ -84,7 +84,7 @@ def _incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
     return rows
 
 
-def _finite(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
+def finite_values(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
     """Values that are numbers; the others are listed."""
     bad = values[~np.isfinite(values["value"])]
     for row in bad.itertuples():
@@ -103,11 +103,11 @@ def _finite(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
     return kept
 
 
-def _gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
+def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
     """Participants without a condition, and cells without a measure that others have."""
     listed = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     rows: list[Row] = []
-    path = _path(work, "participants")
+    path = table_path(work, "participants")
     if path is not None:
         named = study_tables.read_participants(path)["participant"]
         for participant in sorted(listed - set(named)):

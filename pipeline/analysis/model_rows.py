@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.analysis import complete_cases as cells
-from pipeline.analysis.complete_cases import Asked
+from pipeline.analysis import complete_cases
+from pipeline.analysis.complete_cases import Request
 from pipeline.errors import PipelineError
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column, Covariate, Factor
@@ -33,26 +33,26 @@ class ModelRows:
     left_out: list[Row]
 
 
-def of_model(asked: Asked) -> ModelRows:
+def of_model(request: Request) -> ModelRows:
     """A participant's mean in each combination of what `fixed` names, as far as there is one; not listwise.
 
     `period` is a slope, `factor(period)` a factor; `carry_over` is the condition of the period before, so that the
     first period, before which nothing came, does not count.
     """
-    terms = list(asked.entry.terms)
+    terms = list(request.entry.terms)
     names = list(dict.fromkeys(name for term in terms for name in term.split(":")))
     told = ("condition", "period", "sequence", CARRY_OVER)
-    rows = cells.with_factors(asked, asked.observations, [name for name in names if name not in told])
+    rows = complete_cases.with_factors(request, request.observations, [name for name in names if name not in told])
     left_out: list[Row] = []
     for name in ("period", "sequence"):
         if name in names or (name == "period" and CARRY_OVER in names):
-            rows, unknown = _known(asked, rows, name)
+            rows, unknown = _known(request, rows, name)
             left_out += unknown
     if CARRY_OVER in names:
-        rows, unknown = _with_carry_over(asked, rows)
+        rows, unknown = _with_carry_over(request, rows)
         left_out += unknown
     means = _means(_means(rows, ["participant", *names, "factors"]), ["participant", *names])
-    columns = {name: _column(asked, name, means[name]) for name in names}
+    columns = {name: _column(request, name, means[name]) for name in names}
     return ModelRows(means["value"].to_numpy(np.float64), list(means["participant"]), columns, terms, left_out)
 
 
@@ -63,24 +63,24 @@ def _means(rows: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     return pd.DataFrame(sums.assign(value=sums["value"] / sums["n"], n=1))
 
 
-def _column(asked: Asked, name: str, values: pd.Series) -> Column:
+def _column(request: Request, name: str, values: pd.Series) -> Column:
     """What a term's name stands for in each row; PipelineError for a factor that has one level."""
-    if name == "period" and asked.entry.period_is_slope:
+    if name == "period" and request.entry.period_is_slope:
         return Covariate(values.to_numpy(np.float64))
-    levels = cells.levels_of(asked.study, "condition" if name == CARRY_OVER else name, values)
+    levels = complete_cases.levels_of(request.study, "condition" if name == CARRY_OVER else name, values)
     levels = [level for level in levels if level in set(values) or name == "condition"]
     if len(levels) < 2:
         raise PipelineError(
-            f'study.yaml: comparisons: "{name}" of "{asked.measure}" has one level in the rows of the model; take it'
+            f'study.yaml: comparisons: "{name}" of "{request.measure}" has one level in the rows of the model; take it'
             " out of fixed"
         )
     codes = np.array([levels.index(value) for value in values], dtype=np.int64)
     return Factor(tuple(str(level) for level in levels), codes)
 
 
-def _with_carry_over(asked: Asked, rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Row]]:
+def _with_carry_over(request: Request, rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Row]]:
     """Rows with the condition that their participant met in the period before, without first periods."""
-    met = asked.observations.dropna(subset="period")
+    met = request.observations.dropna(subset="period")
     before = {
         (participant, int(period) + 1): condition
         for participant, period, condition in zip(met["participant"], met["period"], met["condition"], strict=True)
@@ -88,20 +88,20 @@ def _with_carry_over(asked: Asked, rows: pd.DataFrame) -> tuple[pd.DataFrame, li
     at = [(who, int(period)) for who, period in zip(rows["participant"], rows["period"], strict=True)]
     rows = rows.copy()
     rows[CARRY_OVER] = [before.get(place) for place in at]
-    return _known(asked, rows[[period > 1 for _, period in at]], CARRY_OVER)
+    return _known(request, rows[[period > 1 for _, period in at]], CARRY_OVER)
 
 
-def _known(asked: Asked, rows: pd.DataFrame, name: str) -> tuple[pd.DataFrame, list[Row]]:
+def _known(request: Request, rows: pd.DataFrame, name: str) -> tuple[pd.DataFrame, list[Row]]:
     """The rows that have a period or sequence, and the exclusions for those that have none."""
     lacking = rows[rows[name].isna()]
     if len(lacking) == len(rows):
         raise PipelineError(
-            f'study.yaml: comparisons: {asked.entry.test} of "{asked.measure}" needs to know the'
+            f'study.yaml: comparisons: {request.entry.test} of "{request.measure}" needs to know the'
             f" {name.replace('_', '-')}, and no data say it; {_WHERE}"
         )
     unknown = [
-        cells.left_out(
-            asked, str(participant), f"no {name} is known for {', '.join(dict.fromkeys(found['condition']))}"
+        complete_cases.left_out(
+            request, str(participant), f"no {name} is known for {', '.join(dict.fromkeys(found['condition']))}"
         )
         for participant, found in lacking.groupby("participant", sort=True)
     ]
@@ -119,13 +119,13 @@ class CrossoverRows:
     left_out: list[Row]
 
 
-def of_crossover(asked: Asked) -> CrossoverRows:
+def of_crossover(request: Request) -> CrossoverRows:
     """Participants with a value and a period of their own in each of the two conditions."""
-    complete = cells.by_condition(asked)
-    rows = asked.observations[asked.observations["measure"] == asked.measure]
+    complete = complete_cases.by_condition(request)
+    rows = request.observations[request.observations["measure"] == request.measure]
     rows = rows[rows["participant"].isin(complete.participants)]
-    kept, left_out = _known(asked, rows, "period") if len(rows) else (rows, [])
-    first, second = asked.study.conditions
+    kept, left_out = _known(request, rows, "period") if len(rows) else (rows, [])
+    first, second = request.study.conditions
     when: dict[str, dict[str, set[int]]] = {}
     for who, condition, period in zip(kept["participant"], kept["condition"], kept["period"], strict=True):
         when.setdefault(who, {}).setdefault(condition, set()).add(int(period))
@@ -139,7 +139,9 @@ def of_crossover(asked: Asked) -> CrossoverRows:
             keep.append(index)
             early.append(min(periods[first]) < min(periods[second]))
         else:
-            left_out.append(cells.left_out(asked, participant, "the two conditions do not have a period each"))
+            left_out.append(
+                complete_cases.left_out(request, participant, "the two conditions do not have a period each")
+            )
     people = [complete.participants[index] for index in keep]
     labels = dict(zip(rows["participant"], rows["sequence"], strict=True))
     sequences = _labels([labels.get(person) for person in people], early)

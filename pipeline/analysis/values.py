@@ -22,15 +22,15 @@ from pipeline.tables.table import Row
 CELL = ["participant", "condition"]
 
 
-def _path(work: Work, field: str) -> Any:
+def table_path(work: Work, field: str) -> Any:
     name = getattr(work.study, field)
     return None if name is None else work.folder / name
 
 
-def _trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
+def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown; selections."""
     trials = tables.read("trials", work.entries["assess"])
-    path = _path(work, "trials")
+    path = table_path(work, "trials")
     if path is None:
         return trials, tables.read("selections", work.entries["assess"])
     if len(trials):
@@ -60,11 +60,11 @@ def _trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
     return tables.as_table("trials", tabled), tables.as_table("selections", selected)
 
 
-def _movements(work: Work) -> pd.DataFrame:
+def all_movements(work: Work) -> pd.DataFrame:
     """The movements of all sessions, or of trials.csv in the order of their starts, and whose they are."""
     people = pd.DataFrame([session.ids for session in work.sessions], columns=[*CELL, "session"])
     logged = tables.read("movements", work.entries["assess"]).merge(people.astype("string"), on="session")
-    path = _path(work, "trials")
+    path = table_path(work, "trials")
     if path is None:
         return logged
     table = study_tables.read_trials(path, work.study.conditions).sort_values("start_s", kind="stable")
@@ -92,7 +92,7 @@ def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.Da
     ).astype({"factors": "object", "period": "Int64"})
 
 
-def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
+def selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
     """Squared selection errors and durations, a row a trial; a cell's mean is its measure."""
     recorded = trials[trials["estimator"] == "recorded"]
     selected = recorded[recorded["squared_error_mm2"].notna()]
@@ -107,7 +107,7 @@ def _selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(parts)
 
 
-def _movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
+def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """Throughput, a row a sequence of a session, and what the hand's path says, a row a trial."""
     rows = [
         (*cell, throughput)
@@ -128,7 +128,7 @@ def _movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
         yield _values(for_measures[for_measures[column].notna()], measure, column, "the trials")
 
 
-def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
+def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
     """From session_start to the last selection, a row a session that has both; what does not fit is listed."""
     rows = []
     for session, folder in sorted(zip(work.sessions, work.entries["ingest"], strict=True), key=lambda one: one[0].id):
@@ -152,9 +152,9 @@ def _completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
     return _values(found, "completion_time_s", "seconds", "the events")
 
 
-def _rated_values(work: Work) -> Iterator[pd.DataFrame]:
+def rated_values(work: Work) -> Iterator[pd.DataFrame]:
     """Ratings from questionnaires."""
-    path = _path(work, "questionnaires")
+    path = table_path(work, "questionnaires")
     if path is not None:
         ratings = study_tables.read_questionnaires(path, work.study.conditions)
         ratings["session"] = ratings.get("session")
@@ -162,13 +162,13 @@ def _rated_values(work: Work) -> Iterator[pd.DataFrame]:
         yield _values(ratings, "", "rating", str(work.study.questionnaires)).assign(measure=names)
 
 
-def _measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
+def measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
     """The table of measures and its further factors, if the study has one."""
-    path = _path(work, "measures")
+    path = table_path(work, "measures")
     return None if path is None else study_tables.read_measures(path, work.study.conditions)
 
 
-def _tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:
+def tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:
     """Further dependent variables from the study's table of measures."""
     if tabled is None:
         return
