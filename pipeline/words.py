@@ -229,7 +229,7 @@ def test_label(row: Row) -> str:
     return TESTS[row["test"]].label
 
 
-def comparison_sentence(row: Row, with_reduction: bool = True) -> str:
+def comparison_sentence(row: Row, with_change: bool = True) -> str:
     """One row in APA's manner, without the measure's name."""
     head = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f"{contrast(row)}, "
     if row["status"] != "ok":
@@ -240,8 +240,8 @@ def comparison_sentence(row: Row, with_reduction: bool = True) -> str:
     parts = [f"{named}{head}{evidence(row)}", f"n = {row['n']}"]
     if (row["details"] or {}).get("singular"):
         parts.append("singular fit: no variance between participants is found")
-    if row["reduction"] is not None and with_reduction:
-        parts.append(reduction_phrase(row["reduction"]))
+    if row["mean_difference"] is not None and with_change:
+        parts.append(change_phrase(row))
     return ", ".join(parts)
 
 
@@ -276,8 +276,40 @@ def verdict(row: Row, alpha: float) -> str:
         return "no test is defined"
     if TESTS[row["test"]].question == "equivalence":
         return f"the conditions are {'' if p < alpha else 'not shown to be '}equivalent within the bounds {level}"
-    named = "the difference is" if row["contrast"] is not None or row["reduction"] is not None else _SEVERAL
+    named = "the difference is" if row["contrast"] is not None or row["mean_difference"] is not None else _SEVERAL
     return f"{named} {'' if p < alpha else 'not '}statistically significant {level}"
+
+
+def reduction_of(row: Row) -> float | None:
+    """A row's reduction, where a percentage means something: only on a scale known to have a zero that means none."""
+    return row["reduction"] if measure(row["measure"]).scale == "ratio" else None
+
+
+def amount_of_change(row: Row) -> str:
+    """How much a measure changes, without its direction: `38.3 %`, or the difference in its unit: `0.42 mm`."""
+    reduction = reduction_of(row)
+    if reduction is not None:
+        return percent(abs(reduction))
+    return f"{number(abs(row['mean_difference']))} {unit_of(row['measure'])}".strip()
+
+
+def direction(row: Row) -> str:
+    """Whether the second mean is lower or higher, and better or worse where that is known of the measure."""
+    if row["mean_difference"] == 0:
+        return "the same"
+    side = "lower" if row["mean_difference"] > 0 else "higher"
+    better = measure(row["measure"]).better
+    return side if better == "unknown" else f"{side} ({'better' if side == better else 'worse'})"
+
+
+def change_phrase(row: Row) -> str:
+    """`reduced by 38.3 %`, or where a percentage means nothing `higher by 0.42`."""
+    reduction = reduction_of(row)
+    if reduction is not None:
+        return reduction_phrase(reduction)
+    if row["mean_difference"] == 0:
+        return "the same mean"
+    return f"{'lower' if row['mean_difference'] > 0 else 'higher'} by {amount_of_change(row)}"
 
 
 def reduction_phrase(reduction: float) -> str:

@@ -25,7 +25,7 @@ from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import Result
-from pipeline.study.measures import measure_order
+from pipeline.study.measures import measure, measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 
@@ -58,7 +58,7 @@ def all_requests(study: Study, measures: pd.DataFrame, observations: pd.DataFram
     known = sorted(set(measures["measure"]), key=measure_order)
     for entry in study.comparisons:
         named = _matching(entry.measure, known)
-        yield [Request(study, entry, measure, measures, observations) for measure in named]
+        yield [Request(study, entry, name, measures, observations) for name in named]
 
 
 def _matching(wanted: str, known: Sequence[str]) -> list[str]:
@@ -80,7 +80,7 @@ def _anova(request: Request) -> Answer:
     rows = [_row(request, result) for result in rm_anova(cases.values, request.entry.within)]
     if cases.values.shape[1:] == (2,):
         (pair,) = pairs.of_conditions(cases.values, cases.levels[0])
-        rows = [_diagnosed({**rows[0], **_change(pair)}, pair, cases)]
+        rows = [_diagnosed({**rows[0], **_change(request, pair)}, pair, cases)]
     if request.entry.follow_up != "none":
         for pair in pairs.follow_ups(cases.values, request.entry.within, cases.levels):
             row = _pair_row(request, t_paired(pair.first, pair.second, pair.effect), pair, cases)
@@ -97,7 +97,7 @@ def _friedman(request: Request) -> Answer:
     cases = complete_cases.by_condition(request)
     row = _row(request, friedman(cases.values))
     of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
-    return [{**row, **_change(of_conditions[0])} if len(of_conditions) == 1 else row], cases.left_out
+    return [{**row, **_change(request, of_conditions[0])} if len(of_conditions) == 1 else row], cases.left_out
 
 
 def _pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Callable[[Request], Answer]:
@@ -174,17 +174,22 @@ def _row(request: Request, result: Result) -> Row:
     }
 
 
-def _change(pair: Pair) -> Row:
-    """The mean difference and the reduction of a pair, if anybody is in it."""
+def _change(request: Request, pair: Pair) -> Row:
+    """The mean difference of a pair, if anybody is in it, and the reduction.
+
+    A share of the first mean says something only where zero means none: never on a scale known to be of another kind,
+    and not where a mean is zero or negative, which contradicts such a zero.
+    """
     if not len(pair.first):
         return {}
     first, second = float(np.mean(pair.first)), float(np.mean(pair.second))
-    return {"mean_difference": first - second, "reduction": 1 - second / first if first != 0 else None}
+    has_zero = measure(request.measure).scale in ("ratio", "unknown") and first > 0 and second > 0
+    return {"mean_difference": first - second, "reduction": 1 - second / first if has_zero else None}
 
 
 def _pair_row(request: Request, result: Result, pair: Pair, cases: CompleteCases) -> Row:
     """The row of a test of two conditions."""
-    return _diagnosed({**_row(request, result), **_change(pair), "contrast": pair.contrast}, pair, cases)
+    return _diagnosed({**_row(request, result), **_change(request, pair), "contrast": pair.contrast}, pair, cases)
 
 
 def _diagnosed(row: Row, pair: Pair, cases: CompleteCases) -> Row:

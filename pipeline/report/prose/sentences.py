@@ -18,6 +18,7 @@ from pipeline.words import (
     listing,
     number,
     percent,
+    reduction_of,
     statistic_value,
     subject,
     unit_of,
@@ -95,8 +96,8 @@ def _amount(row: Row, difference: float) -> str:
     size = f"{number(abs(value))} {unit_of(row['measure'])}".strip()
     if value * difference < 0:
         return f"by ranks, while its mean was {'lower' if value > 0 else 'higher'} by {size}"
-    of_first = row["reduction"] is not None and row["effect_size_name"] != "estimate"
-    return f"by {size}" + (f", {percent(abs(row['reduction']))}" if of_first else "")
+    reduction = None if row["effect_size_name"] == "estimate" else reduction_of(row)
+    return f"by {size}" + ("" if reduction is None else f", {percent(abs(reduction))}")
 
 
 def _effect(row: Row, told: Told, what: str) -> str:
@@ -175,7 +176,7 @@ def _difference(row: Row) -> float | None:
         return None if row["effect_size"] is None else float(row["effect_size"])
     if row["mean_difference"] is None:
         return None
-    same = row["reduction"] is not None and abs(row["reduction"]) < _ROUND_OFF
+    same = row["reduction"] is not None and abs(row["reduction"]) < _ROUND_OFF  # of the mean: the means are the same
     return 0.0 if same else float(row["mean_difference"])
 
 

@@ -22,6 +22,7 @@ from pipeline.words import (
     number,
     p_value,
     percent,
+    reduction_of,
     share,
     statistic_name,
     statistic_value,
@@ -47,7 +48,8 @@ def section(material: Material) -> Section | None:
         f" if there were none; the study's level is {100 * material.study.alpha:g} %.",
         columns([title for title, _ in filled], 3),
         tuple(tuple(cell(row) for _, cell in filled) for row in rows),
-        f"{_who_counts(tests)} Mean difference: first minus second condition; reduction: relative to the first.",
+        f"{_who_counts(tests)} Mean difference: first minus second condition. Reduction: relative to the first, of"
+        " measures whose zero means none.",
         tuple(anchor(at) for at in range(len(rows))),
     )
     where = "Every test of the study, a row each. What the words and letters mean stands in the "
@@ -142,6 +144,6 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("p adjusted", _adjusted_p),
     ("Effect size [95 % interval]", effect_size),
     ("Mean difference", lambda row: number(row["mean_difference"])),
-    ("Reduction", lambda row: percent(row["reduction"])),
+    ("Reduction", lambda row: percent(reduction_of(row))),
 )
 """The table's columns; one that no row fills is left out."""

@@ -28,16 +28,17 @@ from pipeline.words import (
     MINUS,
     NOTHING,
     adjustment,
+    amount_of_change,
+    change_phrase,
     comparison_sentence,
     counted,
     decisive_p,
+    direction,
     interval,
     listing,
     measure_label,
     number,
     p_phrase,
-    percent,
-    reduction_phrase,
     short_label,
     statistic,
     unit_of,
@@ -90,9 +91,9 @@ def _sentence(material: Material, row: Row) -> str:
     significant = p is not None and p < study.alpha
     found = f"{p_phrase(p)}, n = {row['n']}"
     told = {one["condition"]: one for one in material.rows("descriptives") if one["measure"] == row["measure"]}
-    if row["reduction"] is not None and set(study.conditions) <= set(told):
+    if row["mean_difference"] is not None and set(study.conditions) <= set(told):
         first, second = study.conditions
-        change = f"{percent(abs(row['reduction']))} {'lower' if row['reduction'] >= 0 else 'higher'}"
+        change = f"{amount_of_change(row)} {direction(row)}" if row["mean_difference"] else "the same"
         means = f"{_mean(told[second])} with {second} against {_mean(told[first])} with {first}"
         sure = "" if significant else ", a difference that is not statistically significant"
         return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({found})."
@@ -220,10 +221,10 @@ def _key_figure(row: Row) -> KeyFigure:
         return KeyFigure("undefined", label, row["status"])
     p = p_phrase(decisive_p(row))
     evidence = f"{statistic(row)}, {p}, n = {row['n']}"
-    if row["reduction"] is None:
+    if row["mean_difference"] is None:
         return KeyFigure(p, label, f"{statistic(row)}, n = {row['n']}")
-    sign = MINUS if row["reduction"] >= 0 else "+"
-    return KeyFigure(f"{sign}{percent(abs(row['reduction']))}", label, evidence)
+    sign = MINUS if row["mean_difference"] >= 0 else "+"
+    return KeyFigure(f"{sign}{amount_of_change(row)}", label, evidence)
 
 
 def _means(material: Material) -> dict[str, tuple[float, int]]:
@@ -248,14 +249,14 @@ def _evidence(material: Material) -> list[Text]:
             answers.append((Strong(f"{label}: "), f"{comparison_sentence(row)}."))
             continue
         change = ""
-        if row["reduction"] is not None:
+        if row["mean_difference"] is not None:
             first, second = material.study.conditions
-            change = f"{reduction_phrase(row['reduction'])} with {second} relative to {first}; "
-        said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
+            change = f"{change_phrase(row)} with {second} relative to {first}; "
+        said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_change=False)})"
         answers.append((Strong(f"{label}: "), f"{change}{said}."))
     for row in _of_conditions(material):
         if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
-            said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_reduction=False)})"
+            said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_change=False)})"
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
     means = _means(material)
