@@ -216,12 +216,15 @@ def corrected(row: Row, digits: int = 4) -> str | None:
     return f"Greenhouse-Geisser ε = {share(details['epsilon_gg'])}, {p_phrase(details['p_gg'], digits=digits)}"
 
 
+def unadjusted_p(row: Row) -> float | None:
+    """The p value before any adjustment over a family: corrected for sphericity where it can be."""
+    corrected_p = (row["details"] or {}).get("p_gg")
+    return row["p"] if corrected_p is None else float(corrected_p)
+
+
 def decisive_p(row: Row) -> float | None:
-    """The p value to judge by: adjusted over its family if it has one, else corrected for sphericity if it can be."""
-    if row["p_adjusted"] is not None:
-        return float(row["p_adjusted"])
-    details = row["details"] or {}
-    return details.get("p_gg") if details.get("p_gg") is not None else row["p"]
+    """The p value to judge by: adjusted over its family if it has one."""
+    return unadjusted_p(row) if row["p_adjusted"] is None else float(row["p_adjusted"])
 
 
 def test_label(row: Row) -> str:
@@ -315,6 +318,11 @@ def change_phrase(row: Row) -> str:
 def reduction_phrase(reduction: float) -> str:
     """`reduced by 38.3 %`, `increased by 4.0 %`."""
     return f"{'reduced' if reduction >= 0 else 'increased'} by {percent(abs(reduction))}"
+
+
+def capitalized(sentence: str) -> str:
+    """With a capital letter first, the rest as it is: names in it keep theirs."""
+    return sentence[:1].upper() + sentence[1:]
 
 
 def listing(words: list[str]) -> str:

@@ -25,6 +25,7 @@ from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import Result
+from pipeline.study.comparison import Comparison
 from pipeline.study.measures import measure, measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
@@ -39,14 +40,16 @@ def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -
     exclusions: list[Row] = []
     if study.comparisons and len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
+    by_entry: list[tuple[Comparison, list[Row]]] = []
     for requests in all_requests(study, measures, observations):
         of_entry: list[Row] = []
         for request in requests:
             answer, incomplete = RUN[request.entry.test](request)
             of_entry += answer
             exclusions += incomplete
-        families.adjust(of_entry)
+        by_entry.append((requests[0].entry, of_entry))
         rows += of_entry
+    families.adjust(by_entry)
     for row in rows:
         row["details"] = json.dumps(row["details"]) if row["details"] else None
     unique = {tuple(sorted(row.items())): row for row in exclusions}
@@ -57,7 +60,7 @@ def all_requests(study: Study, measures: pd.DataFrame, observations: pd.DataFram
     """What each entry asks, one request per measure."""
     known = sorted(set(measures["measure"]), key=measure_order)
     for entry in study.comparisons:
-        named = _matching(entry.measure, known)
+        named = list(dict.fromkeys(name for wanted in entry.measures for name in _matching(wanted, known)))
         yield [Request(study, entry, name, measures, observations) for name in named]
 
 

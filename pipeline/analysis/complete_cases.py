@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
+from pipeline.analysis.factors import Factors, factors_of, missing_cells, parsed
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.comparison import Comparison
@@ -39,15 +39,15 @@ class CompleteCases:
 
 
 def by_condition(request: Request) -> CompleteCases:
-    """Each participant's mean over everything else (n, k)."""
-    wide = tables.participant_means(request.measures, request.measure, request.study.conditions)
-    complete = wide.dropna()
-    return CompleteCases(
-        complete.to_numpy(np.float64),
-        list(complete.index),
-        [list(request.study.conditions)],
-        _incomplete(request, wide),
-    )
+    """Each participant's mean over everything else (n, k), of those who have a value in every cell of it.
+
+    With `missing: available` also of those who lack a cell of a further factor: their mean is over what is there.
+    """
+    rows, factors = rows_and_factors(request, request.measures)
+    wide = tables.participant_means(rows, request.measure, request.study.conditions)
+    levels = [list(request.study.conditions)]
+    complete, left_out = _complete(request, rows, factors, wide)
+    return CompleteCases(complete.to_numpy(np.float64), list(complete.index), levels, left_out)
 
 
 def by_factors_of(request: Request) -> CompleteCases:
@@ -57,29 +57,64 @@ def by_factors_of(request: Request) -> CompleteCases:
 
 def by_factor(request: Request) -> CompleteCases:
     """Each participant's mean by the factors of `within`, in their order (n, k₁, k₂, …)."""
-    rows = with_factors(request, request.measures, request.entry.within)
-    levels = [levels_of(request.study, factor, rows[factor]) for factor in request.entry.within]
-    for factor, found in zip(request.entry.within, levels, strict=True):
-        if len(found) < 2:
+    within = request.entry.within
+    table, factors = rows_and_factors(request, request.measures)
+    rows = with_factors(request, table, within)
+    levels = [levels_of(request.study, factor, rows[factor]) for factor in within]
+    for factor, known in zip(within, levels, strict=True):
+        if factor in factors.between:
             raise PipelineError(
-                f'study.yaml: comparisons: factor "{factor}" of "{request.measure}" has one level: {found[0]}'
+                f'study.yaml: comparisons: "{factor}" of "{request.measure}" does not vary within participants: it'
+                f" tells groups of people apart, and is no factor for within. Write factors: {{{factor}: between}} and"
+                " test: mixed_anova"
             )
-    wide = rows.pivot_table(index="participant", columns=list(request.entry.within), values="value", aggfunc="mean")
-    wide = wide.reindex(columns=pd.MultiIndex.from_product(levels, names=list(request.entry.within)))
-    complete = wide.dropna()
+        if len(known) < 2:
+            raise PipelineError(
+                f'study.yaml: comparisons: factor "{factor}" of "{request.measure}" has one level: {known[0]}'
+            )
+    wide = rows.pivot_table(index="participant", columns=list(within), values="value", aggfunc="mean")
+    wide = wide.reindex(columns=pd.MultiIndex.from_product(levels, names=list(within)))
+    complete, left_out = _complete(request, table, factors, wide)
     values = complete.to_numpy(np.float64).reshape(len(complete), *(len(level) for level in levels))
-    return CompleteCases(values, list(complete.index), levels, _incomplete(request, wide))
+    return CompleteCases(values, list(complete.index), levels, left_out)
+
+
+def rows_and_factors(request: Request, table: pd.DataFrame) -> tuple[pd.DataFrame, Factors]:
+    """The measure's rows of a table without those of levels that are likely misspelt, and what its factors are."""
+    rows = table[table["measure"] == request.measure]
+    factors = factors_of(rows)
+    if factors.rare:
+        odd = {(level.factor, level.level) for level in factors.rare}
+        rows = rows[[not (odd & set(fact.items())) for fact in parsed(rows["factors"])]]
+    return rows, factors
+
+
+def rare_levels(request: Request, factors: Factors) -> list[Row]:
+    """The exclusions for values at levels that are likely misspelt."""
+    return [left_out(request, person, level.reason) for level in factors.rare for person in level.participants]
+
+
+def _complete(
+    request: Request, rows: pd.DataFrame, factors: Factors, wide: pd.DataFrame
+) -> tuple[pd.DataFrame, list[Row]]:
+    """The participants of `wide` who count, and the exclusions of the others (listwise)."""
+    lacking = missing_cells(rows, request.study.conditions, factors.crossed)
+    if request.entry.missing == "available":
+        lacking = {person: cells for person, cells in lacking.items() if wide.loc[person].isna().any()}
+    exclusions = rare_levels(request, factors)
+    exclusions += [left_out(request, person, f"no value in {', '.join(cells)}") for person, cells in lacking.items()]
+    return wide.drop(index=[person for person in lacking if person in wide.index]).dropna(), exclusions
 
 
 def with_factors(request: Request, table: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
     """The measure's rows with a column for each factor; PipelineError for one that some row lacks."""
     rows = table[table["measure"] == request.measure].copy()
-    told = [json.loads(text) if isinstance(text, str) else {} for text in rows["factors"]]
+    facts = parsed(rows["factors"])
     for factor in factors:
         if factor != "condition":
-            rows[factor] = [facts.get(factor) for facts in told]
+            rows[factor] = [fact.get(factor) for fact in facts]
             if rows[factor].isna().any():
-                known = sorted({key for facts in told for key in facts} | {"condition"})
+                known = sorted({key for fact in facts for key in fact} | {"condition"})
                 hint = did_you_mean(factor, known)
                 raise PipelineError(f'study.yaml: comparisons: "{request.measure}" has no factor "{factor}"{hint}')
     return rows
@@ -102,15 +137,3 @@ def left_out(request: Request, participant: str, reason: str) -> Row:
         "what": "left out of comparisons",
         "reason": f"{request.entry.test}: {reason}",
     }
-
-
-def _incomplete(request: Request, wide: pd.DataFrame) -> list[Row]:
-    """Who is left out of a comparison because a cell is missing (listwise)."""
-    found: list[Row] = []
-    for participant in wide.index[wide.isna().any(axis=1)]:
-        absent = [
-            column if isinstance(column, str) else " × ".join(column)
-            for column in wide.columns[wide.loc[participant].isna()]
-        ]
-        found.append(left_out(request, participant, f"no value in {', '.join(absent)}"))
-    return found

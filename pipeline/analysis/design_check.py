@@ -10,7 +10,8 @@ from itertools import combinations
 import pandas as pd
 
 from pipeline.analysis import model_rows, orders
-from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.complete_cases import Request, rows_and_factors
+from pipeline.analysis.factors import Factors, missing_cells
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
 from pipeline.statistics.counterbalancing import balance
@@ -179,21 +180,32 @@ def _tested(result: Result, remark: str, alpha: float) -> Row:
 
 
 def _complete_people(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
-    """Participants who lack a condition in a measure that is compared."""
+    """Participants who lack a condition, or a cell of a further factor, in a measure that is compared."""
     what = "participants with every condition"
     complete: set[int] = set()
     for one in requests:
-        rows = one.measures[one.measures["measure"] == one.measure]
-        met = rows.groupby("participant")["condition"].nunique()
-        whole = int((met == len(study.conditions)).sum())
-        if whole == len(met):
-            complete.add(whole)
+        rows, factors = rows_and_factors(one, one.measures)
+        yield from _rare_levels(one.measure, factors)
+        people = rows["participant"].nunique()
+        lacking = missing_cells(rows, study.conditions, factors.crossed)
+        if not lacking:
+            complete.add(people)
             continue
-        remark = "the others are left out of tests within people, and are listed under exclusions"
-        yield {"what": what, "measure": one.measure, "found": str(whole), "expected": str(len(met)), "remark": remark}
+        told = _names([f"{person} ({', '.join(cells)})" for person, cells in lacking.items()])
+        remark = f"left out of tests within people, where they lack a value: {told}"
+        named = f"{what} and {listing(list(factors.crossed))}" if factors.crossed else what
+        found = str(people - len(lacking))
+        yield {"what": named, "measure": one.measure, "found": found, "expected": str(people), "remark": remark}
     if complete:
         numbers = listing([str(number) for number in sorted(complete)])
         yield {"what": what, "found": f"all, {numbers}", "expected": "all"}
+
+
+def _rare_levels(measure: str, factors: Factors) -> Iterator[Row]:
+    """Levels of a factor that hardly anybody has, and which are likely misspelt."""
+    for level in factors.rare:
+        row = {"what": f"levels of {level.factor}", "measure": measure, "expected": "known of most participants"}
+        yield {**row, "found": f'"{level.level}" of {listing(list(level.participants))} alone', "remark": level.reason}
 
 
 def _trials(trials: pd.DataFrame, requests: Sequence[Request]) -> Iterator[Row]:

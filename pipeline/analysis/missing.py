@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from pipeline.analysis.factors import BETWEEN_FACTORS, factors_of, folded, missing_cells
 from pipeline.analysis.values import CELL, table_path
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, did_you_mean
@@ -122,7 +125,20 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
             if (participant, condition) not in seen and not _decided(work.study, participant, condition, None):
                 cell = {"participant": participant, "condition": condition}
                 rows.append({**cell, "what": "no data", "reason": "the participant has nothing in this condition"})
-    return rows + _missing_cells(work.study, measures, seen)
+    return [*rows, *_look_alikes(listed, seen, work.study.conditions), *_missing_cells(work.study, measures, seen)]
+
+
+def _look_alikes(people: Iterable[str], seen: AbstractSet[tuple[Any, Any]], conditions: Sequence[str]) -> Iterator[Row]:
+    """Ids that differ only in what people overlook, where one of them lacks a condition: likely one person."""
+    alike: dict[str, list[str]] = {}
+    for person in sorted(people):
+        alike.setdefault(folded(person), []).append(person)
+    for ids in alike.values():
+        gaps = any((person, condition) not in seen for person in ids for condition in conditions)
+        if len(ids) > 1 and gaps:
+            named = " and ".join(f'"{person}"' for person in ids)
+            reason = f"{named} differ only in case, spaces or zeros; if they are one person, give them one id"
+            yield {"participant": ids[0], "what": "participants with similar ids", "reason": reason}
 
 
 def _decided(study: Study, participant: str, condition: str, measure: str | None) -> bool:
@@ -135,20 +151,20 @@ def _decided(study: Study, participant: str, condition: str, measure: str | None
 
 def _missing_cells(study: Study, measures: pd.DataFrame, seen: set[Any]) -> list[Row]:
     """Cells, and cells of a further factor, that others have."""
-    rows = []
+    rows: list[Row] = []
     for measure, values in measures.groupby("measure", sort=True):
-        every = sorted({factors for factors in values["factors"] if isinstance(factors, str)})
-        have: dict[Any, set[str]] = {}
-        for row in values.itertuples():
-            have.setdefault((row.participant, row.condition), set()).add(str(row.factors))
+        have = set(zip(values["participant"], values["condition"], strict=True))
+        crossed = factors_of(values).crossed
+        partial = missing_cells(values, study.conditions, crossed) if crossed else {}
         for participant, condition in sorted(seen):
             if _decided(study, participant, condition, str(measure)):
                 continue
-            lacking = [factors for factors in every if factors not in have.get((participant, condition), set())]
-            if (participant, condition) in have and not lacking:
-                continue
-            whole = (participant, condition) not in have
-            at = "" if whole else f" ({'; '.join(lacking)})"
-            cell = {"participant": participant, "condition": condition, "measure": measure}
-            rows.append({**cell, "what": "missing cell", "reason": f"others have this measure{at}"})
+            row: Row = {"participant": participant, "condition": condition, "measure": measure, "what": "missing cell"}
+            of_condition = f"{condition}{BETWEEN_FACTORS}"
+            cells = [cell for cell in partial.get(participant, ()) if cell.startswith(of_condition)]
+            if (participant, condition) not in have:
+                rows.append({**row, "reason": "others have this measure"})
+            elif cells:
+                named = ", ".join(cell.removeprefix(of_condition) for cell in cells)
+                rows.append({**row, "reason": f"others have this measure at {named}"})
     return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ import pandas as pd
 
 from pipeline.analysis import complete_cases
 from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.factors import BETWEEN_FACTORS, missing_cells
 from pipeline.errors import PipelineError
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column, Covariate, Factor
@@ -42,8 +44,13 @@ def of_model(request: Request) -> ModelRows:
     terms = list(request.entry.terms)
     names = list(dict.fromkeys(name for term in terms for name in term.split(":")))
     told = ("condition", "period", "sequence", CARRY_OVER)
-    rows = complete_cases.with_factors(request, request.observations, [name for name in names if name not in told])
-    left_out: list[Row] = []
+    observations, factors = complete_cases.rows_and_factors(request, request.observations)
+    rows = complete_cases.with_factors(request, observations, [name for name in names if name not in told])
+    left_out: list[Row] = complete_cases.rare_levels(request, factors)
+    if request.entry.missing == "listwise":
+        outside = {name: levels for name, levels in factors.crossed.items() if name not in names}
+        rows, partial = _without_partial_conditions(request, rows, outside)
+        left_out += partial
     for name in ("period", "sequence"):
         if name in names or (name == "period" and CARRY_OVER in names):
             rows, unknown = _known(request, rows, name)
@@ -54,6 +61,29 @@ def of_model(request: Request) -> ModelRows:
     means = _means(_means(rows, ["participant", *names, "factors"]), ["participant", *names])
     columns = {name: _column(request, name, means[name]) for name in names}
     return ModelRows(means["value"].to_numpy(np.float64), list(means["participant"]), columns, terms, left_out)
+
+
+def _without_partial_conditions(
+    request: Request, rows: pd.DataFrame, crossed: Mapping[str, Sequence[str]]
+) -> tuple[pd.DataFrame, list[Row]]:
+    """Without what people have in a condition of which they lack a cell of a factor that is not in the model.
+
+    The model takes people who lack a whole condition; a mean over half of a condition's cells would confound the two.
+    """
+    lacking = missing_cells(rows, request.study.conditions, crossed) if crossed else {}
+    met = set(zip(rows["participant"], rows["condition"], strict=True))
+    partial: dict[tuple[str, str], list[str]] = {}
+    for person, cells in lacking.items():
+        for cell in cells:
+            condition = cell.split(BETWEEN_FACTORS)[0]
+            if (person, condition) in met:
+                partial.setdefault((person, condition), []).append(cell)
+    exclusions = [
+        complete_cases.left_out(request, person, f"no value in {', '.join(cells)}, so not counted in {condition}")
+        for (person, condition), cells in partial.items()
+    ]
+    kept = [place not in partial for place in zip(rows["participant"], rows["condition"], strict=True)]
+    return rows[kept], exclusions
 
 
 def _means(rows: pd.DataFrame, keys: list[str]) -> pd.DataFrame:

@@ -31,11 +31,13 @@ _OPTIONS = {option for test in TESTS.values() for option in test.options}
 class Comparison(Frozen):
     """What to test. A key that the test has no use for is an error, for something else was meant."""
 
-    measure: Id
+    measure: Id | Annotated[tuple[Id, ...], Field(min_length=1)]
     test: TestName
     within: tuple[Id, ...] = ("condition",)
     adjust: AdjustmentName = "none"
     follow_up: AdjustmentName = "holm"
+    family: Id | None = None
+    missing: Literal["listwise", "available"] = "listwise"
     zeros: Literal["dropped", "pratt"] = "dropped"
     bounds: tuple[Finite, Finite] | None = None
     prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
@@ -46,13 +48,15 @@ class Comparison(Frozen):
         for key in _OPTIONS - set(TESTS[self.test].options):
             if getattr(self, key) != type(self).model_fields[key].default:
                 raise ValueError(f"{self.test} does not take {key}; it is for {' and '.join(tests_that_take(key))}")
+        if self.family is not None and self.adjust == "none":
+            raise ValueError(f'family "{self.family}" needs an adjustment, such as adjust: holm')
         if self.test == "tost" and self.bounds is None:
             raise ValueError("tost needs bounds, in the unit of the measure, such as bounds: [-5, 5]")
         if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
             raise ValueError(f"bounds need the lower one first, found {list(self.bounds)}")
         for key, names in (("within", self.within), ("fixed", self.terms)):
             if "condition" not in names or len(set(names)) < len(names):
-                raise ValueError(f'{key} of "{self.measure}" needs "condition", and no name twice')
+                raise ValueError(f'{key} of "{self.title}" needs "condition", and no name twice')
         if len(self.within) > 3:
             raise ValueError(f"{self.test} does not take within: {list(self.within)}; three factors are the most")
         for term in self.terms:
@@ -63,6 +67,21 @@ class Comparison(Frozen):
             if len(parts) > 1 and "period" in parts and self.period_is_slope:
                 raise ValueError(f'fixed: "{term}" needs factor(period) in the place of period')
         return self
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """The measures that the entry names, each a name or a pattern."""
+        return (self.measure,) if isinstance(self.measure, str) else self.measure
+
+    @property
+    def title(self) -> str:
+        """The measures as an error names them."""
+        return ", ".join(self.measures)
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The keys that mean something to its test alone."""
+        return TESTS[self.test].options
 
     @property
     def terms(self) -> tuple[str, ...]:

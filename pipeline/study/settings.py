@@ -138,6 +138,7 @@ class Study(Frozen):
                     f"comparisons: crossover is for two conditions, and there are {len(self.conditions)}; mixed_model"
                     " with fixed: [condition, period] takes more"
                 )
+        self._families_fit()
         self._sensors_fit()
         for kind in ("reference", "display"):
             named = [name for name, stream in self.streams.items() if stream.kind == kind]
@@ -148,6 +149,17 @@ class Study(Frozen):
         if not (self.sessions or self.trials or self.questionnaires or self.measures):
             raise ValueError("names no data; give sessions, trials, questionnaires or measures")
         return self
+
+    def _families_fit(self) -> None:
+        """A family is adjusted in one way."""
+        ways: dict[str, str] = {}
+        for comparison in self.comparisons:
+            if (
+                comparison.family is not None
+                and ways.setdefault(comparison.family, comparison.adjust) != comparison.adjust
+            ):
+                ways_named = f"{ways[comparison.family]} and {comparison.adjust}"
+                raise ValueError(f'comparisons: family "{comparison.family}" is adjusted by {ways_named}; keep one')
 
     def exclusion_of(self, session: Session) -> Exclusion | None:
         """The first decision by which a session is left out as a whole."""

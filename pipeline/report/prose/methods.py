@@ -112,7 +112,7 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
         return
     said: dict[str, list[str]] = {}
     for entry in study.comparisons:
-        of = subject(entry.measure).replace(" *", " scales") if "*" in entry.measure else subject(entry.measure)
+        of = listing([_named(pattern) for pattern in entry.measures])
         mine = [row for row in rows if row["test"] == entry.test]
         said.setdefault(_asked(entry, mine) + _followed_up(entry, mine), []).append(of)
     for test, measures in said.items():
@@ -120,6 +120,11 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
         yield "Of more than two conditions p was corrected for sphericity after Greenhouse and Geisser."
     yield f"The level of significance was {_level(study.alpha)}; intervals are of 95 %."
+
+
+def _named(pattern: str) -> str:
+    """The measures that an entry's name or pattern stands for."""
+    return subject(pattern).replace(" *", " scales") if "*" in pattern else subject(pattern)
 
 
 def _level(alpha: float) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
+from pipeline.report.prose.families import families
 from pipeline.report.sections.material import Material
 from pipeline.statistics.diagnostics import OUTLIER_RULE
 from pipeline.study.statistical_tests import TESTS
@@ -13,6 +14,7 @@ from pipeline.tables.table import Row
 from pipeline.words import (
     NOTHING,
     adjustment,
+    capitalized,
     contrast,
     counted,
     degrees_of_freedom,
@@ -70,7 +72,7 @@ def _methods(rows: Sequence[Row]) -> str:
     for row in rows:
         named.setdefault(test_label(row), []).append(row["method"])
     told = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in named.items()]
-    return "; ".join(told) + ". Adjusted p: over the measures of an entry of study.yaml, pairs over those of a measure."
+    return f"{'; '.join(told)}. {capitalized(families(rows))}."
 
 
 def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:

@@ -9,13 +9,14 @@ from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures import captions
 from pipeline.report.figures.canvas import offsets_mm
+from pipeline.report.prose.families import families
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.study.measures import MEASURES, measure
 from pipeline.study.measures import Section as SectionName
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
-    adjustment,
+    capitalized,
     comparison_sentence,
     contrast,
     effect_size,
@@ -217,7 +218,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
         for row in rows
     )
     methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
-    note = f"Methods: {methods}. Adjusted: {_families(rows)}."
+    note = f"Methods: {methods}. {capitalized(families(rows))}."
     caption = (
         f"Tests of the {title} scales. Judge by the adjusted p: with many tests some fall below any level by chance."
     )
@@ -228,16 +229,6 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
         cells,
         note,
     )
-
-
-def _families(rows: list[Row]) -> str:
-    """How p values were adjusted, and over what."""
-    methods = [adjustment(name) for name in dict.fromkeys(row["adjust"] for row in rows) if name != "none"]
-    if not methods:
-        return "no"
-    pairs = len({row["contrast"] for row in rows if row["contrast"] is not None}) > 1
-    over = "the scales, pairs over those of their scale" if pairs else "the scales"
-    return f"{', '.join(methods)} over {over}"
 
 
 def _shown(material: Material) -> Table:

@@ -1,0 +1,143 @@
+"""What the further columns of measures.csv are: factors crossed with people, groups of people, misspelt levels.
+
+A column is taken as study.yaml and the data together allow, never by its name:
+
+- *crossed*: people meet several of its levels, and every level is met by many. Each person then owes a value in each
+  of its cells.
+- *between*: every person has one level, so it tells groups of people apart.
+- neither: everybody meets other levels (a random choice of targets, a time stamp). Nobody owes a value.
+
+A level that one person, or at most a fifth of them, has beside levels that most have is likely a slip of the pen.
+"""
+
+from __future__ import annotations
+
+import json
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from pipeline.errors import did_you_mean
+
+BETWEEN_FACTORS = " × "
+_RARE_SHARE = 0.2
+_COMMON_SHARE = 0.5
+_FEW = 3  # participants: among fewer, one person's level is no exception
+
+
+@dataclass(frozen=True)
+class RareLevel:
+    """A level that hardly anybody has, who has it, and which common level is likely meant."""
+
+    factor: str
+    level: str
+    participants: tuple[str, ...]
+    meant: str | None
+
+    @property
+    def reason(self) -> str:
+        """Why its values are not used, and what to do."""
+        likely = f'; likely "{self.meant}" is meant' if self.meant else ""
+        who = ", ".join(self.participants)
+        return f'only {who} has {self.factor} "{self.level}", which is not used{likely}; check its spelling'
+
+
+@dataclass(frozen=True)
+class Factors:
+    """The further factors of one measure: levels of those crossed with people, names of those between, rare levels."""
+
+    crossed: Mapping[str, tuple[str, ...]]
+    between: tuple[str, ...]
+    rare: tuple[RareLevel, ...]
+
+    def rare_of(self, names: Iterable[str]) -> list[RareLevel]:
+        """Those of some factors."""
+        wanted = set(names)
+        return [level for level in self.rare if level.factor in wanted]
+
+
+def parsed(factors: pd.Series) -> list[dict[str, str]]:
+    """The column `factors` of the tables, JSON text, as mappings."""
+    return [json.loads(text) if isinstance(text, str) else {} for text in factors]
+
+
+def factors_of(rows: pd.DataFrame) -> Factors:
+    """What the further columns of one measure's rows are; rows of the table `measures` or `observations`."""
+    facts = parsed(rows["factors"])
+    people = list(rows["participant"])
+    names = list(dict.fromkeys(name for fact in facts for name in fact))
+    crossed: dict[str, tuple[str, ...]] = {}
+    between: list[str] = []
+    rare: list[RareLevel] = []
+    for name in names:
+        had: dict[str, set[str]] = {}
+        for person, fact in zip(people, facts, strict=True):
+            if name in fact:
+                had.setdefault(fact[name], set()).add(person)
+        of_person: dict[str, int] = {}
+        for who in had.values():
+            for person in who:
+                of_person[person] = of_person.get(person, 0) + 1
+        if len(had) > 1 and max(of_person.values()) == 1:
+            between.append(name)
+            continue
+        odd = _rare_levels(name, had, len(of_person))
+        common = [level for level in had if level not in {one.level for one in odd}]
+        if any(len(had[level]) >= _COMMON_SHARE * len(of_person) for level in common):
+            crossed[name], rare = tuple(common), rare + odd
+    return Factors(crossed, tuple(between), tuple(rare))
+
+
+def _rare_levels(name: str, had: Mapping[str, set[str]], people: int) -> list[RareLevel]:
+    """Levels that hardly anybody has, where others are common."""
+    common = [level for level, who in had.items() if len(who) > _COMMON_SHARE * people]
+    if people < _FEW or not common:
+        return []
+    return [
+        RareLevel(name, level, tuple(sorted(who)), _meant(level, common))
+        for level, who in had.items()
+        if level not in common and (len(who) == 1 or len(who) <= _RARE_SHARE * people)
+    ]
+
+
+def _meant(level: str, common: Sequence[str]) -> str | None:
+    """The common level that a rare one looks like."""
+    alike = next((other for other in common if folded(other) == folded(level)), None)
+    if alike is not None:
+        return alike
+    hint = did_you_mean(level, common)
+    return hint.partition('"')[2].partition('"')[0] if "did you mean" in hint else None
+
+
+def folded(text: str) -> str:
+    """A name without what people overlook: case, white space, invisible characters, leading zeros of numbers."""
+    plain = unicodedata.normalize("NFKC", text).casefold()
+    kept = "".join(mark for mark in plain if not mark.isspace() and unicodedata.category(mark) not in ("Cf", "Cc"))
+    digits = "".join(mark if mark.isdigit() else " " for mark in kept)
+    for number in sorted(set(digits.split()), key=len, reverse=True):
+        kept = kept.replace(number, number.lstrip("0") or "0")
+    return kept.replace("_", "").replace("-", "")
+
+
+def missing_cells(
+    rows: pd.DataFrame, conditions: Sequence[str], crossed: Mapping[str, Sequence[str]]
+) -> dict[str, list[str]]:
+    """The cells in which a person has no value, as people read them, for each person who lacks one.
+
+    A cell is a condition and a level of each crossed factor; those that nobody has are no cells.
+    """
+    facts = parsed(rows["factors"])
+    names = list(crossed)
+    have: dict[str, set[tuple[str, ...]]] = {}
+    for person, condition, fact in zip(rows["participant"], rows["condition"], facts, strict=True):
+        if condition in conditions and all(fact.get(name) in crossed[name] for name in names):
+            have.setdefault(person, set()).add((condition, *(fact[name] for name in names)))
+    order = {condition: at for at, condition in enumerate(conditions)}
+    every = sorted(set().union(*have.values()) if have else set(), key=lambda cell: (order[cell[0]], cell[1:]))
+    people = sorted(set(rows["participant"]))
+    lacking = {
+        person: [BETWEEN_FACTORS.join(cell) for cell in every if cell not in have.get(person, ())] for person in people
+    }
+    return {person: cells for person, cells in lacking.items() if cells}

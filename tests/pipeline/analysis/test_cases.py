@@ -1,0 +1,149 @@
+"""Small invented studies on which a rule around the tests can go wrong, each through its study folder."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.pipeline.helpers import Steadyhand
+
+CASES = Path(__file__).resolve().parents[2] / "data" / "cases"
+
+Results = Callable[[str], dict[str, Any]]
+
+
+@pytest.fixture
+def results(tmp_path: Path, steadyhand: Steadyhand) -> Results:
+    """What `steadyhand compare` writes of a case."""
+
+    def of(case: str) -> dict[str, Any]:
+        study = tmp_path / case
+        shutil.copytree(CASES / case, study)
+        assert steadyhand("compare", study).code == 0
+        return steadyhand.results()
+
+    return of
+
+
+def rows(found: dict[str, Any], test: str, effect: str = "condition") -> list[dict[str, Any]]:
+    return [row for row in found["comparisons"] if row["test"] == test and row["effect"] == effect]
+
+
+def test_the_p_that_is_adjusted_is_the_p_that_is_judged_by(results: Results) -> None:
+    """Holm of two Greenhouse-Geisser p values: twice the smaller, .0482."""
+    time = next(row for row in rows(results("gg_holm"), "rm_anova") if row["measure"] == "time")
+    assert time["details"]["p_gg"] == pytest.approx(0.0482, abs=5e-5)
+    assert time["p_adjusted"] == pytest.approx(2 * time["details"]["p_gg"], rel=1e-12)
+
+
+def test_who_lacks_a_cell_of_a_further_factor_is_not_averaged_over_the_rest(results: Results) -> None:
+    """Three people lack the hard task with B. Of the complete ones p = .14; averaged over what is left it was .046."""
+    found = results("confound")
+    (paired,) = rows(found, "t_paired")
+    assert (paired["n"], round(paired["p"], 2)) == (7, 0.14)
+    whole = [row["p"] for row in rows(found, "rm_anova") if row["contrast"] is None]
+    assert whole == pytest.approx([paired["p"]] * 2)
+    of_condition_alone = rows(found, "mixed_model")[0]
+    assert of_condition_alone["p"] > 0.1
+    remarks = [row["remark"] for row in found["design_check"] if row["remark"]]
+    assert any("P01 (B × hard), P02 (B × hard) and P03 (B × hard)" in remark for remark in remarks)
+
+
+def test_available_cells_are_averaged_where_that_is_asked_for(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    study = tmp_path / "confound"
+    shutil.copytree(CASES / "confound", study)
+    (study / "study.yaml").write_text(
+        "conditions: [A, B]\nmeasures: measures.csv\ncomparisons: [{measure: m, test: t_paired, missing: available}]\n",
+        encoding="utf-8",
+    )
+    assert steadyhand("compare", study).code == 0
+    (row,) = steadyhand.results()["comparisons"]
+    assert row["n"] == 10
+    assert row["p"] == pytest.approx(0.046, abs=5e-4)
+
+
+def test_a_misspelt_level_is_named_and_leaves_the_others_in(results: Results) -> None:
+    found = results("case_level")
+    assert rows(found, "rm_anova")[0]["n"] == 11
+    reasons = {row["participant"]: row["reason"] for row in found["exclusions"] if "Easy" in row["reason"]}
+    assert reasons == {"P01": 'rm_anova: only P01 has target "Easy", which is not used; check its spelling'}
+
+
+def test_ids_that_look_alike_are_named(results: Results) -> None:
+    found = [
+        row["reason"] for row in results("idvariants")["exclusions"] if row["what"] == "participants with similar ids"
+    ]
+    assert [reason.partition(" differ")[0] for reason in found] == [
+        '"P02" and "P2"',
+        '"P1" and "p1"',
+        '"P4" and "P4\u200b"',
+    ]
+
+
+def test_a_column_that_tells_groups_apart_is_no_factor_within(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    shutil.copytree(CASES / "between", tmp_path / "between")
+    ran = steadyhand("compare", tmp_path / "between")
+    assert ran.code == 2
+    assert '"group" of "m" does not vary within participants' in ran.err
+    assert "mixed_anova" in ran.err
+
+
+def test_a_family_may_span_measures_and_entries(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Three tests in two entries, one of them of two measures: Holm's factors are 3, 2 and 1."""
+    study = tmp_path / "family2"
+    shutil.copytree(CASES / "family2", study)
+    (study / "study.yaml").write_text(
+        "conditions: [A, B]\nmeasures: measures.csv\ncomparisons:\n"
+        "  - {measure: [time, error], test: t_paired, adjust: holm, family: main}\n"
+        "  - {measure: time, test: wilcoxon, adjust: holm, family: main}\n",
+        encoding="utf-8",
+    )
+    assert steadyhand("report", study).code == 0
+    found = steadyhand.results()["comparisons"]
+    ranked = sorted(found, key=lambda row: float(row["p"]))
+    expected, largest = [], 0.0
+    for factor, row in zip((3, 2, 1), ranked, strict=True):
+        largest = max(largest, factor * row["p"])
+        expected.append(min(1.0, largest))
+    assert [row["p_adjusted"] for row in ranked] == pytest.approx(expected)
+    assert {(row["details"]["family"], row["details"]["family_size"]) for row in found} == {("main", 3)}
+    page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
+    assert "by Holm over the 3 tests of the family &#34;main&#34;" in page
+
+
+def test_a_family_is_adjusted_in_one_way(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    study = tmp_path / "family2"
+    shutil.copytree(CASES / "family2", study)
+    (study / "study.yaml").write_text(
+        "conditions: [A, B]\nmeasures: measures.csv\ncomparisons:\n"
+        "  - {measure: time, test: t_paired, adjust: holm, family: main}\n"
+        "  - {measure: error, test: t_paired, adjust: bonferroni, family: main}\n",
+        encoding="utf-8",
+    )
+    ran = steadyhand("compare", study)
+    assert ran.code == 2
+    assert 'family "main" is adjusted by holm and bonferroni; keep one' in ran.err
+
+
+def test_no_percentage_of_a_scale_without_a_zero(results: Results, steadyhand: Steadyhand) -> None:
+    """From −0.6 to 1.4 is no reduction by 309.8 %."""
+    found = results("ueq")["comparisons"]
+    assert [row["reduction"] for row in found] == [None, None]
+    assert [row["mean_difference"] < 0 for row in found] == [True, True]
+
+
+def test_the_direction_is_that_of_the_difference(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Means of −0.50 and 0.39: higher by 0.89, and no percentage."""
+    shutil.copytree(CASES / "signed", tmp_path / "signed")
+    ran = steadyhand("report", tmp_path / "signed")
+    assert ran.code == 0
+    assert "higher by 0.89" in ran.out
+    page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
+    assert "0.89 higher with fusion than with kinect" in page
+    assert "176.7" not in page
+    assert json.loads((steadyhand.out / "results.json").read_text())["comparisons"][0]["reduction"] is None
