@@ -10,12 +10,12 @@ keep_apart()
 
 from fusion_core.estimator import Estimator, replay_loop
 from fusion_core.filters import Holt, OneEuro, Raw
-from fusion_core.fusion_kalman import FusionKalman
-from fusion_core.position_kalman import PositionKalman
+from fusion_core.kalman.fusion import FusionKalman
+from fusion_core.kalman.position import PositionKalman
+from fusion_core.kalman.smoothing import fixed_lag, smooth
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import OPERATORS, Sensor, Term
-from fusion_core.smoother import fixed_lag, smooth
-from fusion_core.window_gp import WindowGP
+from fusion_core.window.gp import WindowGP
 
 ESTIMATORS: dict[str, type[Raw | OneEuro | Holt | PositionKalman | WindowGP | FusionKalman]] = {
     "raw": Raw,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusion_core import event_steps
 from fusion_core.estimator import Estimator
-from fusion_core.fusion_kalman import FusionKalman
+from fusion_core.kalman import event_steps
+from fusion_core.kalman.fusion import FusionKalman
 from fusion_core.samples import FloatArray, Samples
 from fusion_core.sensors import position_sensor
 

@@ -10,7 +10,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusion_core import Samples, accuracy, noise
+from fusion_core import Samples, accuracy
+from fusion_core.accuracy import noise
 from pipeline.engine.stage import Outcome, Work
 from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fusion_core import Samples, Sensor
-from fusion_core.alignment import carried, headed, heading, level, nearest, rotate, rotations
-from fusion_core.calibration import Body, Calibration, calibrate, mounted
+from fusion_core.phone.calibration import Body, Calibration, calibrate, mounted
+from fusion_core.phone.orientation import carried, headed, heading, level, nearest, rotate, rotations
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns

@@ -13,8 +13,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
-from fusion_core.alignment import nearest, rotate
-from fusion_core.calibration import Body
+from fusion_core.phone.calibration import Body
+from fusion_core.phone.orientation import nearest, rotate
 from pipeline.sessions.estimators import build_estimator, sensor, sensors
 from pipeline.sessions.phone import Phone, aligned, phone
 from pipeline.statistics.arrays import FloatArray

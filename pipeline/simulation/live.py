@@ -12,11 +12,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from fusion_core import Estimator, FusionKalman, PositionKalman, Raw, Samples, WindowGP, position_steps, window_gains
-from fusion_core.event_replay import arrive
-from fusion_core.event_steps import History, Model, expect
-from fusion_core.event_time import EventTime
-from fusion_core.window_gp import Schedule
+from fusion_core import Estimator, FusionKalman, PositionKalman, Raw, Samples, WindowGP
+from fusion_core.kalman import position_steps
+from fusion_core.kalman.event_replay import arrive
+from fusion_core.kalman.event_steps import History, Model, expect
+from fusion_core.kalman.event_time import EventTime
+from fusion_core.window import weights as window_weights
+from fusion_core.window.gp import Schedule
 from pipeline.simulation.hand_steps import IntArray
 from pipeline.statistics.arrays import FloatArray
 
@@ -127,9 +129,9 @@ def _show_window(window: Schedule, readings: Readings, now: float, index: int, s
             time[0, row], sensor[row] = readings.frame_time[first + row], window.sensors[0]
         for row in range(others):
             time[0, positions + row], sensor[positions + row] = readings.force_time[begin + row], window.sensors[1]
-        weights = window_gains.gains(window.prior, time, np.array([now]), sensor)[0][0]
+        weights = window_weights.gains(window.prior, time, np.array([now]), sensor)[0][0]
     for axis in range(len(shown)):
-        origin = 0.0 if regular or window.prior.mean == window_gains.ZERO else readings.frame_mm[last - 1, axis]
+        origin = 0.0 if regular or window.prior.mean == window_weights.ZERO else readings.frame_mm[last - 1, axis]
         total = origin
         for row in range(positions):
             total += weights[row] * (readings.frame_mm[first + row, axis] - origin)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fusion_core import Estimator, Samples, Sensor, accuracy
-from fusion_core.alignment import rotate, rotations
+from fusion_core.phone.orientation import rotate, rotations
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
 from pipeline.sessions.recording import seeded

@@ -13,7 +13,7 @@ import numpy as np
 
 from fusion_core import Samples, Sensor, WindowGP
 from pipeline.statistics.arrays import FloatArray
-from tests.fusion_core.reference import wiener_acceleration
+from tests.fusion_core.kalman.reference import wiener_acceleration
 
 JERK_PSD_MM2_S5, BIAS_WALK = 1e7, 30.0
 _STATES, _FRAME, _FORCE = 4, np.array([[1.0, 0, 0, 0]]), np.array([[0, 0, 1.0, 1.0]])

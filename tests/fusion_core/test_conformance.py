@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fusion_core import ESTIMATORS, Estimator, Samples, Sensor, replay_loop
-from fusion_core.alignment import rotate
+from fusion_core.phone.orientation import rotate
 
 SENSORS = {"tracker": Sensor("position", 8.0, 0.1, 3), "imu": Sensor("acceleration", 100.0, 0.0, 3)}
 TIMES = np.arange(0.0513, 2.0, 0.0371)  # never at the very instant of an arrival

@@ -9,9 +9,9 @@ from scipy import stats
 from fusion_core import FusionKalman, Samples, WindowGP
 from fusion_core.likelihood import foretold, foretold_by, maximise
 from pipeline.statistics.arrays import FloatArray
-from tests.fusion_core.test_kalman import IMU, TRACKER
-from tests.fusion_core.test_smoother import small
-from tests.fusion_core.test_window_gp import RATED, regular
+from tests.fusion_core.kalman.test_kalman import IMU, TRACKER
+from tests.fusion_core.kalman.test_smoothing import small
+from tests.fusion_core.window.test_gp import RATED, regular
 
 
 def test_the_log_density_is_that_of_each_position_given_those_before() -> None:

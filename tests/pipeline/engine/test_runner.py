@@ -118,7 +118,7 @@ def test_edited_code_invalidates_what_it_touches(monkeypatch: pytest.MonkeyPatch
         after = digests()
         return {name for name in before if before[name] != after[name]}
 
-    assert touched("fusion_core/window_gp.py") == {"fuse", "assess", "compare", "report"}
+    assert touched("fusion_core/window/gp.py") == {"fuse", "assess", "compare", "report"}
     assert touched("pipeline/sessions/logs/mcap/container.py") == {"ingest"}
     assert touched("pipeline/sessions/logs/mcap/protobuf_template.py") == {"ingest"}
     assert touched("pipeline/statistics/rank.py") == {"compare"}

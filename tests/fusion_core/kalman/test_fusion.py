@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusion_core import FusionKalman, Sample, Samples, Sensor, Term, event_steps
-from fusion_core.alignment import rotations
+from fusion_core import FusionKalman, Sample, Samples, Sensor, Term
+from fusion_core.kalman import event_steps
+from fusion_core.phone.orientation import rotations
 from tests.benchmarks import floor
-from tests.fusion_core.test_window_gp import RATED, regular
+from tests.fusion_core.window.test_gp import RATED, regular
 
 SPACE = {"tracker": Sensor("position", 8.0, 0.1), "imu": Sensor("acceleration", 100.0)}
 PLAIN: dict[str, Any] = {"bias_frame": "tracker", "gate_sd": 0.0, "adaptation": 0.0}

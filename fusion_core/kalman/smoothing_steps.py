@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fusion_core.event_steps import JERK_PSD, History, Model, whole_step
+from fusion_core.kalman.event_steps import JERK_PSD, History, Model, whole_step
 from fusion_core.samples import FloatArray
 
 

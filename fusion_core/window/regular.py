@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fusion_core.kernels import IntArray
 from fusion_core.samples import FloatArray
+from fusion_core.window.kernels import IntArray
 
 _REGULAR_NS = 2.0  # stamps in whole ns keep to a rate no better
 _MOST_PATTERNS = 256  # in one batch; windows of others are computed one by one

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from fusion_core.motion import Motion, add_wiener_noise, position_step, step
+from fusion_core.kalman.motion import Motion, add_wiener_noise, position_step, step
 from fusion_core.samples import FloatArray
 
 IntArray = npt.NDArray[np.int64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fusion_core.fusion_kalman import FusionKalman
+from fusion_core.kalman.fusion import FusionKalman
 from fusion_core.samples import FloatArray, Samples
 from fusion_core.sensors import Sensor
 

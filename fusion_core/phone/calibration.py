@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusion_core.alignment import nearest
-from fusion_core.fusion_kalman import FusionKalman
+from fusion_core.kalman.fusion import FusionKalman
+from fusion_core.phone.orientation import nearest
 from fusion_core.samples import FloatArray, Samples
 from fusion_core.sensors import Sensor
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fusion_core.motion import add_wiener_noise
+from fusion_core.kalman.motion import add_wiener_noise
 from fusion_core.samples import FloatArray
 
 

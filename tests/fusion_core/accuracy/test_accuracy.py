@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusion_core import Samples, accuracy, noise
-from fusion_core.alignment import rotate, rotations
-from fusion_core.calibration import Body
+from fusion_core import Samples, accuracy
+from fusion_core.accuracy import noise
+from fusion_core.phone.calibration import Body
+from fusion_core.phone.orientation import rotate, rotations
 from pipeline.statistics.arrays import FloatArray
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusion_core import position_steps
 from fusion_core.checks import require_not_negative, require_positive
 from fusion_core.estimator import replay_loop, unknown
+from fusion_core.kalman import position_steps
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusion_core import lag_steps
+from fusion_core.accuracy import lag_steps
 from fusion_core.samples import FloatArray, Samples
 
 BoolArray = npt.NDArray[np.bool_]

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from fusion_core import fixed_steps
 from fusion_core.estimator import replay_loop, unknown
-from fusion_core.event_steps import SAME_S
-from fusion_core.fixed_steps import Gains, Rows, Schedule
+from fusion_core.kalman import fixed_gain_steps
+from fusion_core.kalman.event_steps import SAME_S
+from fusion_core.kalman.fixed_gain_steps import Gains, Rows, Schedule
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 
@@ -84,7 +84,7 @@ class FixedGain:
 
     def _gains(self, after_s: float) -> Gains:
         imu_rate_hz, tracker_rate_hz = float(self._imu.rate_hz or 1.0), float(self._tracker.rate_hz or 1.0)
-        return fixed_steps.settled(
+        return fixed_gain_steps.settled(
             Schedule(
                 self.jerk_psd_mm2_s5,
                 self.bias_psd,
@@ -110,16 +110,16 @@ class FixedGain:
             waiting = tuple(w for w in state.waiting if w.time > sample.time - self.history_s)
             return replace(state, waiting=(*waiting, sample))
         count = len(state.rows.time)
-        room = fixed_steps.empty_rows(count + 1, self._tracker.dimension)
+        room = fixed_gain_steps.empty_rows(count + 1, self._tracker.dimension)
         value = np.ascontiguousarray(sample.value, dtype=np.float64)
-        if fixed_steps.inserted(self._gains(state.after_s), state.rows, room, sample.time, is_frame, value) == 0:
+        if fixed_gain_steps.inserted(self._gains(state.after_s), state.rows, room, sample.time, is_frame, value) == 0:
             return replace(state, too_late=state.too_late + 1)
         oldest = max(int(np.searchsorted(room.time, room.time[-1] - self.history_s, side="right")) - 1, 0)
         return replace(state, rows=Rows._make(column[oldest:] for column in room))
 
     def _first(self, state: Recent, sample: Sample) -> Recent:
         """Start at the first frame; accelerations wait for it."""
-        rows = fixed_steps.empty_rows(1, self._tracker.dimension)
+        rows = fixed_gain_steps.empty_rows(1, self._tracker.dimension)
         rows.time[0], rows.is_frame[0], rows.value[0], rows.mean[0, 0] = sample.time, True, sample.value, sample.value
         later = [reading for reading in state.waiting if reading.time > sample.time]
         after_s = self._after_s(sample.time, min((reading.time for reading in later), default=None))
@@ -133,7 +133,7 @@ class FixedGain:
         if state.rows is None:
             return unknown(self._tracker.dimension)
         newest = len(state.rows.time) - 1
-        found: tuple[FloatArray, FloatArray] = fixed_steps.expect_one(
+        found: tuple[FloatArray, FloatArray] = fixed_gain_steps.expect_one(
             self._gains(state.after_s), state.rows, newest, time
         )
         return found
@@ -151,8 +151,8 @@ class FixedGain:
         later = np.searchsorted(accelerations.time, frames.time[0], side="right")
         known = later < len(accelerations) and accelerations.arrival[later] <= frames.arrival[0]
         gains = self._gains(self._after_s(frames.time[0], float(accelerations.time[later]) if known else None))
-        ring = fixed_steps.empty_rows(_RING, self._tracker.dimension)
-        mean, sd, whole = fixed_steps.replay(gains, _columns(frames), _columns(accelerations), times, ring)
+        ring = fixed_gain_steps.empty_rows(_RING, self._tracker.dimension)
+        mean, sd, whole = fixed_gain_steps.replay(gains, _columns(frames), _columns(accelerations), times, ring)
         return Track(times, mean, sd) if whole else replay_loop(self, samples, times)
 
 

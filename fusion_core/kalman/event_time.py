@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from fusion_core import event_replay, event_steps
 from fusion_core.estimator import unknown
-from fusion_core.event_steps import History, Model, Readings
+from fusion_core.kalman import event_replay, event_steps
+from fusion_core.kalman.event_steps import History, Model, Readings
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 

@@ -9,15 +9,15 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from fusion_core import kernels, window_batch, window_gains, window_steps
 from fusion_core.checks import require_not_negative, require_one_of, require_positive
 from fusion_core.estimator import replay_loop, require_reading, require_readings, unknown
-from fusion_core.kernels import IntArray
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, Term, position_sensor, require_covered, require_fit
+from fusion_core.window import batch, kernels, regular, weights
+from fusion_core.window.kernels import IntArray
 
 _ACCELERATION = 2
-_MEANS = {"zero": window_gains.ZERO, "constant": window_gains.CONSTANT, "window": window_gains.WINDOW}
+_MEANS = {"zero": weights.ZERO, "constant": weights.CONSTANT, "window": weights.WINDOW}
 _MOST_SETS = 64  # of patterns
 _MOST_PATTERNS = 4096  # of regular windows whose weights are remembered
 Pattern = tuple[int, int, int, int]
@@ -31,7 +31,7 @@ class Schedule(NamedTuple):
     which: IntArray
     weights: FloatArray
     sensors: tuple[int, int]  # the tracker's and the other's index in `prior`
-    prior: window_gains.Prior
+    prior: weights.Prior
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class WindowGP:
 
     def _gains(self, time: FloatArray, now: FloatArray, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         """As `gains`, of readings at `time` (n, m) when it is `now` (n,)."""
-        found: tuple[FloatArray, FloatArray] = window_gains.gains(
+        found: tuple[FloatArray, FloatArray] = weights.gains(
             self._prior, time, now, np.array([self._index[name] for name in names], np.int64)
         )
         return found
@@ -122,9 +122,9 @@ class WindowGP:
         return {name: index for index, name in enumerate(self.sensors)}
 
     @cached_property
-    def _prior(self) -> window_gains.Prior:
+    def _prior(self) -> weights.Prior:
         accelerations = np.array([sensor.order == _ACCELERATION for sensor in self.sensors.values()])
-        return window_gains.Prior(
+        return weights.Prior(
             float(self.signal_variance_mm2),
             _MEANS[self.mean],
             kernels.covariances(
@@ -223,9 +223,9 @@ class WindowGP:
         if self._regular_names is not None:
             n_positions = names.count(self._tracker)
             rates = [float(self.sensors[name].rate_hz or 0.0) for name in self._regular_names]
-            if window_steps.is_regular(measured, n_positions, rates[0], rates[-1]):
-                newest = int(window_steps.in_ns(now - measured[n_positions - 1]))
-                last = int(window_steps.in_ns(now - measured[-1])) if len(names) > n_positions else 0
+            if regular.is_regular(measured, n_positions, rates[0], rates[-1]):
+                newest = int(regular.in_ns(now - measured[n_positions - 1]))
+                last = int(regular.in_ns(now - measured[-1])) if len(names) > n_positions else 0
                 return self._of_pattern((n_positions, len(names) - n_positions, newest, last))
         weights, variance = self._gains(measured[None, :], np.array([now]), names)
         return weights[0], variance[0]
@@ -294,7 +294,7 @@ class WindowGP:
             left = self._regular_windows(frames, others, times, spans, mean, sd)
         if len(left):
             other = self._index[names[0]] if names else 0
-            streams = window_batch.Streams(
+            streams = batch.Streams(
                 self._index[self._tracker],
                 np.ascontiguousarray(frames.time, dtype=np.float64),
                 np.ascontiguousarray(frames.value, dtype=np.float64),
@@ -302,11 +302,11 @@ class WindowGP:
                 np.ascontiguousarray(others.time, dtype=np.float64),
                 np.ascontiguousarray(others.value, dtype=np.float64),
             )
-            window_batch.estimates(self._prior, streams, times, spans, left, mean, sd)
+            batch.estimates(self._prior, streams, times, spans, left, mean, sd)
         return Track(times, mean, sd)
 
     def _spans(self, frames: Samples, others: Samples, times: FloatArray) -> IntArray:
-        found: IntArray = window_steps.spans(
+        found: IntArray = regular.spans(
             times, frames.time, frames.arrival, others.time, others.arrival, self.window, self.horizon_s
         )
         return found
@@ -323,7 +323,7 @@ class WindowGP:
         which, weights = np.full(len(times), -1), np.empty((0, 0))
         if self._regular_names is not None:
             rates = [float(self.sensors[name].rate_hz or 1.0) for name in self._regular_names]
-            which, patterns = window_steps.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
+            which, patterns = regular.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
             weights, _ = self._of_patterns(patterns)
         sensors = (self._index[self._tracker], self._index[names[0]] if names else 0)
         return Schedule(spans, which, weights, sensors, self._prior)
@@ -340,9 +340,9 @@ class WindowGP:
         """Fills the rows of regular windows by the weights of their patterns; returns the rows that are left."""
         names = self._regular_names or ()
         rates = [float(self.sensors[name].rate_hz or 1.0) for name in names]
-        which, patterns = window_steps.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
+        which, patterns = regular.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
         weights, spread = self._of_patterns(patterns)
-        window_steps.apply(
+        regular.apply(
             which,
             spans,
             weights,

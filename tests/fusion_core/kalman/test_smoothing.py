@@ -8,10 +8,10 @@ import pytest
 from fusion_core import FusionKalman, Samples, fixed_lag, smooth
 from pipeline.statistics.arrays import FloatArray
 from tests.benchmarks import floor
+from tests.fusion_core.kalman.test_fusion import PLAIN, SPACE
+from tests.fusion_core.kalman.test_kalman import IMU, TRACKER, dense_posterior
 from tests.fusion_core.test_conformance import recording
-from tests.fusion_core.test_fusion_kalman import PLAIN, SPACE
-from tests.fusion_core.test_kalman import IMU, TRACKER, dense_posterior
-from tests.fusion_core.test_window_gp import RATED
+from tests.fusion_core.window.test_gp import RATED
 
 
 def until(samples: dict[str, Samples], now: float) -> dict[str, Samples]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusion_core import FusionKalman, PositionKalman, Sample, Samples, Sensor, position_steps
-from tests.fusion_core.reference import wiener_acceleration
+from fusion_core import FusionKalman, PositionKalman, Sample, Samples, Sensor
+from fusion_core.kalman import position_steps
+from tests.fusion_core.kalman.reference import wiener_acceleration
 
 TRACKER = Sensor("position", 8.0, 0.1, 1)
 IMU = Sensor("acceleration", 100.0, 0.0, 1)

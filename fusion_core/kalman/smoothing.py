@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fusion_core import smoothing_steps
 from fusion_core.checks import require_not_negative
 from fusion_core.estimator import require_readings
-from fusion_core.event_time import EventTime
-from fusion_core.fusion_kalman import FusionKalman
+from fusion_core.kalman import smoothing_steps
+from fusion_core.kalman.event_time import EventTime
+from fusion_core.kalman.fusion import FusionKalman
 from fusion_core.samples import FloatArray, Samples, Track
 
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fusion_core import Samples, Sensor
-from fusion_core.alignment import carried, headed, heading, level, rotate, rotations
-from fusion_core.calibration import Body, calibrate, mounted
+from fusion_core.phone.calibration import Body, calibrate, mounted
+from fusion_core.phone.orientation import carried, headed, heading, level, rotate, rotations
 from pipeline.statistics.arrays import FloatArray
 
 TRACKER, IMU = Sensor("position", 8.0, 0.1), Sensor("acceleration", 100.0)

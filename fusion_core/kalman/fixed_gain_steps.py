@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from fusion_core.event_steps import SAME_S
-from fusion_core.motion import add_wiener_noise
+from fusion_core.kalman.event_steps import SAME_S
+from fusion_core.kalman.motion import add_wiener_noise
 from fusion_core.samples import FloatArray
 
 STATES = 4  # position, velocity, acceleration and bias of one axis

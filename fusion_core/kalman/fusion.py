@@ -11,10 +11,10 @@ import numpy as np
 
 from fusion_core.checks import require_not_negative, require_one_of, require_positive
 from fusion_core.estimator import require_reading, require_readings
-from fusion_core.event_steps import Model
-from fusion_core.event_time import EventTime
-from fusion_core.fixed_gain import FixedGain
-from fusion_core.motion import Matern72, Prior, Wiener
+from fusion_core.kalman.event_steps import Model
+from fusion_core.kalman.event_time import EventTime
+from fusion_core.kalman.fixed_gain import FixedGain
+from fusion_core.kalman.motion import Matern72, Prior, Wiener
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor, require_covered, require_fit
 

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from fusion_core.kernels import Covariances, IntArray, covariance
 from fusion_core.samples import FloatArray
+from fusion_core.window.kernels import Covariances, IntArray, covariance
 
 ZERO, CONSTANT, WINDOW = 0, 1, 2  # the mean of the prior
 

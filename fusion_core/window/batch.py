@@ -4,7 +4,7 @@ Covariances of readings among themselves do not depend on "now": each is compute
 into the window. A window that only gained readings at its end goes on with the Cholesky factor it has; where its first
 readings changed the factor is begun again. With the factor L, of covariances k with "now", of c, what each reads of a
 constant, and of values v, the estimate is (L⁻¹k)·(L⁻¹v), so that weights are never needed: eqs. (19) to (24) as in
-`window_gains`.
+`weights`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fusion_core.kernels import IntArray, covariance
 from fusion_core.samples import FloatArray
-from fusion_core.window_gains import CONSTANT, WINDOW, ZERO, Prior, gains
+from fusion_core.window.kernels import IntArray, covariance
+from fusion_core.window.weights import CONSTANT, WINDOW, ZERO, Prior, gains
 
 
 class Streams(NamedTuple):
@@ -74,7 +74,7 @@ def estimates(
     mean: FloatArray,
     sd: FloatArray,
 ) -> None:
-    """Fills the rows `wanted` of mean and sd (n, d); `window_spans` (4, n) are those of `window_steps.spans`."""
+    """Fills the rows `wanted` of mean and sd (n, d); `window_spans` (4, n) are those of `regular.spans`."""
     most, most_others, dimension = 0, 0, mean.shape[1]
     for index in wanted:
         first, last, begin, end = window_spans[:, index]

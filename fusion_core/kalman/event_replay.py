@@ -5,10 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fusion_core.event_steps import JERK_PSD, History, Model, Readings, begin, insert, oldest_needed, write_expected
-from fusion_core.motion import position_step
+from fusion_core.kalman.event_steps import (
+    JERK_PSD,
+    History,
+    Model,
+    Readings,
+    begin,
+    insert,
+    oldest_needed,
+    write_expected,
+)
+from fusion_core.kalman.motion import position_step
+from fusion_core.kalman.smoothing_steps import smoothed_at
 from fusion_core.samples import FloatArray
-from fusion_core.smoothing_steps import smoothed_at
 
 
 @njit(cache=True)
