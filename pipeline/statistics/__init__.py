@@ -13,6 +13,11 @@ CONFOUNDED = "undefined: nobody has values in two conditions, so the effect cann
 ALIASED = "undefined: the terms of the model cannot be told apart in these data"
 TOO_FEW_VALUES = "undefined: too few values for the terms of the model"
 ONE_ORDER = "undefined: everybody met the conditions in the same order"
+TOO_FEW_GROUPS = "undefined: there are fewer than two groups"
+EMPTY_GROUP = "undefined: a group has no participant"
+ONE_IN_GROUP = "undefined: a group has only one participant"
+EQUAL_IN_GROUP = "undefined: all values of one group are equal, so its mean has no standard error"
+EQUAL_IN_GROUPS = "undefined: no value varies within its group, so there is no error to test against"
 
 STATUSES = (
     OK,
@@ -25,4 +30,9 @@ STATUSES = (
     ALIASED,
     TOO_FEW_VALUES,
     ONE_ORDER,
+    TOO_FEW_GROUPS,
+    EMPTY_GROUP,
+    ONE_IN_GROUP,
+    EQUAL_IN_GROUP,
+    EQUAL_IN_GROUPS,
 )

@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy import optimize, special, stats
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(800)
-_LARGEST = 1e5  # of a noncentrality: beyond it the distributions are not computed
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
+_STEP = np.array([-9.0, 9.0])  # where Φ is neither 0 nor 1
+_WIDEST = 1e6  # beyond this times what was found, no bound is looked for
+_LARGEST = 1e5  # noncentrality for which SciPy's noncentral F is used: beyond it gives NaN
 
 
 def cohen_dz(differences: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
@@ -18,28 +20,41 @@ def cohen_dz(differences: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float
 
 def dz_interval(dz: float, n: int, level: float = 0.95) -> tuple[float | None, float | None]:
     """Interval of d_z from the noncentral t distribution."""
-    t, tail = dz * np.sqrt(n), (1 - level) / 2
-    width = 10 + abs(t)
+    return standardized_interval(float(dz * np.sqrt(n)), n - 1, float(n**-0.5), level)
+
+
+def standardized_interval(t: float, df: float, error: float, level: float = 0.95) -> tuple[float | None, float | None]:
+    """Interval of a standardized difference, which is t times `error`: from the noncentralities that fit t."""
+    tail = (1 - level) / 2
 
     def bound(target: float) -> float | None:
-        found = _solve(lambda shift: noncentral_t_cdf(t, n - 1, shift) - target, t - width, t + width)
-        return None if found is None else float(found / np.sqrt(n))
+        width = 10 + abs(t)
+        # Of one degree of freedom t may be a small part of its noncentrality: the bracket grows until it holds it.
+        while width < _WIDEST * (10 + abs(t)):
+            found = _solve(lambda shift: noncentral_t_cdf(t, df, shift) - target, t - width, t + width)
+            if found is not None:
+                return found * error
+            width *= 4
+        return None
 
     return bound(1 - tail), bound(tail)
 
 
-def noncentral_t_cdf(t: float, df: int, noncentrality: float) -> float:
+def noncentral_t_cdf(t: float, df: float, noncentrality: float) -> float:
     """P(T ≤ t) as E[Φ(t·s − δ)] over s = √(χ²/df), by Gauss and Legendre.
 
-    SciPy's own gives NaN for negative t far from zero; in the middle the two agree to 1e-10.
+    SciPy's own gives NaN for negative t far from zero; in the middle the two agree to 1e-10. For a large t, Φ is a
+    step as narrow as 1/t: its surroundings are integrated apart.
     """
-    low, high = np.sqrt(stats.chi2.ppf(1e-18, df)), np.sqrt(stats.chi2.isf(1e-18, df))
-    at = (_NODES + 1) / 2 * (high - low) + low
-    density = _WEIGHTS * (high - low) / 2 * stats.chi.pdf(at, df)
-    return float(np.sum(density * special.ndtr(t * at / np.sqrt(df) - noncentrality)))
+    edges = np.sqrt(np.array([stats.chi2.ppf(1e-18, df), stats.chi2.isf(1e-18, df)]) / df)
+    if t != 0:
+        edges = np.unique(np.clip([*edges, *((noncentrality + _STEP) / t)], *edges))
+    at = (_NODES + 1) / 2 * np.diff(edges)[:, None] + edges[:-1, None]
+    density = _WEIGHTS * np.diff(edges)[:, None] / 2 * stats.chi.pdf(at * np.sqrt(df), df) * np.sqrt(df)
+    return float(np.sum(density * special.ndtr(t * at - noncentrality)))
 
 
-def hedges_correction(df: int) -> float | None:
+def hedges_correction(df: float) -> float | None:
     """The exact small-sample factor J (Hedges 1981); None for one degree of freedom, where it is zero."""
     if df < 2:
         return None
@@ -55,6 +70,8 @@ def partial_eta_squared_interval(
     def below(noncentrality: float) -> float:
         if noncentrality == 0:
             return float(stats.f.cdf(statistic, df1, df2))
+        if noncentrality > _LARGEST:  # there a noncentral χ is normal around √(λ + df1 − 1), to five digits
+            return noncentral_t_cdf(np.sqrt(statistic * df1), df2, np.sqrt(noncentrality + df1 - 1))
         return float(stats.ncf.cdf(statistic, df1, df2, noncentrality))
 
     bounds: list[float | None] = []
@@ -63,7 +80,7 @@ def partial_eta_squared_interval(
             bounds.append(0.0)
             continue
         upper = max(10.0, 4 * statistic * df1)
-        while below(upper) > target and upper < _LARGEST:
+        while below(upper) > target and upper < _WIDEST * statistic * df1:
             upper *= 2
         found = _solve(lambda value, target=target: below(value) - target, 0.0, upper)  # type: ignore[misc]
         bounds.append(None if found is None else found / (found + df2))

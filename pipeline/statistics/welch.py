@@ -1,0 +1,138 @@
+"""Means of groups whose variances may differ: Welch's t and analysis of variance, and Games and Howell's pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from pipeline.statistics import with_pingouin
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.diagnostics import normality
+from pipeline.statistics.effect_size import hedges_correction, partial_eta_squared_interval, standardized_interval
+from pipeline.statistics.groups import at_unit_scale, untestable, unweightable
+from pipeline.statistics.result import Result
+
+Interval = tuple[float | None, float | None]
+
+_GAMES_HOWELL = "Games and Howell's test, p over all pairs"
+_SPREADS: dict[str, Literal["mean", "median"]] = {"levene": "mean", "brown_forsythe": "median"}
+
+
+def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Result:
+    """Welch's t of the means of first (n₁,) and second (n₂,), two-sided, with Satterthwaite's degrees of freedom.
+
+    Effect size: Cohen's d_s over the pooled SD with its noncentral-t interval (Lakens 2013). That interval takes the
+    variances as equal, as d_s does; of d_av in the details, over the root of their mean, it does not (Delacre et al.
+    2021), and leaves out 0 exactly where p is below .05.
+    """
+    blank = Result(effect, "t", "Welch's t test, two-sided", "Cohen's d_s", len(first) + len(second))
+    (one, other), exponent = at_unit_scale([first, second])
+    if status := untestable([one, other]):
+        return replace(blank, status=status)
+    sizes = np.array([len(one), len(other)])
+    variances = np.array([np.var(one, ddof=1), np.var(other, ddof=1)])
+    difference = float(one.mean() - other.mean())
+    shares = variances / sizes
+    error = float(np.sqrt(shares.sum()))
+    df = float(shares.sum() ** 2 / np.sum(shares**2 / (sizes - 1)))
+    statistic, margin = difference / error, float(stats.t.ppf(0.975, df)) * error
+    pooled_df = float(sizes.sum() - 2)
+    pooled = float(np.sqrt(np.sum((sizes - 1) * variances) / pooled_df))
+    d, d_ci = _standardized(difference, pooled, pooled * float(np.sqrt(np.sum(1 / sizes))), pooled_df)
+    d_av, d_av_ci = _standardized(difference, float(np.sqrt(variances.mean())), error, df)
+    correction = hedges_correction(pooled_df) or 0.0
+    return replace(
+        blank,
+        statistic=statistic,
+        df2=df,
+        p=float(2 * stats.t.sf(abs(statistic), df)),
+        effect_size=d,
+        ci_low=d_ci[0],
+        ci_high=d_ci[1],
+        details={
+            "hedges_gs": correction * d,
+            "hedges_gs_ci": [None if bound is None else correction * bound for bound in d_ci],
+            "d_av": d_av,
+            "d_av_ci": list(d_av_ci),
+            "ci_difference": [float(np.ldexp(difference + sign * margin, exponent)) for sign in (-1, 1)],
+            "n_groups": [int(size) for size in sizes],
+            **spreads([one, other]),
+            **_normality([one, other]),
+        },
+    )
+
+
+def _standardized(difference: float, sd: float, error: float, df: float) -> tuple[float, Interval]:
+    """A difference over an SD, and its interval from the t that is the difference over its standard error."""
+    return difference / sd, standardized_interval(difference / error, df, error / sd)
+
+
+def anova_welch(groups: Sequence[FloatArray], effect: str = "group") -> Result:
+    """Welch's F (1951) of the means of groups (n₁,), (n₂,), …
+
+    Effect size: partial η² as F and its degrees of freedom give it, with the interval of the noncentral F.
+    """
+    n = sum(len(group) for group in groups)
+    blank = Result(effect, "F", "Welch's analysis of variance", "partial eta squared", n, df1=float(len(groups) - 1))
+    scaled, _ = at_unit_scale(groups)
+    if status := unweightable(scaled):
+        return replace(blank, status=status)
+    statistic, df1, df2, p = with_pingouin.welch_anova(scaled)
+    low, high = partial_eta_squared_interval(statistic, df1, df2)
+    return replace(
+        blank,
+        statistic=statistic,
+        df2=df2,
+        p=p,
+        effect_size=statistic * df1 / (statistic * df1 + df2),
+        ci_low=low,
+        ci_high=high,
+        details={"n_groups": [len(group) for group in groups], **spreads(scaled), **_normality(scaled)},
+    )
+
+
+def games_howell(groups: Sequence[FloatArray], names: Sequence[str], effect: str = "group") -> list[Result]:
+    """Every two groups after Welch's analysis, whose p holds for all pairs together (Games and Howell 1976).
+
+    t and the effect size are those of `t_welch`; p and the interval of the difference are of the studentized range.
+    """
+    pairs = list(combinations(range(len(groups)), 2))
+    results = [
+        replace(t_welch(groups[i], groups[j], effect), method=_GAMES_HOWELL, contrast=f"{names[i]} - {names[j]}")
+        for i, j in pairs
+    ]
+    scaled, exponent = at_unit_scale(groups)
+    if status := unweightable(scaled):
+        blank = Result(effect, "t", _GAMES_HOWELL, "Cohen's d_s", 0, status=status)
+        return [replace(blank, n=result.n, contrast=result.contrast) for result in results]
+    for at, (t, df, error, p) in enumerate(with_pingouin.games_howell(scaled)):
+        margin = float(stats.studentized_range.ppf(0.95, len(groups), df)) / np.sqrt(2) * error
+        interval = [float(np.ldexp(t * error + sign * margin, exponent)) for sign in (-1, 1)]
+        results[at] = replace(results[at], p=p, details={**results[at].details, "ci_difference": interval})
+    return results
+
+
+def spreads(groups: Sequence[FloatArray]) -> dict[str, float | None]:
+    """Do the groups spread alike? Levene's F around the means, Brown and Forsythe's around the medians.
+
+    None where the deviations do not vary within any group, as in groups of two.
+    """
+    found: dict[str, float | None] = {}
+    for name, center in _SPREADS.items():
+        middle = np.mean if center == "mean" else np.median
+        deviations = [np.abs(group - middle(group)) for group in groups]
+        defined = untestable(deviations) is None
+        f, p = with_pingouin.levene(groups, center) if defined else (None, None)
+        found |= {f"{name}_f": f, f"{name}_p": p}
+    return found
+
+
+def _normality(groups: Sequence[FloatArray]) -> dict[str, list[float | None]]:
+    """Shapiro and Wilk's W and p of each group."""
+    found = [normality(group) for group in groups]
+    return {f"groups_{name}": [one[name] for one in found] for name in ("shapiro_w", "shapiro_p")}
