@@ -18,6 +18,8 @@ EMPTY_GROUP = "undefined: a group has no participant"
 ONE_IN_GROUP = "undefined: a group has only one participant"
 EQUAL_IN_GROUP = "undefined: all values of one group are equal, so its mean has no standard error"
 EQUAL_IN_GROUPS = "undefined: no value varies within its group, so there is no error to test against"
+ONE_ITEM = "undefined: a scale of one item has no internal consistency"
+NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
 
 STATUSES = (
     OK,
@@ -35,4 +37,6 @@ STATUSES = (
     ONE_IN_GROUP,
     EQUAL_IN_GROUP,
     EQUAL_IN_GROUPS,
+    ONE_ITEM,
+    NO_TOTAL_VARIES,
 )

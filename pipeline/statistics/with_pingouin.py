@@ -68,3 +68,12 @@ def _table(groups: Sequence[FloatArray]) -> pd.DataFrame:
 
     number = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     return pd.DataFrame({"group": number, "value": np.concatenate(groups)})
+
+
+def cronbach_alpha(items: FloatArray) -> float:
+    """Of ratings (n, k)."""
+    with _quiet():
+        import pandas as pd
+        import pingouin
+
+        return float(pingouin.cronbach_alpha(data=pd.DataFrame(items))[0])

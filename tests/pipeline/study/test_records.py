@@ -12,6 +12,7 @@ from pipeline.analysis.comparisons import RUN
 from pipeline.report.prose import references
 from pipeline.study.comparison import Comparison
 from pipeline.study.measures import MEASURES, QUESTIONNAIRES, Section, measure, measure_order
+from pipeline.study.scoring import RULES
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from pipeline.words import measure_label
 
@@ -25,6 +26,7 @@ def test_what_is_cited_stands_in_the_bibliography() -> None:
     for keys in (*(one.cite for one in MEASURES.values()), *(one.cite for one in QUESTIONNAIRES.values())):
         cited.update(keys)
     cited.update(key for one in TESTS.values() for key in one.cite)
+    cited.update(key for one in RULES.values() for key in one.cite)
     assert cited <= set(references.entries())
 
 

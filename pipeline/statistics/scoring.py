@@ -1,0 +1,145 @@
+"""Scores of questionnaires, from a table item → rating, and how well the items of a scale agree."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate
+from math import comb, isfinite
+
+import numpy as np
+from scipy import stats
+
+from pipeline.statistics import NO_TOTAL_VARIES, NO_VARIATION, ONE_ITEM, with_pingouin
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.instrument import Scale
+from pipeline.statistics.result import Result, negligible, too_few
+
+MISSING, OUT_OF_RANGE, IMPOSSIBLE_WEIGHTS = "missing", "out of range", "weights that no comparison of pairs gives"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why scores are undefined: an item's rating or weight is missing or out of range, or the weights do not add up.
+
+    `item` is empty where it is the weights as a whole; `value` is what was found (then their sum), None if nothing.
+    """
+
+    item: str
+    what: str
+    value: float | None
+    scores: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A participant's scores in one condition, None where one is undefined, and every reason for that."""
+
+    scores: Mapping[str, float | None]
+    faults: tuple[Fault, ...]
+
+
+def scored(
+    ratings: Mapping[str, float | None],
+    scales: Sequence[Scale],
+    limits: tuple[float, float],
+    reversed_items: Collection[str] = (),
+    weights: Mapping[str, float | None] | None = None,
+) -> Scored:
+    """The scores of one participant in one condition from ratings by item; items of no scale are ignored.
+
+    A score is undefined where one of its items is missing (absent, None or NaN) or outside the `limits`, the lowest
+    and the highest answer. A weighted score also needs possible `weights` by item: how often each item was chosen
+    when every two were compared.
+    """
+    known = {item: _number(ratings.get(item)) for scale in scales for item in scale.items}
+    faults = [
+        Fault(item, what, value, tuple(scale.name for scale in scales if item in scale.items))
+        for item, value in known.items()
+        if (what := _wrong(value, limits)) is not None
+    ]
+    chosen = {item: _number(value) for item, value in (weights or {}).items()}
+    faults += [fault for scale in scales if scale.weighted for fault in _weight_faults(scale, chosen)]
+    undefined = {name for fault in faults for name in fault.scores}
+    turned = {
+        item: sum(limits) - value if item in reversed_items else value
+        for item, value in known.items()
+        if value is not None
+    }
+    return Scored(
+        {scale.name: None if scale.name in undefined else _score(scale, turned, chosen, limits) for scale in scales},
+        tuple(faults),
+    )
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or not isfinite(value) else float(value)
+
+
+def _wrong(value: float | None, limits: tuple[float, float]) -> str | None:
+    if value is None:
+        return MISSING
+    return None if limits[0] <= value <= limits[1] else OUT_OF_RANGE
+
+
+def _weight_faults(scale: Scale, weights: Mapping[str, float | None]) -> Iterator[Fault]:
+    """Weights of k items: whole numbers up to k − 1, and any j of them sum to at least j(j − 1)/2 (Landau 1953)."""
+    found = [weights.get(item) for item in scale.items]
+    most = len(scale.items) - 1
+    single = [_wrong(weight, (0, most)) for weight in found]
+    yield from (
+        Fault(item, f"weight {what}", weight, (scale.name,))
+        for item, weight, what in zip(scale.items, found, single, strict=True)
+        if what is not None
+    )
+    if any(single):
+        return
+    whole = sorted(weight for weight in found if weight is not None)
+    sums = list(accumulate(whole))
+    enough = all(total >= comb(count, 2) for count, total in enumerate(sums, 1))
+    if sums[-1] != comb(len(whole), 2) or not enough or any(weight % 1 for weight in whole):
+        yield Fault("", IMPOSSIBLE_WEIGHTS, sums[-1], (scale.name,))
+
+
+def _score(
+    scale: Scale,
+    turned: Mapping[str, float],
+    weights: Mapping[str, float | None],
+    limits: tuple[float, float],
+) -> float:
+    """A score whose items are all there; reversed ones are turned already."""
+    low, high = limits
+    values = np.array([turned[item] for item in scale.items])
+    weigh = np.array([weights.get(item) or 0.0 for item in scale.items]) if scale.weighted else None
+    mean = float(np.average(values, weights=weigh))
+    read = {
+        "mean": mean,
+        "sum": float(np.sum(values)),
+        "centred": mean - (low + high) / 2,
+        "percent": 100 * (mean - low) / (high - low),
+        "points": float(np.sum(values - low)),
+    }
+    return scale.factor * read[scale.reading]
+
+
+def cronbach_alpha(items: FloatArray) -> Result:
+    """Cronbach's (1951) α of ratings (n, k), reversed items turned already, with Feldt's (1965) 95 % interval.
+
+    α = k/(k − 1) · (1 − Σ item variances / variance of the sums), as pingouin computes it. The interval is our own:
+    pingouin rounds its bounds to three decimals.
+    """
+    n, k = items.shape
+    blank = Result("items", "alpha", "Cronbach's alpha, interval by Feldt", "Cronbach's alpha", n)
+    totals = items.sum(axis=1)
+    status = too_few(n) or (ONE_ITEM if k < 2 else None)
+    if status is None and negligible(float(np.sum((totals - totals.mean()) ** 2)), items):
+        varies = not negligible(float(np.sum((items - items.mean(axis=0)) ** 2)), items)
+        status = NO_TOTAL_VARIES if varies else NO_VARIATION
+    if status is not None:
+        return replace(blank, status=status)
+    alpha = with_pingouin.cronbach_alpha(items)
+    df1, df2 = n - 1, (n - 1) * (k - 1)
+    low, high = (1 - (1 - alpha) * float(stats.f.ppf(level, df1, df2)) for level in (0.975, 0.025))
+    return replace(
+        blank, statistic=alpha, df1=df1, df2=df2, effect_size=alpha, ci_low=low, ci_high=high, details={"items": k}
+    )
