@@ -46,6 +46,7 @@ STAGE_OF: Mapping[str, str] = {
             "quality",
             "exclusions",
             "printed",
+            "reliability",
         ),
         "compare",
     ),

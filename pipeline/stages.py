@@ -36,6 +36,7 @@ STAGES: tuple[Stage, ...] = (
             "conditions",
             "display",
             "exclusions",
+            "scoring",
             "participants",
             "trials",
             "questionnaires",

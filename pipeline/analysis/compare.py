@@ -39,6 +39,7 @@ def run(work: Work) -> Outcome:
     found: dict[str, pd.DataFrame] = {
         "trials": tables.read("trials", measured),
         "measures": measures,
+        "reliability": tables.read("reliability", measured),
         "descriptives": tables.frame("descriptives", descriptives(study, measures)),
     }
     observations = tables.read("observations", measured)

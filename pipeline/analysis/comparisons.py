@@ -26,7 +26,7 @@ from pipeline.statistics.pairs import Pair
 from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import Result
 from pipeline.study.comparison import Comparison
-from pipeline.study.measures import measure, measure_order
+from pipeline.study.measures import has_total, measure, measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 
@@ -71,10 +71,27 @@ def _matching(wanted: str, known: Sequence[str]) -> list[str]:
         found = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
     else:
         found = [name for name in known if name == wanted]
+    if not found and wanted.endswith("/total"):
+        found = _only_score(wanted.removesuffix("total"), known)
     if not found:
         hint = did_you_mean(wanted, known)
         raise PipelineError(f'study.yaml: comparisons: there is no measure "{wanted}" in the data{hint}')
     return found
+
+
+def _only_score(prefix: str, known: Sequence[str]) -> list[str]:
+    """What is meant by the total of an instrument that has a single score; PipelineError for one without a rule."""
+    mine = [name for name in known if name.startswith(prefix)]
+    if len(mine) == 1:
+        return mine
+    if mine and not has_total(prefix.removesuffix("/")):
+        questionnaire = prefix.removesuffix("/")
+        raise PipelineError(
+            f'study.yaml: comparisons: "{questionnaire}" has no total, for nothing says how it is scored; state'
+            f" scoring: {{{questionnaire}: {{rule: sum, range: [lowest, highest answer]}}}}, or compare"
+            f" {questionnaire}/*"
+        )
+    return []
 
 
 def _anova(request: Request) -> Answer:

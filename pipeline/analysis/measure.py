@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pandas as pd
 
 from pipeline.analysis import orders
 from pipeline.analysis.missing import check_exclusion, excludable, finite_values, gaps, incomplete_trials, matches
+from pipeline.analysis.scores import instruments, items_of, reliability, score_values
 from pipeline.analysis.values import (
     CELL,
     all_movements,
@@ -24,6 +26,7 @@ from pipeline.analysis.values import (
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
 from pipeline.study import csv_tables as study_tables
+from pipeline.study.measures import has_total, reported_scales
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
@@ -48,6 +51,11 @@ def run(work: Work) -> Outcome:
         ]
     ).reset_index(drop=True)
     _check_sources(values)
+    scored_by = instruments(study, sorted(set(values["measure"])))
+    counts_in = items_of(scored_by)
+    agreement = list(reliability(scored_by, values))
+    scores = score_values(scored_by, values, exclusions)
+    values = pd.concat([values[~values["measure"].isin(_only_items(counts_in))], scores]).reset_index(drop=True)
     known, everything = excludable(work, values, trials) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
         check_exclusion(excluded, known)
@@ -67,10 +75,16 @@ def run(work: Work) -> Outcome:
         counted = _with_totals(whole, _cells(unfiltered, CELL), CELL)
         _write_values(whole, counted, orders.placed(unfiltered, run, sequences), work.out / ALL_DATA)
     tables.write("orders", run, work.out)
+    tables.write("reliability", tables.frame("reliability", agreement), work.out)
     tables.write("trials", trials, work.out)
     tables.write("selections", selections, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
+
+
+def _only_items(counts_in: Mapping[str, Sequence[str]]) -> list[str]:
+    """The items that are nothing but items: what an instrument reports by itself, as the NASA-TLX does, stays."""
+    return [name for name in counts_in if name.partition("/")[2] not in reported_scales(name.partition("/")[0])]
 
 
 def _write_values(study: Study, measures: pd.DataFrame, placed: pd.DataFrame, folder: Path) -> None:
@@ -108,7 +122,10 @@ def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str]) -> pd.DataF
 
 
 def _totals(cells: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
-    """`<questionnaire>/total`: a participant's sum over the scales; none where a scale is missing."""
+    """`nasa_tlx/total`: a participant's plain sum over the scales; none where a scale is missing.
+
+    Of the instruments only those have one whose record says that people report a sum.
+    """
     parts = [str(measure).partition("/") for measure in cells["measure"]]
     told = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
     ratings = told[told["scale"] != ""]
@@ -116,7 +133,7 @@ def _totals(cells: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
     keys = [*cell, "factors"]
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
         scales = set(answered["scale"])
-        if "total" in scales:
+        if "total" in scales or not has_total(str(questionnaire)):
             continue
         for found, rated in answered.groupby(keys, dropna=False, sort=False):
             if set(rated["scale"]) == scales:

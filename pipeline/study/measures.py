@@ -7,7 +7,7 @@ may be said of it and which direction is better follow from its record, and from
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Literal
 
@@ -55,6 +55,8 @@ class Questionnaire:
     scales: tuple[str, ...] = ()
     better: Better = "unknown"
     cite: tuple[str, ...] = ()
+    has_total: bool = False
+    score_labels: Mapping[str, str] = field(default_factory=dict)
 
 
 _FITTS = ("soukoreff2004", "iso9241411")
@@ -105,9 +107,30 @@ QUESTIONNAIRES: Mapping[str, Questionnaire] = {
             ("mental", "physical", "temporal", "performance", "effort", "frustration"),
             "lower",
             ("hart1988",),
+            has_total=True,
+            score_labels={
+                "total": "total (plain sum)",
+                "raw_tlx": "raw score (0–100)",
+                "weighted_tlx": "weighted score (0–100)",
+            },
         ),
-        Questionnaire("sus", "SUS", cite=("brooke1996",)),
-        Questionnaire("ueq", "UEQ", cite=("laugwitz2008",)),
+        Questionnaire("sus", "SUS", better="higher", cite=("brooke1996",), score_labels={"score": "score (0–100)"}),
+        Questionnaire(
+            "ueq",
+            "UEQ",
+            ("attractiveness", "perspicuity", "efficiency", "dependability", "stimulation", "novelty"),
+            "higher",
+            ("laugwitz2008",),
+        ),
+        Questionnaire("ueq_s", "UEQ-S", ("pragmatic", "hedonic", "overall"), "higher", ("schrepp2017",)),
+        Questionnaire("ssq", "SSQ", ("nausea", "oculomotor", "disorientation"), "lower", ("kennedy1993",)),
+        Questionnaire(
+            "ipq",
+            "IPQ",
+            ("general_presence", "spatial_presence", "involvement", "realism"),
+            "higher",
+            ("schubert2001",),
+        ),
     )
 }
 
@@ -145,7 +168,7 @@ def _rating(name: str, questionnaire: str, scale: str) -> Measure:
     order = known.scales.index(scale) if scale in known.scales else len(known.scales)
     return Measure(
         name,
-        f"{known.label}: {_spaced(scale).lower()}",
+        f"{known.label}: {known.score_labels.get(scale, _spaced(scale).lower())}",
         scale="interval",
         better=known.better,
         section="ratings",
@@ -154,6 +177,16 @@ def _rating(name: str, questionnaire: str, scale: str) -> Measure:
         questionnaire=questionnaire,
         order=_LAST if scale == _TOTAL else order,
     )
+
+
+def has_total(questionnaire: str) -> bool:
+    """Do people report the plain sum of its scales?"""
+    return questionnaire in QUESTIONNAIRES and QUESTIONNAIRES[questionnaire].has_total
+
+
+def reported_scales(questionnaire: str) -> tuple[str, ...]:
+    """The scales of a known instrument that are reported beside its scores."""
+    return QUESTIONNAIRES[questionnaire].scales if questionnaire in QUESTIONNAIRES else ()
 
 
 def measure_order(name: str) -> tuple[str, int, str]:

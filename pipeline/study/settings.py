@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.study.comparison import Comparison
 from pipeline.study.fields import Axes, Frozen, Id, Positive, known, unique
+from pipeline.study.scoring_settings import Scoring
 from pipeline.study.session import Session, check_pattern
 from pipeline.study.simulation import Simulation, Task
 from pipeline.study.streams import AccelerationStream, PositionStream, Sensing, Stream
@@ -112,6 +113,7 @@ class Study(Frozen):
     measures: str | None = None
     printed: str | None = None
     repeats: str | None = None
+    scoring: Mapping[Id, Scoring] = {}
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()

@@ -348,6 +348,17 @@ TABLES: Mapping[str, pa.Schema] = {
         ("participants_high", _COUNT),
         ("status", _TEXT),
     ),
+    "reliability": _schema(
+        ("measure", _TEXT),
+        ("rule", _TEXT),
+        ("items", _COUNT),
+        ("n", _COUNT),
+        ("alpha", _FLOAT),
+        ("ci_low", _FLOAT),
+        ("ci_high", _FLOAT),
+        ("assumes", _TEXT),
+        ("status", _TEXT),
+    ),
     "printed": _schema(
         ("what", _TEXT),
         ("check", _TEXT),

@@ -31,6 +31,7 @@ LISTS = (
     "printed",
     "design_check",
     "simulated_reductions",
+    "reliability",
 )
 
 

@@ -147,3 +147,78 @@ def test_the_direction_is_that_of_the_difference(tmp_path: Path, steadyhand: Ste
     assert "0.89 higher with fusion than with kinect" in page
     assert "176.7" not in page
     assert json.loads((steadyhand.out / "results.json").read_text())["comparisons"][0]["reduction"] is None
+
+
+TLX = ("mental", "physical", "temporal", "performance", "effort", "frustration")
+
+
+def questionnaire(folder: Path, settings: str, rows: list[str]) -> Path:
+    folder.mkdir()
+    (folder / "study.yaml").write_text(f"conditions: [A, B]\nquestionnaires: q.csv\n{settings}", encoding="utf-8")
+    header = "participant,condition,questionnaire,scale,rating\n"
+    (folder / "q.csv").write_text(header + "\n".join(rows) + "\n", encoding="utf-8")
+    return folder
+
+
+def test_a_sus_is_scored_by_its_rule(results: Results) -> None:
+    """(odd − 1, 5 − even) × 2.5: A 82.8, B 52.2, the opposite of the sums."""
+    found = results("sus")
+    means = {row["condition"]: row["mean"] for row in found["descriptives"] if row["measure"] == "sus/score"}
+    assert {name: round(mean, 1) for name, mean in means.items()} == {"A": 82.8, "B": 52.2}
+    (row,) = found["comparisons"]
+    assert (row["measure"], round(row["statistic"], 1), row["df2"]) == ("sus/score", 15.4, 7)
+    assert {row["measure"] for row in found["descriptives"]} == {"sus/score"}
+    assert [row["items"] for row in found["reliability"]] == [10]
+
+
+def test_a_raw_tlx_needs_its_range_and_is_a_mean_from_0_to_100(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Hart 2006: the raw TLX is the mean of the six ratings; on a sheet from 0 to 20 a 5 is a quarter of the way."""
+    rows = [f"P{p},{c},nasa_tlx,{s},{5 * (1 + (c == 'B'))}" for p in (1, 2, 3) for c in "AB" for s in TLX]
+    ask = "comparisons: [{measure: nasa_tlx/raw_tlx, test: t_paired}]\n"
+    ran = steadyhand("compare", questionnaire(tmp_path / "a", f"scoring: {{nasa_tlx: raw_tlx}}\n{ask}", rows))
+    assert ran.code == 2
+    assert "rule raw_tlx needs range, the lowest and the highest answer" in ran.err
+    scoring = "scoring: {nasa_tlx: {rule: raw_tlx, range: [0, 20]}}\n"
+    assert steadyhand("compare", questionnaire(tmp_path / "b", scoring + ask, rows)).code == 0
+    found = steadyhand.results()["descriptives"]
+    means = {(row["measure"], row["condition"]): row["mean"] for row in found}
+    assert (means["nasa_tlx/raw_tlx", "A"], means["nasa_tlx/raw_tlx", "B"]) == (25.0, 50.0)
+    assert means["nasa_tlx/total", "A"] == 30.0  # the plain sum stays, and says so by its label
+
+
+def test_an_answer_out_of_range_or_missing_is_named_and_leaves_out_that_score(
+    tmp_path: Path, steadyhand: Steadyhand
+) -> None:
+    rows = [f"P{p},{c},sus,q{i},{3 + (p + i) % 2}" for p in (1, 2, 3, 4) for c in "AB" for i in range(1, 11)]
+    rows = [row.replace("P1,A,sus,q3,3", "P1,A,sus,q3,7").replace("P1,A,sus,q3,4", "P1,A,sus,q3,7") for row in rows]
+    rows = [row for row in rows if not row.startswith("P2,B,sus,q7,")]
+    study = questionnaire(tmp_path / "a", "comparisons: [{measure: sus/score, test: wilcoxon}]\n", rows)
+    assert steadyhand("compare", study).code == 0
+    found = steadyhand.results()
+    assert found["comparisons"][0]["n"] == 2
+    reasons = {row["participant"]: row["reason"] for row in found["exclusions"] if row["what"] == "score undefined"}
+    assert reasons == {
+        "P1": "q3 is 7.00, outside 1 to 5; state the range under scoring",
+        "P2": "q7 is missing",
+    }
+
+
+def test_an_instrument_without_a_rule_has_no_total(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    rows = [f"P{p},{c},mine,q{i},{p + i}" for p in (1, 2, 3) for c in "AB" for i in (1, 2)]
+    study = questionnaire(tmp_path / "a", "comparisons: [{measure: mine/total, test: wilcoxon}]\n", rows)
+    ran = steadyhand("compare", study)
+    assert ran.code == 2
+    assert '"mine" has no total, for nothing says how it is scored; state scoring: {mine:' in ran.err
+
+
+def test_a_rule_of_ones_own_turns_its_reversed_items(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """On 1 to 7 a reversed 6 counts 2: the mean of 5 and 2 is 3.5."""
+    rows = [f"P{p},{c},mine,{item},{value}" for p in (1, 2) for c in "AB" for item, value in (("q1", 5), ("q2", 6))]
+    scoring = "scoring: {mine: {rule: mean, range: [1, 7], reversed: [q2]}}\n"
+    ask = "comparisons: [{measure: mine/score, test: wilcoxon}]\n"
+    assert steadyhand("compare", questionnaire(tmp_path / "a", scoring + ask, rows)).code == 0
+    assert {row["mean"] for row in steadyhand.results()["descriptives"]} == {3.5}
+    wrong = scoring.replace("[q2]", "[q3]")
+    ran = steadyhand("compare", questionnaire(tmp_path / "b", wrong + ask, rows))
+    assert ran.code == 2
+    assert 'scoring.mine.reversed: there is no item "q3"' in ran.err
