@@ -104,6 +104,7 @@ def test_units_are_in_the_names_of_columns() -> None:
         "ci_low",
         "ci_high",
         "published_reduction",
+        "alpha",
     }
     units = ("_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95", "_deg")
     for name, schema in TABLES.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +55,7 @@ def run(work: Work) -> Outcome:
     counts_in = items_of(scored_by)
     agreement = list(reliability(scored_by, values))
     scores = score_values(scored_by, values, exclusions)
+    names = {name for one in scored_by for name in one.scores}
     values = pd.concat([values[~values["measure"].isin(_only_items(counts_in))], scores]).reset_index(drop=True)
     known, everything = excludable(work, values, trials) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
@@ -65,15 +66,15 @@ def run(work: Work) -> Outcome:
         exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
     exclusions += incomplete_trials(trials, moved)
     values = finite_values(values, exclusions)
-    measures = _with_totals(study, _cells(values, CELL), CELL)
+    measures = _with_totals(study, _cells(values, CELL), CELL, names)
     exclusions += gaps(work, measures)
     run, sequences = _orders(work, tabled)
-    _write_values(study, measures, orders.placed(values, run, sequences), work.out)
+    _write_values(study, measures, orders.placed(values, run, sequences), names, work.out)
     if study.exclusions:
         whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(everything, [])
         (work.out / ALL_DATA).mkdir()
-        counted = _with_totals(whole, _cells(unfiltered, CELL), CELL)
-        _write_values(whole, counted, orders.placed(unfiltered, run, sequences), work.out / ALL_DATA)
+        counted = _with_totals(whole, _cells(unfiltered, CELL), CELL, names)
+        _write_values(whole, counted, orders.placed(unfiltered, run, sequences), names, work.out / ALL_DATA)
     tables.write("orders", run, work.out)
     tables.write("reliability", tables.frame("reliability", agreement), work.out)
     tables.write("trials", trials, work.out)
@@ -87,11 +88,13 @@ def _only_items(counts_in: Mapping[str, Sequence[str]]) -> list[str]:
     return [name for name in counts_in if name.partition("/")[2] not in reported_scales(name.partition("/")[0])]
 
 
-def _write_values(study: Study, measures: pd.DataFrame, placed: pd.DataFrame, folder: Path) -> None:
+def _write_values(
+    study: Study, measures: pd.DataFrame, placed: pd.DataFrame, scores: Collection[str], folder: Path
+) -> None:
     """A study's values: a mean a cell, and the same with their session, period and sequence."""
     observed = [*CELL, "session", "period", "sequence"]
     tables.write("measures", measures, folder)
-    tables.write("observations", _with_totals(study, _cells(placed, observed), observed), folder)
+    tables.write("observations", _with_totals(study, _cells(placed, observed), observed, scores), folder)
 
 
 def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -112,23 +115,23 @@ def _cells(values: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
     return pd.DataFrame(found.agg(["mean", "size"]).reset_index()).rename(columns={"mean": "value", "size": "n"})
 
 
-def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
+def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:
     """Cells and the questionnaires' totals, less those that study.yaml excludes, in the order of the table."""
-    rows = pd.concat([cells, _totals(cells, cell)]).reset_index(drop=True)
+    rows = pd.concat([cells, _totals(cells, cell, scores)]).reset_index(drop=True)
     for excluded in study.exclusions:
         if excluded.session is None:
             rows = rows[~matches(excluded, rows)]
     return rows.sort_values(["measure", *CELL, "factors"], kind="stable")
 
 
-def _totals(cells: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
+def _totals(cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:
     """`nasa_tlx/total`: a participant's plain sum over the scales; none where a scale is missing.
 
     Of the instruments only those have one whose record says that people report a sum.
     """
     parts = [str(measure).partition("/") for measure in cells["measure"]]
     told = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
-    ratings = told[told["scale"] != ""]
+    ratings = told[(told["scale"] != "") & ~told["measure"].isin(list(scores))]
     rows = []
     keys = [*cell, "factors"]
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
