@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 from dataclasses import fields
+from typing import get_args
 
 import pytest
 import yaml
@@ -21,7 +22,7 @@ from pipeline.study.csv_tables import (
 from pipeline.study.fields import Frozen
 from pipeline.study.folder import load_study
 from pipeline.study.settings import Display, QualityLimits, Study
-from pipeline.study.streams import KINDS, OperatorTerm
+from pipeline.study.streams import OperatorTerm, Stream
 from pipeline.study.yaml_text import parse
 from pipeline.tables.columns import TABLES
 from tests.conftest import CLONE
@@ -45,7 +46,7 @@ def test_every_key_of_a_study_is_in_the_reference() -> None:
     assert {re.findall(r"`(\w+)`", line)[0] for line in table.splitlines() if line.startswith("| `")} == set(
         Study.model_fields
     )
-    models: list[type[Frozen]] = [*KINDS.values(), OperatorTerm, Display, Comparison, QualityLimits]
+    models: list[type[Frozen]] = [*get_args(get_args(Stream)[0]), OperatorTerm, Display, Comparison, QualityLimits]
     for model in models:
         for key in model.model_fields:
             assert f"`{key}`" in REFERENCE, key

@@ -104,13 +104,3 @@ Stream = Annotated[
     PositionStream | VelocityStream | LinearStream | AccelerationStream | ReferenceStream | DisplayStream,
     Field(discriminator="kind"),
 ]
-
-
-KINDS: dict[object, type[Frozen]] = {
-    "position": PositionStream,
-    "velocity": VelocityStream,
-    "linear": LinearStream,
-    "acceleration": AccelerationStream,
-    "reference": ReferenceStream,
-    "display": DisplayStream,
-}

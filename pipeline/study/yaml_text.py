@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study.simulation import SIMULATIONS
-from pipeline.study.streams import KINDS
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -97,15 +97,14 @@ def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Mo
 
 def _explained(fault: Any, model: type[BaseModel]) -> str:
     """One fault of pydantic's in the user's words."""
-    location = [part for part in fault["loc"] if part not in (*KINDS, *SIMULATIONS) or part is fault["loc"][0]]
-    field = ".".join(str(part) for part in location)
+    words, there = _followed(model, fault["loc"])
+    field = ".".join(str(word) for word in words)
     if fault["type"] == "extra_forbidden":
-        return f'unknown key "{field}"{did_you_mean(str(location[-1]), _keys_at(model, fault["loc"][:-1]))}'
+        return f'unknown key "{field}"{did_you_mean(str(words[-1]), _keys_at(model, fault["loc"][:-1]))}'
     if fault["type"] == "missing":
         return f'"{field}" is missing'
     if fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        kinds = SIMULATIONS if location[:1] == ["simulation"] else KINDS
-        return f'"{field}" needs a kind: {", ".join(str(kind) for kind in kinds)}'
+        return f'"{field}" needs a kind: {", ".join(str(kind) for each in there for kind in _kinds(each))}'
     message = fault["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
     found = fault.get("input")
@@ -113,28 +112,52 @@ def _explained(fault: Any, model: type[BaseModel]) -> str:
     return f'"{field}": {message}{shown}' if field else f"{message}{shown}"
 
 
-def _keys_at(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
-    """The keys that are known where an unknown one stood."""
-    models = [model]
+def _followed(model: type[BaseModel], location: Sequence[object]) -> tuple[list[object], list[Any]]:
+    """The keys of a location that the user wrote, and the types that may stand there.
+
+    Where several models share a place and their `kind` tells them apart, pydantic adds the kind to the location, after
+    the key. Only the model says which is which, for a key may be any word: a stream can be called "display".
+    """
+    words: list[object] = []
+    there: list[Any] = [model]
     for part in location:
-        inner = [kind for outer in models for kind in _models_of(outer, part)]
-        models = inner or [kind for kind in models if part in _kinds(kind)] or models
-    return [field.alias or name for name, field in models[0].model_fields.items()]
+        of_kind = [each for each in there if part in _kinds(each)]
+        if of_kind and sum(bool(_kinds(each)) for each in there) > 1:
+            there = of_kind
+        else:
+            words.append(part)
+            there = [inner for each in there for inner in _inside(each, part)]
+    return words, there
 
 
-def _models_of(model: type[BaseModel], key: object) -> list[type[BaseModel]]:
-    """The models that a key of a model holds, in a list or a mapping or by itself."""
-    field = next((field for name, field in model.model_fields.items() if key in (name, field.alias)), None)
-    pending, found = [] if field is None else [field.annotation], []
-    while pending:
-        annotation: Any = pending.pop()
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            found.append(annotation)
-        pending += get_args(annotation)
-    return found
+def _keys_at(model: type[BaseModel], location: Sequence[object]) -> list[str]:
+    """The keys that are known where an unknown one stood."""
+    _, there = _followed(model, location)
+    models = [each for each in there if _is_model(each)]
+    return [field.alias or name for each in models for name, field in each.model_fields.items()]
 
 
-def _kinds(model: type[BaseModel]) -> tuple[object, ...]:
+def _inside(annotation: Any, key: object) -> list[Any]:
+    """The types that may stand under a key of a model or a mapping, or in a list."""
+    if _is_model(annotation):
+        fields = annotation.model_fields.items()
+        return [each for name, field in fields if key in (name, field.alias) for each in _members(field.annotation)]
+    return [each for held in get_args(annotation) for each in _members(held)]
+
+
+def _members(annotation: Any) -> list[Any]:
+    """A union's types; of any other type that one."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _members(parts[0])
+    return [each for part in parts for each in _members(part)] if origin in (Union, UnionType) else [annotation]
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _kinds(annotation: Any) -> tuple[object, ...]:
     """The kinds by which a union of models tells this one."""
-    field = model.model_fields.get("kind")
+    field = annotation.model_fields.get("kind") if _is_model(annotation) else None
     return get_args(field.annotation) if field else ()
