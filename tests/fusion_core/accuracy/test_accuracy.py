@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import statistics
+
 import numpy as np
 import pytest
 
@@ -138,12 +140,50 @@ def test_jitter_is_the_sd_while_the_hand_is_slow() -> None:
     assert np.isnan(accuracy.jitter(time, fast, of(time, fast)))
 
 
+def test_jitter_pools_the_variances_of_stretches_by_what_is_free_in_each() -> None:
+    """Of a track at 5 Hz five and three readings lie in two pauses: √(Σ(n − 1)s² / Σ(n − 1))."""
+    time = np.arange(0, 6, 1 / 100)
+    moving = np.where((time > 1) & (time < 2.1), 0.0, np.where((time > 4) & (time < 4.7), 0.0, 300.0))
+    reference = of(time, np.cumsum(moving / 100)[:, None])
+    track_s = np.arange(0.1, 6, 0.2)
+    track = np.random.default_rng(4).normal(0, 3, (len(track_s), 2))
+    pauses = [track[(track_s > begin) & (track_s < end)] for begin, end in ((1.0, 2.1), (4.0, 4.7))]
+    assert [len(pause) for pause in pauses] == [5, 3]
+    variances = [statistics.variance(pause[:, 0]) + statistics.variance(pause[:, 1]) for pause in pauses]
+    expected = np.sqrt((4 * variances[0] + 2 * variances[1]) / 6)
+    assert accuracy.jitter(track_s, track, reference) == pytest.approx(expected)
+
+
 def test_noise_is_found_in_a_still_stretch_and_drift_is_not_noise() -> None:
     time = np.arange(0, 10, 1 / 100)
     drift = 3 * (time - 5) ** 2
     value = (drift + np.random.default_rng(5).normal(0, 2.5, len(time)))[:, None]
     left = noise.residuals(of(time, value), 0, 10)
     assert np.sqrt(np.mean(left**2)) == pytest.approx(2.5, rel=0.06)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_residuals_have_the_mean_square_of_a_regression_on_a_parabola(seed: int) -> None:
+    """Of n readings and three coefficients n − 3 are free; with a dozen of them it shows. Statsmodels' mse_resid."""
+    from statsmodels.regression.linear_model import OLS
+
+    random = np.random.default_rng(seed)
+    time = np.sort(random.uniform(4.0, 6.0, 12))
+    value = random.normal(0, 2.5, (12, 2)) + 30 * time[:, None] - 4 * time[:, None] ** 2
+    before, after = [3.0, 4 - 1e-9], [6 + 1e-9, 7.0]  # the stretch's first and last 0.1 s, and beyond
+    others = np.full((2, 2), 500.0)
+    samples = of(np.concatenate([before, time, after]), np.concatenate([others, value, others]))
+    left = noise.residuals(samples, 3.9, 6.1)
+    design = np.column_stack([np.ones(12), time, time**2])
+    expected = [OLS(value[:, axis], design).fit().mse_resid for axis in range(2)]
+    np.testing.assert_allclose(np.mean(left**2, axis=0), expected, rtol=1e-9)
+
+
+def test_too_few_readings_say_nothing_of_the_noise() -> None:
+    time = np.linspace(0.1, 0.9, 9)
+    assert noise.residuals(of(time, np.ones((9, 2))), 0.0, 1.0).shape == (0, 2)
+    time = np.linspace(0.1, 0.9, 10)
+    assert len(noise.residuals(of(time, np.ones((10, 2))), 0.0, 1.0)) == 10
 
 
 def test_still_stretch_by_accelerations_alone() -> None:

@@ -246,6 +246,17 @@ def test_a_second_bump_in_the_speed_is_a_correction(second_mm: float, expected: 
     assert movements.corrections(path) == expected
 
 
+@pytest.mark.parametrize(("second_mm_s", "expected"), [(150, 0), (195, 0), (205, 1), (300, 1)])
+def test_a_second_submovement_counts_if_it_stands_out_by_a_tenth_of_the_peak_speed(
+    second_mm_s: float, expected: int
+) -> None:
+    """The speed rises to 1000 mm/s and falls to 100: the second rise must reach 200."""
+    speed = np.interp(np.arange(0, 1, 0.01), [0, 0.3, 0.6, 0.8, 1], [0, 1000, 100, second_mm_s, 0])
+    time = np.arange(len(speed) + 1) * 0.01
+    path = HandPath(time, np.column_stack([np.concatenate([[0], np.cumsum(speed * 0.01)]), 0 * time]))
+    assert movements.corrections(path) == expected
+
+
 def test_a_hand_that_rests_corrects_nothing() -> None:
     assert movements.corrections(HandPath(np.arange(3.0), np.zeros((3, 2)))) == 0
     assert movements.corrections(HandPath(np.arange(2.0), np.zeros((2, 2)))) == 0
