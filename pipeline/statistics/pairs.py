@@ -20,11 +20,6 @@ class Pair:
     first: FloatArray
     second: FloatArray
 
-    @property
-    def both(self) -> FloatArray:
-        """Participants × 2."""
-        return np.column_stack([self.first, self.second])
-
 
 def of_conditions(values: FloatArray, conditions: Sequence[str]) -> list[Pair]:
     """Every two columns of values (n, k), in order."""

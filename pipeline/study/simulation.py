@@ -110,10 +110,6 @@ class Instruments(Frozen):
     heading_walk_deg_per_sqrt_s: Annotated[float, Field(ge=0, le=45)] = 0.1
 
 
-DRIVERS = ("completion_time_s", "selection_rmse_mm", "corrections_per_target")
-"""What a rating may depend on, as measured in the session."""
-
-
 class Scale(Frozen):
     """A rating: `base` at the `usual` session, and how much it rises for each doubling of a driver."""
 
@@ -185,6 +181,3 @@ class ReachSimulation(Frozen):
 
 
 Simulation = Annotated[ReachSimulation | SelectionSimulation, Field(discriminator="kind")]
-
-
-SIMULATIONS = ("reach", "selection")
