@@ -3,11 +3,6 @@
 NumPy, SciPy and Numba only: no files, sockets, clocks or DataFrames. The README has the notation table.
 """
 
-# ruff: noqa: E402 - before anything is compiled
-from fusion_core.compilation import keep_apart
-
-keep_apart()
-
 from fusion_core.estimator import Estimator, replay_loop
 from fusion_core.filters import Holt, OneEuro, Raw
 from fusion_core.kalman.fusion import FusionKalman

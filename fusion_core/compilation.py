@@ -1,37 +1,95 @@
-"""Where compiled code is kept: apart for each state of the package's sources.
+"""How functions are compiled, and where the machine code is kept between runs.
 
-Numba looks only at the file of the function it compiled, and would go on with code in which a function of another
-file, since changed, is still as it was.
+Numba keeps machine code in a file and looks only at the source file of the function that it compiled. But a compiled
+function holds copies of all it calls, and of the constants it uses. If one of these stands in another file and is
+edited, Numba would go on running the old code without a word. So the machine code of each state of the sources has a
+folder of its own: any edit, in any file, leads to an empty folder, and everything is compiled anew.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import os
 import shutil
+import tempfile
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from threading import Lock
+from typing import Any, TypeVar, overload
 
-_PACKAGE = Path(__file__).parent
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+_FUSION_CORE = Path(__file__).parent
+_numba_settings = Lock()
 
 
-def keep_apart(package: Path = _PACKAGE) -> None:
-    """Set Numba's cache folder to one of the sources' own, and remove those of earlier sources.
+class Compiler:
+    """A decorator: `@compiled`, or `@compiled(fastmath=True)` with further options of `numba.njit`.
 
-    Must come before any function of `package`, a folder, is compiled; its sources and those of this package count. A
-    folder that the user set (NUMBA_CACHE_DIR) is left alone.
+    For the functions of one package, a folder. They may call each other and those of fusion_core; a function or
+    constant of a third place would not be noticed when it changes.
     """
-    import numba
 
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return
-    sources = sorted({*_PACKAGE.glob("*.py"), *package.glob("*.py")})
-    stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sources]
-    digest = hashlib.sha256(repr((numba.__version__, stamps)).encode()).hexdigest()[:16]
-    folder = package / "__pycache__"
-    for earlier in folder.glob("compiled-*"):
-        if earlier.name != f"compiled-{digest}":
-            shutil.rmtree(earlier, ignore_errors=True)
-    with contextlib.suppress(OSError):  # a package that cannot be written to is compiled anew each time
-        (folder / f"compiled-{digest}").mkdir(parents=True, exist_ok=True)
-        numba.config.CACHE_DIR = str(folder / f"compiled-{digest}")  # type: ignore[attr-defined]
+    def __init__(self, package: Path) -> None:
+        self._package = package
+
+    @overload
+    def __call__(self, function: Function) -> Function: ...
+    @overload
+    def __call__(self, **options: Any) -> Callable[[Function], Function]: ...
+    def __call__(self, function: Function | None = None, **options: Any) -> Any:
+        if function is None:
+            return lambda wanted: self._compile(wanted, options)
+        return self._compile(function, options)
+
+    def _compile(self, function: Callable[..., Any], options: dict[str, Any]) -> Any:
+        folder = code_folder(self._package, numba.config.CACHE_DIR)  # type: ignore[attr-defined]
+        if folder is None:
+            return numba.njit(**options)(function)
+        # Numba asks for the folder only while it decorates. Afterwards the setting is the user's again.
+        with _numba_settings:
+            before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+            numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+            try:
+                return numba.njit(cache=True, **options)(function)
+            finally:
+                numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
+
+
+compiled = Compiler(_FUSION_CORE)
+"""For the functions of fusion_core."""
+
+
+@cache
+def code_folder(package: Path, users_folder: str = "") -> Path | None:
+    """Where machine code of a package's sources as they are now is kept; None where nothing can be written.
+
+    Beside the sources, where folders of earlier sources are removed, or in `users_folder` (NUMBA_CACHE_DIR) if there is
+    one. Without a folder, as in an installation that is read-only, each process compiles for itself, in memory.
+    """
+    name = f"compiled-{sources_digest(package)}"
+    if users_folder:
+        folder = Path(users_folder) / name
+    else:
+        folder = package / "__pycache__" / name
+        for earlier in folder.parent.glob("compiled-*"):
+            if earlier.name != name:
+                shutil.rmtree(earlier, ignore_errors=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):  # a folder may be there and still not be ours to write to
+            return folder
+    except OSError:
+        return None
+
+
+def sources_digest(package: Path) -> str:
+    """Of the contents of every .py file in the package and in fusion_core, however deep, and Numba's version."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for root in dict.fromkeys((_FUSION_CORE, package)):
+        for source in sorted(root.rglob("*.py")):
+            contents = source.read_bytes()
+            digest.update(f"\0{source.relative_to(root).as_posix()}\0{len(contents)}\0".encode())
+            digest.update(contents)
+    return digest.hexdigest()[:16]

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
 _GROUP = 8  # shifts: a line of memory
@@ -37,7 +37,7 @@ class Blocks(NamedTuple):
     total: FloatArray  # (shifts,) mm²: of all instants
 
 
-@njit(cache=True)
+@compiled
 def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shifts: FloatArray, block: int) -> Blocks:
     """Σ‖estimate(t) − reference(t − shift)‖² over every `block` instants, for rising `shifts`.
 
@@ -67,7 +67,7 @@ def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shif
     return Blocks(cost, bound, still, total)
 
 
-@njit(cache=True)
+@compiled
 def _squared_distances(
     segments: Segments,
     begin: int,
@@ -103,7 +103,7 @@ def _squared_distances(
             wanted = time - shifts[shift]
 
 
-@njit(cache=True)
+@compiled
 def _into_groups(running: FloatArray, cost: FloatArray, bound: FloatArray) -> bool:
     """One block's costs into its groups and their bounds; whether they are all the same but for round-off."""
     lowest, highest = np.inf, -np.inf
@@ -117,7 +117,7 @@ def _into_groups(running: FloatArray, cost: FloatArray, bound: FloatArray) -> bo
     return highest - lowest <= _STILL * highest
 
 
-@njit(cache=True)
+@compiled
 def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArray:
     """The best shift, in steps from the first, of the blocks that each row of `picks` (resamples, k) names.
 
@@ -147,7 +147,7 @@ def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArra
     return found
 
 
-@njit(cache=True)
+@compiled
 def _summed(rows: FloatArray, picks: npt.NDArray[np.int64], total: FloatArray) -> None:
     """Σ of the rows that `picks` names."""
     total[:] = 0.0
@@ -162,7 +162,7 @@ def _summed(rows: FloatArray, picks: npt.NDArray[np.int64], total: FloatArray) -
             total[column] += part[column]
 
 
-@njit(cache=True)
+@compiled
 def _costs_of(blocks: Blocks, group: int, picks: npt.NDArray[np.int64], cost: FloatArray) -> float:
     """A resample's costs at one group of shifts, and the lowest of them."""
     own = cost[group * _GROUP : (group + 1) * _GROUP]
@@ -170,7 +170,7 @@ def _costs_of(blocks: Blocks, group: int, picks: npt.NDArray[np.int64], cost: Fl
     return float(own.min())
 
 
-@njit(cache=True)
+@compiled
 def _first_of_lowest(cost: FloatArray, count: int, scale: float) -> int:
     """Where a stretch of shifts fits equally well but for round-off: the first of them."""
     enough = cost[:count].min() + _ROUND_OFF * scale
@@ -180,7 +180,7 @@ def _first_of_lowest(cost: FloatArray, count: int, scale: float) -> int:
     return at
 
 
-@njit(cache=True)
+@compiled
 def best(cost: FloatArray, scale: float) -> float:
     """The shift of the lowest cost, in steps from the first, refined by a parabola unless it is at an edge."""
     at = _first_of_lowest(cost, len(cost), scale)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.kalman.event_steps import (
     JERK_PSD,
     History,
@@ -20,7 +20,7 @@ from fusion_core.kalman.smoothing_steps import smoothed_at
 from fusion_core.samples import FloatArray
 
 
-@njit(cache=True)
+@compiled
 def _shift_down(history: History, first: int, count: int) -> None:
     for row in range(first, count):
         history.time[row - first] = history.time[row]
@@ -32,7 +32,7 @@ def _shift_down(history: History, first: int, count: int) -> None:
         history.adapted[row - first] = history.adapted[row]
 
 
-@njit(cache=True)
+@compiled
 def arrive(
     model: Model,
     history: History,
@@ -61,7 +61,7 @@ def arrive(
     return oldest, count
 
 
-@njit(cache=True)
+@compiled
 def replay(
     model: Model,
     readings: Readings,

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.kalman.motion import Motion, add_wiener_noise, position_step, step
 from fusion_core.samples import FloatArray
 
@@ -96,7 +96,7 @@ def empty_history(capacity: int, dimension: int, constants: int, states: int) ->
     )
 
 
-@njit(cache=True)
+@compiled
 def _less_constants(model: Model, coupling: FloatArray, covariance: FloatArray) -> None:
     """The first position less the constants it holds: what is unknown of these is unknown of it.
 
@@ -116,7 +116,7 @@ def _less_constants(model: Model, coupling: FloatArray, covariance: FloatArray) 
                         covariance[row + axis, other_state * dimension + other] += shared * coupling[other, constant]
 
 
-@njit(cache=True)
+@compiled
 def begin(model: Model, history: History) -> None:
     """The moments at the first position, which stands in row 0."""
     states, dimension = len(model.states), len(model.axes)
@@ -136,7 +136,7 @@ def begin(model: Model, history: History) -> None:
     _less_constants(model, history.coupling[0], covariance)
 
 
-@njit(cache=True)
+@compiled
 def _move_wiener(
     axes: tuple[int, ...],
     constants: tuple[int, ...],
@@ -172,7 +172,7 @@ def _move_wiener(
         add_wiener_noise(density, dt, covariance[row], dimension, axis)
 
 
-@njit(cache=True)
+@compiled
 def whole_step(motion: Motion, dimension: int, size: int, dt: float, density: float) -> tuple[FloatArray, FloatArray]:
     """Transition and process noise of all states of all axes over `dt` seconds, (size, size); constants stay."""
     states = len(motion.stationary)
@@ -187,7 +187,7 @@ def whole_step(motion: Motion, dimension: int, size: int, dt: float, density: fl
     return transition, added
 
 
-@njit(cache=True)
+@compiled
 def _move_anchored(
     motion: Motion, dimension: int, mean: FloatArray, covariance: FloatArray, row: int, dt: float, density: float
 ) -> None:
@@ -197,7 +197,7 @@ def _move_anchored(
     covariance[row] = transition @ covariance[row - 1] @ transition.T + noise
 
 
-@njit(cache=True)
+@compiled
 def _observe(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -234,7 +234,7 @@ def _observe(
     return variance, expected
 
 
-@njit(cache=True)
+@compiled
 def _correct(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -256,7 +256,7 @@ def _correct(
             covariance[row, state, other] = covariance[row, other, state] = both
 
 
-@njit(cache=True)
+@compiled
 def _squared_innovation(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -295,7 +295,7 @@ def _squared_innovation(
     return squared, seen, log_determinant
 
 
-@njit(cache=True)
+@compiled
 def _whitened(innovation: FloatArray, variance: FloatArray) -> tuple[float, float]:
     """νᵀS⁻¹ν and log det S, by Cholesky's factor of the lower triangle of `variance`, in place."""
     squared, log_determinant = 0.0, 0.0
@@ -314,7 +314,7 @@ def _whitened(innovation: FloatArray, variance: FloatArray) -> tuple[float, floa
     return squared, log_determinant
 
 
-@njit(cache=True)
+@compiled
 def _measure_jerk(
     axes: tuple[int, ...],
     adapted: FloatArray,
@@ -347,7 +347,7 @@ def _measure_jerk(
         adapted[row, JERK_PSD] = least * (max(measured, least) / least) ** share if share > 0.0 else least
 
 
-@njit(cache=True)
+@compiled
 def _judge(adapted: FloatArray, row: int, squared: float, seen: int, gate: float, adaptation: float) -> bool:
     """Is a reading believed? Its surprise tells how far the accelerations can be trusted."""
     rejected = adapted[row, _REJECTED]
@@ -359,7 +359,7 @@ def _judge(adapted: FloatArray, row: int, squared: float, seen: int, gate: float
     return believed
 
 
-@njit(cache=True)
+@compiled
 def take_in(model: Model, history: History, first: int, count: int) -> None:
     """The moments of the rows from `first` on, each from those of the row before and its reading.
 
@@ -417,7 +417,7 @@ def take_in(model: Model, history: History, first: int, count: int) -> None:
                 _correct(states, axes, constants, mean, covariance, row, column, precision, innovation)
 
 
-@njit(cache=True)
+@compiled
 def insert(
     model: Model,
     history: History,
@@ -453,7 +453,7 @@ def insert(
     return at
 
 
-@njit(cache=True)
+@compiled
 def write_expected(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -478,7 +478,7 @@ def write_expected(
         found[index, axis], sd[index, axis] = total, np.sqrt(variance)
 
 
-@njit(cache=True)
+@compiled
 def expect(model: Model, history: History, row: int, time: float) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (dimension,) of the position at `time`, from the moments of a row."""
     mean, sd = np.empty((1, len(model.axes))), np.empty((1, len(model.axes)))
@@ -488,7 +488,7 @@ def expect(model: Model, history: History, row: int, time: float) -> tuple[Float
     return mean[0], sd[0]
 
 
-@njit(cache=True)
+@compiled
 def oldest_needed(time: FloatArray, oldest: int, count: int, history_s: float) -> int:
     """The row whose moments a reading may still build on: the newest of those older than the history."""
     since = time[count - 1] - history_s
@@ -497,7 +497,7 @@ def oldest_needed(time: FloatArray, oldest: int, count: int, history_s: float) -
     return oldest
 
 
-@njit(cache=True)
+@compiled
 def inserted(
     model: Model,
     history: History,

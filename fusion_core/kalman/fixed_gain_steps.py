@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.kalman.event_steps import SAME_S
 from fusion_core.kalman.motion import add_wiener_noise
 from fusion_core.samples import FloatArray
@@ -54,7 +54,7 @@ def settled(schedule: Schedule, dimension: int) -> Gains:
     return Gains((0,) * dimension, gain, covariance, schedule.jerk_psd_mm2_s5)
 
 
-@njit(cache=True)
+@compiled
 def _settle(schedule: Schedule, gain: FloatArray, covariance: FloatArray) -> None:
     """Fills the table of `Gains`."""
     of_position, of_acceleration = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0, 1.0])
@@ -76,7 +76,7 @@ def _settle(schedule: Schedule, gain: FloatArray, covariance: FloatArray) -> Non
         gain[k], covariance[k] = gains, now
 
 
-@njit(cache=True)
+@compiled
 def _moved(schedule: Schedule, covariance: FloatArray, dt: float) -> FloatArray:
     transition = np.eye(STATES)
     transition[0, 1] = transition[1, 2] = dt
@@ -87,7 +87,7 @@ def _moved(schedule: Schedule, covariance: FloatArray, dt: float) -> FloatArray:
     return moved
 
 
-@njit(cache=True)
+@compiled
 def _updated(covariance: FloatArray, observed: FloatArray, noise_variance: float, gains: FloatArray) -> FloatArray:
     """The covariance after a reading; its gains go into `gains`."""
     column = covariance @ observed
@@ -117,7 +117,7 @@ def empty_rows(count: int, dimension: int) -> Rows:
     )
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _take_in(gains: Gains, rows: Rows, row: int, before: int) -> None:
     """The mean of a row from that of the row `before` and its reading."""
     dt = max(rows.time[row] - rows.time[before], 0.0)
@@ -139,7 +139,7 @@ def _take_in(gains: Gains, rows: Rows, row: int, before: int) -> None:
         rows.mean[row, 3, axis] = bias + of_bias * innovation
 
 
-@njit(cache=True)
+@compiled
 def inserted(gains: Gains, rows: Rows, room: Rows, time: float, is_frame: bool, value: FloatArray) -> int:
     """`rows` copied into `room`, which has one more, with one more reading. Where it went; 0 if it was too late."""
     count = len(rows.time)
@@ -159,7 +159,7 @@ def inserted(gains: Gains, rows: Rows, room: Rows, time: float, is_frame: bool, 
     return at
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def expect(gains: Gains, rows: Rows, row: int, time: float, mean: FloatArray, sd: FloatArray, index: int) -> None:
     """Writes position and SD at `time`, from the mean of a row, into row `index` of `mean` and `sd`."""
     dt = max(time - rows.time[row], 0.0)
@@ -174,7 +174,7 @@ def expect(gains: Gains, rows: Rows, row: int, time: float, mean: FloatArray, sd
         sd[index, axis] = spread
 
 
-@njit(cache=True)
+@compiled
 def expect_one(gains: Gains, rows: Rows, row: int, time: float) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (dimension,) at `time`, from the mean of a row."""
     mean, sd = np.empty((1, rows.value.shape[1])), np.empty((1, rows.value.shape[1]))
@@ -182,7 +182,7 @@ def expect_one(gains: Gains, rows: Rows, row: int, time: float) -> tuple[FloatAr
     return mean[0], sd[0]
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _put_in(gains: Gains, ring: Rows, last: int, time: float, is_frame: bool, value: FloatArray, at: int) -> int:
     """One more reading at its time, the newest row being `last` − 1; how many rows it went back."""
     mask, row, back = len(ring.time) - 1, last, 0
@@ -200,7 +200,7 @@ def _put_in(gains: Gains, ring: Rows, last: int, time: float, is_frame: bool, va
     return back
 
 
-@njit(cache=True)
+@compiled
 def replay(
     gains: Gains,
     frames: tuple[FloatArray, FloatArray, FloatArray],

@@ -7,10 +7,10 @@ from math import factorial
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.linalg import solve_continuous_lyapunov
 
 from fusion_core.checks import require_positive
+from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
 
@@ -119,7 +119,7 @@ def _series(nilpotent: FloatArray) -> FloatArray:
     return np.array(powers, dtype=np.float64)
 
 
-@njit(cache=True)
+@compiled
 def add_wiener_noise(density: float, dt: float, noise: FloatArray, apart: int, axis: int) -> None:
     """The process noise of position, velocity and acceleration, whose rows stand `apart` from `axis` on."""
     speed, rate, squared = apart + axis, 2 * apart + axis, dt * dt
@@ -134,7 +134,7 @@ def add_wiener_noise(density: float, dt: float, noise: FloatArray, apart: int, a
     noise[rate, rate] += density * dt
 
 
-@njit(cache=True)
+@compiled
 def step(motion: Motion, dt: float, jerk_psd: float, transition: FloatArray, noise: FloatArray) -> None:
     """Writes the transition and the process noise over `dt` seconds, (states, states) each, for one axis.
 
@@ -153,7 +153,7 @@ def step(motion: Motion, dt: float, jerk_psd: float, transition: FloatArray, noi
     add_wiener_noise(max(motion.jerk_psd_mm2_s5, jerk_psd), dt, noise, 1, 0)
 
 
-@njit(cache=True)
+@compiled
 def position_step(motion: Motion, dt: float, jerk_psd: float, of_position: FloatArray) -> float:
     """Writes the position's row of the transition over `dt` seconds; returns its process noise."""
     if not motion.anchored:
@@ -166,7 +166,7 @@ def position_step(motion: Motion, dt: float, jerk_psd: float, of_position: Float
     return float(noise[0, 0])
 
 
-@njit(cache=True)
+@compiled
 def _anchored(motion: Motion, dt: float, transition: FloatArray) -> None:
     """A cubic times a decay for the process; what it leaves of the position goes back to the constant."""
     moving = len(transition) - 1
@@ -182,7 +182,7 @@ def _anchored(motion: Motion, dt: float, transition: FloatArray) -> None:
     transition[moving, moving] = 1.0
 
 
-@njit(cache=True)
+@compiled
 def _stationary_noise(stationary: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
     """What keeps the stationary covariance as it is: Q = P − F P Fᵀ, for all states but the constant."""
     moving = stationary.shape[0] - 1

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.kalman.motion import add_wiener_noise
 from fusion_core.samples import FloatArray
 
 
-@njit(cache=True)
+@compiled
 def begin(
     value: FloatArray, noise_variance: float, speed_sd: float, acceleration_sd: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -20,7 +20,7 @@ def begin(
     return mean, covariance
 
 
-@njit(cache=True)
+@compiled
 def moved(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float) -> tuple[FloatArray, FloatArray]:
     """Both `dt` seconds on, by the Wiener-process-acceleration model."""
     transition = np.eye(3)
@@ -31,7 +31,7 @@ def moved(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: 
     return transition @ mean, later
 
 
-@njit(cache=True)
+@compiled
 def correct(mean: FloatArray, covariance: FloatArray, value: FloatArray, noise_variance: float) -> None:
     """A frame taken in, in place. Joseph's form keeps the covariance symmetric and positive."""
     gain = covariance[:, 0] / (covariance[0, 0] + noise_variance)
@@ -44,14 +44,14 @@ def correct(mean: FloatArray, covariance: FloatArray, value: FloatArray, noise_v
     covariance[:] = keep @ covariance @ keep.T + noise_variance * np.outer(gain, gain)
 
 
-@njit(cache=True)
+@compiled
 def ahead(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float) -> tuple[FloatArray, float]:
     """Position (d,) and its SD `dt` seconds after the newest frame."""
     later, spread = moved(mean, covariance, dt, jerk_psd_mm2_s5)
     return later[0], np.sqrt(spread[0, 0])
 
 
-@njit(cache=True)
+@compiled
 def replay(
     arrival: FloatArray,
     value: FloatArray,

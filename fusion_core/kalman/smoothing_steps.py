@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.kalman.event_steps import JERK_PSD, History, Model, whole_step
 from fusion_core.samples import FloatArray
 
 
-@njit(cache=True)
+@compiled
 def _step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatArray]:
     """Transition and process noise over `dt` seconds, (size, size); constants are slow random walks."""
     dimension, moving = len(model.axes), len(model.states) * len(model.axes)
@@ -19,7 +19,7 @@ def _step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatAr
     return transition, noise
 
 
-@njit(cache=True)
+@compiled
 def step_back(
     model: Model,
     mean: FloatArray,
@@ -40,7 +40,7 @@ def step_back(
     return smoothed, (spread + spread.T) / 2.0
 
 
-@njit(cache=True)
+@compiled
 def _at(
     model: Model, history: History, row: int, time: float, later_mean: FloatArray, later_covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -54,7 +54,7 @@ def _at(
     return mean[: len(model.axes)].copy(), np.sqrt(np.diag(covariance)[: len(model.axes)])
 
 
-@njit(cache=True)
+@compiled
 def smoothed_at(model: Model, history: History, oldest: int, count: int, time: float) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (dimension,) of the position at `time`, within the rows from `oldest` to `count`."""
     mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
@@ -68,7 +68,7 @@ def smoothed_at(model: Model, history: History, oldest: int, count: int, time: f
     return _at(model, history, row, time, mean, covariance)
 
 
-@njit(cache=True)
+@compiled
 def smooth(model: Model, history: History, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (n, dimension) at `times`, which rise, in view of all rows; NaN outside them."""
     dimension = len(model.axes)

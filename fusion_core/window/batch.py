@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 from fusion_core.window.kernels import IntArray, covariance
 from fusion_core.window.weights import CONSTANT, WINDOW, ZERO, Prior, gains
@@ -48,7 +48,7 @@ class _Held(NamedTuple):
     of_values: FloatArray  # (d, m): L⁻¹v
 
 
-@njit(cache=True)
+@compiled
 def _room(positions: int, others: int, dimension: int) -> _Held:
     most = positions + others
     return _Held(
@@ -64,7 +64,7 @@ def _room(positions: int, others: int, dimension: int) -> _Held:
     )
 
 
-@njit(cache=True)
+@compiled
 def estimates(
     prior: Prior,
     streams: Streams,
@@ -106,13 +106,13 @@ def estimates(
             _conclude(prior, held, with_now[:size], positions, origin, mean[index], sd[index])
 
 
-@njit(cache=True)
+@compiled
 def _goes_on(known: IntArray, span: IntArray) -> bool:
     """Has a window only lost readings at its begin, and gained some at its end? Not so where times go back."""
     return bool(span[0] >= known[0] and span[1] >= known[1] and span[2] >= known[2] and span[3] >= known[3])
 
 
-@njit(cache=True)
+@compiled
 def _take_in(
     prior: Prior, streams: Streams, held: _Held, span: IntArray, begin: int, end: int, origin: FloatArray
 ) -> None:
@@ -134,7 +134,7 @@ def _take_in(
     _place(held.slot[middle:end], since + middle - positions, held.positions, len(held.among) - held.positions)
 
 
-@njit(cache=True)
+@compiled
 def _copy(
     held: _Held,
     begin: int,
@@ -153,7 +153,7 @@ def _copy(
             centred[axis, row] = value[row + apart, axis] - constant * origin[axis]
 
 
-@njit(cache=True)
+@compiled
 def _place(slot: IntArray, at: int, begin: int, count: int) -> None:
     """The slots of consecutive readings from `at` on, which take turns in `count` slots from `begin` on."""
     turn = at % count if count else 0
@@ -162,7 +162,7 @@ def _place(slot: IntArray, at: int, begin: int, count: int) -> None:
         turn = turn + 1 if turn + 1 < count else 0
 
 
-@njit(cache=True)
+@compiled
 def _covariances(prior: Prior, streams: Streams, held: _Held, known: IntArray, span: IntArray) -> None:
     """Covariances of the readings that come into the window, with all that are in it."""
     inverse_scale, begins, shift, polynomial, shared = prior.covariances
@@ -183,7 +183,7 @@ def _covariances(prior: Prior, streams: Streams, held: _Held, known: IntArray, s
         among[place, place] += noise[own]
 
 
-@njit(cache=True)
+@compiled
 def _covariances_with_now(
     prior: Prior, streams: Streams, held: _Held, positions: int, now: float, with_now: FloatArray
 ) -> None:
@@ -195,7 +195,7 @@ def _covariances_with_now(
         with_now[row] = covariance(inverse_scale, begins, shift, polynomial, shared, own, position, time[row] - now)
 
 
-@njit(cache=True)
+@compiled
 def _factor(held: _Held, begin: int, size: int) -> int:
     """Rows begin:size of the factor, and of what follows from it; how many stand, fewer where round-off left none."""
     if begin == 0:
@@ -218,7 +218,7 @@ def _factor(held: _Held, begin: int, size: int) -> int:
     return size
 
 
-@njit(cache=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _factor_anew(held: _Held, size: int) -> int:
     """All rows of the factor; as `_factor`."""
     factor, among, slot = held.factor, held.among, held.slot
@@ -257,7 +257,7 @@ def _factor_anew(held: _Held, size: int) -> int:
     return size
 
 
-@njit(cache=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _solve(factor: FloatArray, right: FloatArray, size: int) -> None:
     """L⁻¹ of a right-hand side, in its place."""
     fours = size - size % 4
@@ -277,7 +277,7 @@ def _solve(factor: FloatArray, right: FloatArray, size: int) -> None:
             right[row] -= factor[at, row] * right[at]
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})  # or sums of products take a step each
+@compiled(fastmath={"reassoc", "contract"})  # or sums of products take a step each
 def _dot(first: FloatArray, second: FloatArray) -> float:
     total = 0.0
     for index in range(len(first)):
@@ -285,7 +285,7 @@ def _dot(first: FloatArray, second: FloatArray) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def _conclude(
     prior: Prior, held: _Held, of_now: FloatArray, positions: int, origin: FloatArray, mean: FloatArray, sd: FloatArray
 ) -> None:
@@ -307,7 +307,7 @@ def _conclude(
         mean[axis], sd[axis] = origin[axis] + total, np.sqrt(max(variance, 0.0))  # round-off may leave less
 
 
-@njit(cache=True)
+@compiled
 def _by_weights(
     prior: Prior,
     streams: Streams,

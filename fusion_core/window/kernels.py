@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 from fusion_core.sensors import Term
 
@@ -56,7 +56,7 @@ def _polynomial(order: int, inverse_scale_s2: float) -> FloatArray:
     return found
 
 
-@njit(cache=True)
+@compiled
 def covariance(
     inverse_scale_s2: float,
     begins: IntArray,

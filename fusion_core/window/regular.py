@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 from fusion_core.window.kernels import IntArray
 
@@ -12,13 +12,13 @@ _REGULAR_NS = 2.0  # stamps in whole ns keep to a rate no better
 _MOST_PATTERNS = 256  # in one batch; windows of others are computed one by one
 
 
-@njit(cache=True)
+@compiled
 def in_ns(seconds: float) -> int:
     """To the nearest nanosecond."""
     return int(np.rint(seconds * 1e9))
 
 
-@njit(cache=True)
+@compiled
 def is_regular(measured: FloatArray, n_positions: int, tracker_rate_hz: float, other_rate_hz: float) -> bool:
     """Do all steps of a window, first of positions and then of other readings, keep to the rates?"""
     for row in range(1, len(measured)):
@@ -29,7 +29,7 @@ def is_regular(measured: FloatArray, n_positions: int, tracker_rate_hz: float, o
     return True
 
 
-@njit(cache=True)
+@compiled
 def spans(
     times: FloatArray,
     frame_time: FloatArray,
@@ -61,7 +61,7 @@ def spans(
     return found
 
 
-@njit(cache=True)
+@compiled
 def _runs(time: FloatArray, rate_hz: float) -> IntArray:
     """How many steps in a row, up to each reading, keep to the rate."""
     runs, period_s, run = np.zeros(len(time), np.int64), 1.0 / rate_hz, 0
@@ -72,7 +72,7 @@ def _runs(time: FloatArray, rate_hz: float) -> IntArray:
     return runs
 
 
-@njit(cache=True)
+@compiled
 def patterns(
     times: FloatArray,
     frame_time: FloatArray,
@@ -111,14 +111,14 @@ def patterns(
     return which, known[:count]
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _is(pattern: IntArray, positions: int, others: int, newest: int, newest_other: int) -> bool:
     return bool(
         pattern[2] == newest and pattern[3] == newest_other and pattern[0] == positions and pattern[1] == others
     )
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def apply(
     which: IntArray,
     window_spans: IntArray,

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 from fusion_core.window.kernels import Covariances, IntArray, covariance
 
@@ -25,7 +25,7 @@ class Prior(NamedTuple):
     is_tracker: npt.NDArray[np.bool_]
 
 
-@njit(cache=True)
+@compiled
 def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> tuple[FloatArray, FloatArray]:
     """Weights (n, m) and variance (n,) of n windows of m readings at `time` (n, m) in s, when it is `now` (n,).
 
@@ -59,7 +59,7 @@ def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> 
     return weights, variance
 
 
-@njit(cache=True)
+@compiled
 def _covariances(
     prior: Prior, time: FloatArray, now: float, sensor: IntArray, among: FloatArray, with_now: FloatArray
 ) -> None:
@@ -76,7 +76,7 @@ def _covariances(
         with_now[row] = covariance(inverse_scale, begins, shift, polynomial, shared, own, position, at - now)
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})  # or sums of products take a step each
+@compiled(fastmath={"reassoc", "contract"})  # or sums of products take a step each
 def _solve(
     among: FloatArray, first: FloatArray, second: FloatArray, of_first: FloatArray, of_second: FloatArray
 ) -> None:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from pipeline.simulation.compilation import compiled
 from pipeline.statistics.arrays import FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -125,13 +125,13 @@ def hand_at(start_mm: FloatArray, begins_s: float) -> Hand:
     return hand
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _steps(seconds: float) -> int:
     """The nearest number of steps; `round` would take as long as the rest of a step."""
     return int(seconds / STEP_S + 0.5)
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
     position, velocity, drive = state[0, axis], state[1, axis], state[2, axis]
     for row in range(3):
@@ -143,7 +143,7 @@ def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
     state[2, axis] += motion.drive_sd * draw
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) -> None:
     """A quintic from the planned motion now to rest at the goal, in T₀ + k·√distance."""
     goal = (to_x, to_y)
@@ -163,7 +163,7 @@ def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) ->
     hand.progress[PLANS] += 1
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _follow_plan(hand: Hand, now: float) -> None:
     """The planned motion at `now`: along the polynomial, at rest beyond its end."""
     lasts = hand.clock[_PLAN_LASTS]
@@ -183,7 +183,7 @@ def _follow_plan(hand: Hand, now: float) -> None:
         hand.planned[2, axis] = acceleration / (lasts * lasts)
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _follow_goal(person: Person, hand: Hand, to_x: float, to_y: float) -> None:
     """A step of a second-order lag towards the goal, by the mean of both ends' velocities."""
     goal, stiffness = (to_x, to_y), person.natural_frequency_rad_s**2
@@ -196,7 +196,7 @@ def _follow_goal(person: Person, hand: Hand, to_x: float, to_y: float) -> None:
         hand.planned_to[axis] = goal[axis]
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _perceive(person: Person, hand: Hand) -> None:
     """The correction follows the discrepancy between what was seen and what the hand was to do, with what lag adds."""
     step = hand.progress[STEP]
@@ -210,7 +210,7 @@ def _perceive(person: Person, hand: Hand) -> None:
         hand.correction[axis] += STEP_S / person.correction_s * (mean - hand.correction[axis])
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _in_view(person: Person, layout: Layout, x: float, y: float, seen_x: float, seen_y: float) -> bool:
     return bool(
         abs(x - seen_x) <= layout.half_window_mm[0] - person.margin_mm
@@ -218,7 +218,7 @@ def _in_view(person: Person, layout: Layout, x: float, y: float, seen_x: float, 
     )
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _farthest_in_view(person: Person, layout: Layout, along: int, last: int, seen_x: float, seen_y: float) -> int:
     """The farthest point of the path in view, from the nearest such to where it was; where it was if none is."""
     path, found = layout.path_mm, -1
@@ -237,7 +237,7 @@ def _farthest_in_view(person: Person, layout: Layout, along: int, last: int, see
     return found
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
     """The goal: the target where it is in view, else the farthest point of the path that is."""
     step, target = hand.progress[STEP], hand.progress[TARGET]
@@ -260,7 +260,7 @@ def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
         hand.goal[0], hand.goal[1] = path[along, 0], path[along, 1]
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _press(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     """Has the participant decided to press? The own hand is slow and the target long enough near the centre."""
     if hand.progress[_AIMING] == 0:
@@ -275,7 +275,7 @@ def _press(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     return bool(hand.clock[_HELD_S] >= person.dwell_s)
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     """Where the participant stands in the task; True as the tap lands."""
     phase = hand.progress[PHASE]
@@ -295,7 +295,7 @@ def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
     return False
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, draws: np.random.Generator) -> None:
     """The hand a step on: its plan, motor noise in proportion to speed, tremor and drift."""
     to_x, to_y = hand.goal[0] - hand.correction[0], hand.goal[1] - hand.correction[1]
@@ -328,7 +328,7 @@ def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, dra
         _sway(drift, hand.drift, axis, draws.standard_normal())
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def advance(
     person: Person,
     layout: Layout,
@@ -368,7 +368,7 @@ def advance(
     return tapped
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _pull(motion: Sway, state: FloatArray, axis: int) -> float:
     """A sway's acceleration."""
     return float(state[2, axis] - motion.damping * state[1, axis] - motion.stiffness * state[0, axis])

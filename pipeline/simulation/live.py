@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from fusion_core import Estimator, FusionKalman, PositionKalman, Raw, Samples, WindowGP
 from fusion_core.kalman import position_steps
@@ -19,6 +18,7 @@ from fusion_core.kalman.event_steps import History, Model, expect
 from fusion_core.kalman.event_time import EventTime
 from fusion_core.window import weights as window_weights
 from fusion_core.window.gp import Schedule
+from pipeline.simulation.compilation import compiled
 from pipeline.simulation.hand_steps import IntArray
 from pipeline.statistics.arrays import FloatArray
 
@@ -72,7 +72,7 @@ class Readings(NamedTuple):
     force_mm_s2: FloatArray
 
 
-@njit(cache=True)
+@compiled
 def show(live: Live, readings: Readings, instants: FloatArray, index: int, shown: FloatArray) -> None:
     """Writes what is displayed at an instant into its row of `shown`; NaN before there is anything to show."""
     if live.kind == _WINDOW:
@@ -83,7 +83,7 @@ def show(live: Live, readings: Readings, instants: FloatArray, index: int, shown
         _show_position(live, readings, instants[index], shown[index])
 
 
-@njit(cache=True)
+@compiled
 def _show_position(live: Live, readings: Readings, now: float, shown: FloatArray) -> None:
     """The newest frame, held or filtered."""
     kalman, arrival = live.kalman, readings.frame_arrival
@@ -111,7 +111,7 @@ def _show_position(live: Live, readings: Readings, now: float, shown: FloatArray
         shown[:] = position_steps.ahead(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)[0]
 
 
-@njit(cache=True)
+@compiled
 def _show_window(window: Schedule, readings: Readings, now: float, index: int, shown: FloatArray) -> None:
     """The weighted sum over the window: weights depend on times alone."""
     first, last = window.spans[0, index], window.spans[1, index]
@@ -140,7 +140,7 @@ def _show_window(window: Schedule, readings: Readings, now: float, index: int, s
         shown[axis] = total
 
 
-@njit(cache=True)
+@compiled
 def _show_event_time(live: Live, readings: Readings, now: float, shown: FloatArray) -> None:
     """All that has arrived taken in at its time, and the newest moments moved on to now."""
     event, upcoming, span = live.event, live.at[_UPCOMING], (live.at[_OLDEST], live.at[_COUNT])

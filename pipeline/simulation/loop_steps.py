@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pipeline.simulation.compilation import compiled
 from pipeline.simulation.hand_steps import (
     DONE,
     PHASE,
@@ -48,7 +48,7 @@ class Session(NamedTuple):
     next: IntArray  # (3,): the next frame, force and instant
 
 
-@njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _sense(sensing: Sensing, readings: Readings, session: Session, step: int) -> None:
     """The readings that were measured in the step before `step`, from the hand's motion at its ends."""
     now, trace = step * STEP_NS, session.trace
@@ -72,7 +72,7 @@ def _sense(sensing: Sensing, readings: Readings, session: Session, step: int) ->
     session.next[0], session.next[1] = frame, force
 
 
-@njit(cache=True)
+@compiled
 def walk(
     person: Person,
     layout: Layout,
@@ -98,7 +98,7 @@ def walk(
         _sense(sensing, readings, session, step + 1)
 
 
-@njit(cache=True)
+@compiled
 def run(
     person: Person,
     layout: Layout,

@@ -1,0 +1,77 @@
+"""Machine code that is kept between runs is never that of other sources."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+import fusion_core
+
+# The position filter's step is in one file and calls the process noise, in another. What it prints: the noise that a
+# second adds to the position, and how often the step was taken from kept machine code.
+RUN = """
+import numpy as np
+from fusion_core.kalman.position_steps import moved
+_, covariance = moved(np.zeros((3, 1)), np.zeros((3, 3)), 1.0, 1.0)
+print(covariance[0, 0], sum(moved.stats.cache_hits.values()))
+"""
+NOISE = "squared * squared * dt / 20.0"
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A copy of fusion_core without compiled code."""
+    source = Path(fusion_core.__file__).parent
+    copy = tmp_path / "sources" / "fusion_core"
+    shutil.copytree(source, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
+
+
+def noise_and_hits(package: Path, **environment: str) -> tuple[float, int]:
+    """What another process prints that uses the package, which Python finds first where it is started."""
+    others = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment = {**others, "HOME": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    command = [sys.executable, "-c", RUN]
+    ran = subprocess.run(command, cwd=package.parent, env=environment, capture_output=True, text=True, check=True)
+    noise, hits = ran.stdout.split()
+    return float(noise), int(hits)
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    """The file is as long as before and no newer: neither tells that it changed."""
+    before = file.stat()
+    text = file.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    assert len(old) == len(new)
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+@pytest.mark.parametrize("users_folder", [False, True], ids=["beside the sources", "in NUMBA_CACHE_DIR"])
+def test_an_edit_of_a_nested_file_is_never_answered_by_code_compiled_before(package: Path, users_folder: bool) -> None:
+    """And code of earlier sources is removed, unless the folder is the user's."""
+    environment = {"NUMBA_CACHE_DIR": str(package.parent / "kept")} if users_folder else {}
+    assert noise_and_hits(package, **environment) == (pytest.approx(1 / 20), 0)
+    assert noise_and_hits(package, **environment) == (pytest.approx(1 / 20), 1)
+    edit(package / "kalman" / "motion.py", NOISE, NOISE.replace("20.0", "10.0"))
+    assert noise_and_hits(package, **environment) == (pytest.approx(1 / 10), 0)
+    assert len(list(package.parent.rglob("compiled-*"))) == (2 if users_folder else 1)
+
+
+def test_a_package_that_cannot_be_written_to_compiles_in_memory(package: Path) -> None:
+    """And leaves nothing in the user's own cache, where it could go stale."""
+    (package / "__pycache__").write_text("no folder can be made here, not even by root")
+    before = sorted(package.parent.rglob("*"))
+    for _ in range(2):
+        assert noise_and_hits(package) == (pytest.approx(1 / 20), 0)
+    assert sorted(package.parent.rglob("*")) == before
+
+
+def test_numbas_own_setting_stays_the_users() -> None:
+    assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
