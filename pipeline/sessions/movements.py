@@ -26,14 +26,13 @@ _PROMINENCE_MIN = 0.1  # of the trial's peak speed
 class Aimed:
     """Movements (n,) from one target to the next, in mm; NaN where one cannot be told.
 
-    `amplitude_mm` between the targets, `moved_mm` what was covered along that axis, `along_mm` and `across_mm` how far
-    the selection was beyond the target along the axis, and off it.
+    `amplitude_mm` between the targets, `moved_mm` what was covered along that axis, `along_mm` how far along it the
+    selection was beyond the target.
     """
 
     amplitude_mm: FloatArray
     moved_mm: FloatArray
     along_mm: FloatArray
-    across_mm: FloatArray
 
 
 @dataclass(frozen=True)
@@ -63,9 +62,8 @@ def aimed(target_mm: FloatArray, selected_mm: FloatArray, left_mm: FloatArray, p
     amplitude = np.where(np.isfinite(amplitude) & (amplitude > 0), amplitude, np.nan)
     unit = axis / amplitude[:, None]
     along = np.sum(off * unit, axis=1)
-    across = np.linalg.norm(off - along[:, None] * unit, axis=1)
     covered = np.where(pause_s <= PAUSE_MAX_S, np.sum(moved * unit, axis=1), np.nan)
-    return Aimed(amplitude, covered, along, across)
+    return Aimed(amplitude, covered, along)
 
 
 def previous(values: FloatArray) -> FloatArray:

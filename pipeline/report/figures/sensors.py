@@ -27,7 +27,6 @@ from pipeline.report.figures.style import (
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words import MINUS, seconds
 
-LEAD_RANGE_S = 0.5
 _TIME = "Time since the session's start (s)"
 _SHADES = 6  # the seventh colour is the reference's
 
