@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate explore power plan test test-browser test-pdf lint bench lock clean
+.PHONY: help report check replay simulate explore power plan test test-browser test-pdf lint docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -51,6 +51,9 @@ lint: .venv/installed ## ruff, mypy strict, import-linter
 	@$(python) -m ruff format --check .
 	@$(python) -m mypy
 	@.venv/bin/lint-imports
+
+docs: .venv/installed ## write docs/tables.md anew from the records in pipeline/tables
+	@$(python) -m pipeline.tables.page
 
 bench: .venv/installed ## how fast, as ratios in one run, beside other libraries
 	@sh tools/make-peers

@@ -21,36 +21,9 @@ from pipeline.stages import COMPARE
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.catalogue import TABLES
 
-STAGE_OF: Mapping[str, str] = {
-    **dict.fromkeys(("positions", "readings", "imu", "events", "session_orders"), "ingest"),
-    "tracks": "fuse",
-    **dict.fromkeys(("noise_residuals", "movements", "excerpts", "lead_curves", "stream_rates"), "assess"),
-    **dict.fromkeys(("observations", "orders", "selections"), "measure"),
-    **dict.fromkeys(
-        (
-            "descriptives",
-            "comparisons",
-            "comparisons_all_data",
-            "design_check",
-            "simulated_reductions",
-            "measures",
-            "trials",
-            "accuracy",
-            "accuracy_means",
-            "calibration",
-            "shown_at_selection",
-            "replay_agreement",
-            "sensor_noise",
-            "phones",
-            "quality",
-            "exclusions",
-            "printed",
-            "reliability",
-        ),
-        "compare",
-    ),
-}
+STAGE_OF: Mapping[str, str] = {name: table.stage for name, table in TABLES.items() if table.stage}
 """The tables of a study by the stage that has them whole."""
 _OF_SESSIONS = tuple(stage.name for stage in COMPARE if stage.scope == "session")
 
@@ -59,7 +32,7 @@ _MAIN = "MainProcess"  # what multiprocessing calls the process that was not sta
 
 @dataclass(frozen=True)
 class Tables(Mapping[str, pd.DataFrame]):
-    """A study's tables by name: `tables.comparisons`, or `tables["comparisons"]`. pipeline.tables has their columns.
+    """A study's tables by name: `tables.comparisons`, or `tables["comparisons"]`. docs/tables.md lists their columns.
 
     A table of the whole study is read once and kept. What is of each session (positions, imu, tracks, …) is read anew
     each time it is asked for, of all sessions; `in_session` gives it of one.

@@ -24,7 +24,8 @@ from pipeline.study.folder import load_study
 from pipeline.study.settings import Display, QualityLimits, Study
 from pipeline.study.streams import OperatorTerm, Stream
 from pipeline.study.yaml_text import parse
-from pipeline.tables.columns import TABLES
+from pipeline.tables.catalogue import TABLES
+from pipeline.tables.columns import FLOAT
 from tests.conftest import CLONE
 
 REFERENCE = (CLONE / "studies" / "README.md").read_text(encoding="utf-8")
@@ -108,9 +109,9 @@ def test_units_are_in_the_names_of_columns() -> None:
         "alpha",
     }
     units = ("_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95", "_deg")
-    for name, schema in TABLES.items():
-        for column in schema:
-            if str(column.type) == "double" and column.name not in bare | dimensionless:
+    for name, table in TABLES.items():
+        for column in table.columns:
+            if column.kind == FLOAT and column.name not in bare | dimensionless:
                 known = column.name.endswith(units) or column.name in ("qx", "qy", "qz", "qw")
                 assert known or column.name in ("mean_difference", "stated_sd", "computed_value"), (name, column.name)
 

@@ -23,10 +23,8 @@ from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.tables import results
 from pipeline.tables import table as tables
-from pipeline.tables.columns import TABLES
+from pipeline.tables.catalogue import GATHERED, TABLES
 from pipeline.tables.table import Row
-
-_SESSION_TABLES = ("quality", "accuracy", "replay_agreement", "sensor_noise", "phones", "calibration")
 
 
 def run(work: Work) -> Outcome:
@@ -51,9 +49,7 @@ def run(work: Work) -> Outcome:
     requests = [one for entry in all_requests(study, measures, observations) for one in entry]
     checked = findings(study, requests, tables.read("orders", measured), found["trials"], work.sessions)
     found["design_check"] = tables.frame("design_check", checked)
-    told = {
-        name: tables.read(name, work.entries["ingest" if name == "quality" else "assess"]) for name in _SESSION_TABLES
-    }
+    told = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
     left_out += _without_accuracy(work, told["quality"], told["accuracy"])
     found["exclusions"] = pd.concat(
         [

@@ -17,12 +17,12 @@ from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.stages import COMPARE
 from pipeline.tables import differences, results
+from pipeline.tables.catalogue import CHECKED
 from pipeline.tables.differences import Change, Figures
 
 EXPECTED = "expected.json"
 MOVED = 3  # the exit code
 _RELATIVE = 1e-6  # what another processor's rounding may do
-_TABLES = ("descriptives", "comparisons", "accuracy", "replay_agreement")
 
 
 def check(
@@ -97,7 +97,7 @@ def _expected(path: Path) -> dict[str, Any]:
 def _figures(content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Every figure of the results by a name that says where it stands."""
     seen: Counter[str] = Counter()
-    for table in _TABLES:
+    for table in CHECKED:
         keys = differences.OF_A_STUDY[table]
         for row in content[table]:
             where = f"{table} | {differences.Identified(table, {key: row[key] for key in keys}).name}"

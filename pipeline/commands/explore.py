@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from pipeline.simulation.session import Setting
 
 _PAGE, _PRINT, _RESULTS = "explore.html", "explore.pdf", "results.json"
-_TABLES = ("explore", "explore_differences", "explore_people")
 _VALUES, _RATES = 6, 4  # of an option: what a figure has room for
 _LIMITS = {"--latency": (0.0, 0.9), "--noise": (0.01, 1000.0), "--rate": (1.0, 1000.0)}
 
@@ -155,9 +154,9 @@ def _write(explored: Explored, grid: Grid, target: Path) -> None:
     with tempfile.TemporaryDirectory() as written, tempfile.TemporaryDirectory() as drawn:
         folder, pictures = Path(written), Path(drawn)
         results.write_exploration(folder / _RESULTS, settings, explored.found, [one.record() for one in explored.pays])
-        for name in _TABLES:
-            tables.write(name, explored.found[name], folder)
-            tables.write_csv(name, explored.found[name], folder)
+        for name, table in explored.found.items():
+            tables.write(name, table, folder)
+            tables.write_csv(name, table, folder)
         shown = document(explored, pictures)
         html.render(shown, pictures, folder / _PAGE)
         pdf.render(shown, pictures, folder / _PRINT)

@@ -28,12 +28,12 @@ from pipeline.study.folder import load_study
 from pipeline.study.session import Session
 from pipeline.tables import results
 from pipeline.tables import table as tables
+from pipeline.tables.catalogue import in_results_of, written_by
 from pipeline.tables.table import Row
 from pipeline.words import interval, number, seconds
 
 _PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"
-_TABLES = ("accuracy", "replay_trials", "replay_means", "replay_exclusions")
-_IN_RESULTS = ("accuracy", "replay_means", "replay_exclusions")
+_TABLES, _IN_RESULTS = written_by("replay"), in_results_of("replay")
 
 
 @dataclass

@@ -12,26 +12,7 @@ from pipeline.report.sections import SECTIONS, glossary, participants, paste, tr
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.tables import results
 from pipeline.tables import table as tables
-
-_FROM_COMPARE = (
-    "trials",
-    "measures",
-    "descriptives",
-    "comparisons",
-    "comparisons_all_data",
-    "accuracy",
-    "replay_agreement",
-    "sensor_noise",
-    "phones",
-    "accuracy_means",
-    "calibration",
-    "shown_at_selection",
-    "quality",
-    "exclusions",
-    "printed",
-    "design_check",
-    "simulated_reductions",
-)
+from pipeline.tables.catalogue import AS_CSV
 
 _MANY = 8  # sessions: with fewer all is drawn before another process is ready
 
@@ -45,25 +26,19 @@ def run(work: Work) -> Outcome:
 
 def _write(work: Work, pool: Executor | None) -> None:
     """report.html, traces.html, participants/*.html, report.pdf, references.bib, tables/*.csv and figures/*.svg."""
-    compared = work.entry("compare")
     for folder in ("tables", "figures"):
         (work.out / folder).mkdir()
-    for name in _FROM_COMPARE:
-        tables.write_csv(name, tables.read(name, compared), work.out / "tables")
-    tables.write_csv("selections", tables.read("selections", work.entry("measure")), work.out / "tables")
     material = Material(
         work.study_name,
         work.study,
-        results.read(compared / "results.json"),
-        tables.read("measures", compared),
+        results.read(work.entry("compare") / "results.json"),
         work.sessions,
-        work.entries["ingest"],
-        work.entries["fuse"],
-        work.entries["assess"],
+        work.entries,
         work.out / "figures",
         work.inputs,
-        (compared, work.entry("measure")),
     )
+    for name in AS_CSV:
+        tables.write_csv(name, material.table(name), work.out / "tables")
     sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
     sections += glossary.of(sections)
     carry_out([*material.drawings, Job(traces.write, (material, work.out / traces.PAGE))], pool)

@@ -7,37 +7,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from pipeline.tables.catalogue import IN_STUDY_RESULTS, TABLES, in_results_of
 from pipeline.tables.table import Row
 from pipeline.words import NOTHING
 
 Figures = Mapping[str, Any]
 
+_STUDY, _STUDIES = "study", "studies"
+
 OF_A_STUDY: Mapping[str, tuple[str, ...]] = {
-    "descriptives": ("measure", "condition"),
-    "comparisons": ("measure", "test", "effect", "contrast"),
-    "comparisons_all_data": ("measure", "test", "effect", "contrast"),
-    "accuracy": ("session", "estimator", "variant"),
-    "replay_agreement": ("session", "estimator"),
-    "quality": ("session", "stream"),
-    "exclusions": ("participant", "condition", "session", "measure", "what"),
-    "sensor_noise": ("session", "stream"),
-    "phones": ("session", "stream"),
-    "shown_at_selection": ("condition", "estimator"),
-    "accuracy_means": ("estimator",),
-    "printed": ("source", "what", "check"),
-    "design_check": ("what", "measure", "condition"),
-    "simulated_reductions": ("measure", "contrast"),
+    name: tuple(column for column in TABLES[name].key if column != _STUDY) for name in IN_STUDY_RESULTS
 }
-"""The tables of a study's results.json, and the columns by which the rows of each are told apart."""
-OF_A_REPLAY: Mapping[str, tuple[str, ...]] = {
-    "accuracy": ("study", "session", "estimator", "variant"),
-    "replay_means": ("study", "estimator", "variant"),
-    "replay_exclusions": ("study", "participant", "condition", "session", "variant", "what"),
-}
-"""The same for the results.json of a replay."""
+"""The tables of a study's results.json, and the columns that tell the rows of each apart.
+
+The name of the study's folder tells no rows apart there, and is not compared: results of two folders may be.
+"""
+OF_A_REPLAY: Mapping[str, tuple[str, ...]] = {name: TABLES[name].key for name in in_results_of("replay")}
+"""The same for the results.json of a replay, where a row belongs to one of several studies."""
 
 _NEAR_ZERO = 1e-12  # a difference that should be none is as large as the rounding of what was subtracted
-_STUDY, _STUDIES = "study", "studies"
 _FACTS: Mapping[str, tuple[str, ...]] = {_STUDY: (), _STUDIES: ("name",)}
 
 

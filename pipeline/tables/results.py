@@ -13,26 +13,10 @@ import pandas as pd
 from pipeline.errors import PipelineError
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.catalogue import IN_STUDY_RESULTS
 from pipeline.tables.differences import OF_A_REPLAY, OF_A_STUDY
 
 SCHEMA_VERSION = 1
-LISTS = (
-    "descriptives",
-    "comparisons",
-    "comparisons_all_data",
-    "accuracy",
-    "replay_agreement",
-    "quality",
-    "exclusions",
-    "sensor_noise",
-    "phones",
-    "shown_at_selection",
-    "accuracy_means",
-    "printed",
-    "design_check",
-    "simulated_reductions",
-    "reliability",
-)
 
 
 def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
@@ -46,7 +30,7 @@ def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame]
         "participants": dict(people),
     }
     rows: dict[str, Iterable[Mapping[str, Any]]] = {
-        table: tables.records(table, found[table]) if table in found else () for table in LISTS
+        table: tables.records(table, found[table]) if table in found else () for table in IN_STUDY_RESULTS
     }
     for table in ("comparisons", "comparisons_all_data"):
         rows[table] = map(_with_details, rows[table])

@@ -1,11 +1,11 @@
-"""The tables every stage speaks: their columns, with the unit in each name, and the one crossing to fusion_core."""
+"""Tables as DataFrames, as Arrow, and as files: every one with exactly the columns and types of its record."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,15 +13,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from pipeline.tables.columns import _COUNT, _FLOAT, _TEXT, TABLES
-
-if TYPE_CHECKING:
-    pass
+from pipeline.tables.catalogue import TABLES
+from pipeline.tables.columns import COUNT, FLOAT, TEXT
 
 pa.set_memory_pool(pa.system_memory_pool())  # small tables by the thousand: the usual pool keeps what they leave
 
-_NULLABLE = {_TEXT: pd.StringDtype(), _COUNT: pd.Int64Dtype()}
-_PANDAS = {**_NULLABLE, _FLOAT: np.dtype("float64")}  # as a frame holds them
+_NULLABLE = {TEXT: pd.StringDtype(), COUNT: pd.Int64Dtype()}
+_PANDAS = {**_NULLABLE, FLOAT: np.dtype("float64")}  # as a frame holds them
 _SMALL = 512  # rows
 _PARTS = 256  # tables read before they are made one: each takes more than the few rows that are in it
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
@@ -45,17 +43,17 @@ def of_rows(name: str, rows: Iterable[Row]) -> pa.Table:
     """
     listed = list(rows)
     columns = _known_columns(name, listed)
-    kinds = TABLES[name].types
+    schema = TABLES[name].schema
     arrays = [
         pa.array([row.get(column) for row in listed], kind, from_pandas=True)
-        for column, kind in zip(columns, kinds, strict=True)
+        for column, kind in zip(columns, schema.types, strict=True)
     ]
-    return pa.Table.from_arrays(arrays, schema=TABLES[name])
+    return pa.Table.from_arrays(arrays, schema=schema)
 
 
 def _known_columns(name: str, rows: Sequence[Row]) -> list[str]:
     """The table's columns; KeyError for a row that has another."""
-    columns: list[str] = TABLES[name].names
+    columns = TABLES[name].names
     for row in rows:
         unknown = row.keys() - set(columns)
         if unknown:
@@ -69,32 +67,33 @@ def of_columns(name: str, length: int, columns: Mapping[str, Any]) -> pa.Table:
     A column that is not there, and NaN, is null.
     """
     arrays = []
-    for column in TABLES[name]:
+    for column in TABLES[name].columns:
         value = columns.get(column.name)
         if isinstance(value, np.ndarray):
-            arrays.append(pa.array(value, column.type, from_pandas=True))
+            arrays.append(pa.array(value, column.kind, from_pandas=True))
         else:
-            arrays.append(pa.repeat(pa.scalar(value, column.type), length))
-    return pa.Table.from_arrays(arrays, schema=TABLES[name])
+            arrays.append(pa.repeat(pa.scalar(value, column.kind), length))
+    return pa.Table.from_arrays(arrays, schema=TABLES[name].schema)
 
 
 def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
     """A frame with exactly the table's columns, in its order and types."""
-    if data.columns.tolist() == TABLES[name].names and data.dtypes.tolist() == [_PANDAS[c.type] for c in TABLES[name]]:
+    columns = TABLES[name].columns
+    if data.columns.tolist() == TABLES[name].names and data.dtypes.tolist() == [_PANDAS[c.kind] for c in columns]:
         return data.copy(deep=False)
     converted = {}
-    for column in TABLES[name]:
+    for column in columns:
         values = data[column.name] if column.name in data else pd.Series([None] * len(data), index=data.index)
-        converted[column.name] = _typed(values, column.type)
+        converted[column.name] = _typed(values, column.kind)
     return pd.DataFrame(converted, index=data.index)
 
 
 def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
     if values.dtype == _PANDAS[kind]:
         return values
-    if kind == _TEXT:
+    if kind == TEXT:
         return values.astype("string")
-    if kind == _FLOAT:
+    if kind == FLOAT:
         return pd.to_numeric(values).astype("float64")
     return pd.to_numeric(values).astype("Int64")
 
@@ -102,11 +101,12 @@ def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
 def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
     """The table as Parquet, `<name>.parquet`; a small one plain, since unpacking it would take most of its reading."""
     if isinstance(data, pd.DataFrame):
-        data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name], preserve_index=False)
-    floats = [column.name for column in TABLES[name] if column.type == _FLOAT]
-    times = [column.name for column in TABLES[name] if column.name.endswith("_ns")]
+        data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name].schema, preserve_index=False)
+    columns = TABLES[name].columns
+    floats = [column.name for column in columns if column.kind == FLOAT]
+    times = [column.name for column in columns if column.name.endswith("_ns")]
     encodings = dict.fromkeys(floats, "BYTE_STREAM_SPLIT") | dict.fromkeys(times, "DELTA_BINARY_PACKED")
-    plain = [column.name for column in TABLES[name] if column.name not in encodings]
+    plain = [name for name in TABLES[name].names if name not in encodings]
     small = len(data) <= _SMALL
     with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
         pq.write_table(
@@ -146,7 +146,7 @@ def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
         if len(parts) == _PARTS:
             whole.append(pa.concat_tables(parts).combine_chunks())
             parts = []
-    return pa.concat_tables([*whole, *parts]) if whole or parts else TABLES[name].empty_table()
+    return pa.concat_tables([*whole, *parts]) if whole or parts else TABLES[name].schema.empty_table()
 
 
 Columns = Mapping[str, np.ndarray[Any, Any]]
@@ -156,7 +156,7 @@ Columns = Mapping[str, np.ndarray[Any, Any]]
 def of_stream(table: pa.Table, stream: str) -> Columns:
     """The columns of one stream's rows as arrays (n,): times in ns, and figures, NaN where they are null."""
     rows = table.filter(pc.equal(table["stream"], stream))
-    names = [column.name for column in table.schema if column.type != _TEXT]
+    names = [column.name for column in table.schema if column.type != TEXT]
     return {name: rows[name].to_numpy() for name in names}
 
 

@@ -16,9 +16,8 @@ import pytest
 import pipeline
 from pipeline.errors import PipelineError
 from pipeline.notebook import STAGE_OF, Tables
-from pipeline.tables import results
 from pipeline.tables import table as stored
-from pipeline.tables.columns import TABLES
+from pipeline.tables.catalogue import IN_STUDY_RESULTS, TABLES
 from tests.conftest import CLONE, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
@@ -66,7 +65,7 @@ def test_the_tables_are_those_of_the_command_and_of_its_cache(study: Path, stead
     tables = pipeline.load(str(study), cache=str(steadyhand.cache))
     assert {path.name for path in steadyhand.cache.rglob("??/*")} == kept
     found = steadyhand.results()
-    for name in results.LISTS:
+    for name in IN_STUDY_RESULTS:
         rows = list(stored.records(name, tables[name]))
         for row in rows:
             if "details" in row and row["details"] is not None:
@@ -78,10 +77,8 @@ def test_the_tables_are_those_of_the_command_and_of_its_cache(study: Path, stead
 
 def test_every_table_of_a_study_is_there(loaded: Tables) -> None:
     never_stored = {"sequences"}
-    of_other_commands = ("replay_", "explore")  # whose tables are not a study's
-    assert set(STAGE_OF) == {name for name in TABLES if not name.startswith(of_other_commands)} - never_stored | {
-        "replay_agreement"
-    }
+    of_other_commands = {name for name in TABLES if name.startswith(("replay_", "explore"))} - {"replay_agreement"}
+    assert set(STAGE_OF) == set(TABLES) - never_stored - of_other_commands
     assert list(loaded) == list(STAGE_OF)
     assert len(loaded) == len(STAGE_OF)
     assert set(STAGE_OF) <= set(dir(loaded))

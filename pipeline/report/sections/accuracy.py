@@ -140,8 +140,8 @@ def _over_sessions(material: Material, rows: pd.DataFrame) -> list[Block]:
 
 def _session_figures(material: Material) -> list[Block]:
     """The paper's figures for one session: the first that can be used."""
-    folder = material.assessed[(material.used() or [0])[0]]
-    excerpts, curves = (tables.read(name, folder) for name in ("excerpts", "lead_curves"))
+    first = (material.used() or [0])[:1]
+    excerpts, curves = (material.table_of(name, first) for name in ("excerpts", "lead_curves"))
     blocks: list[Block] = []
     if len(excerpts):
         blocks.append(material.drawn("streams", figures.streams, captions.streams, excerpts))

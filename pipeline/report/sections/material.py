@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from pipeline.report.figures import captions
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.tables.catalogue import TABLES
 from pipeline.tables.table import Row
 from pipeline.words import listing
 
@@ -32,31 +34,38 @@ ORIGINS = {
 
 @dataclass(frozen=True)
 class Material:
-    """A study's settings, results and tables. `ingested` and `fused` are a folder a session, in their order.
+    """What a study's report is made from: its settings, its results, and every table that its stages wrote.
 
-    `whole` are the folders with tables of the whole study; `drawings` gathers the figures that are to be drawn.
+    `entries` has the folders of each stage: one per session, in their order, or a single one. `figures` is the folder
+    for the figures of the report, and `drawings` gathers those that are to be drawn.
     """
 
     name: str
     study: Study
     results: Mapping[str, Any]
-    measures: pd.DataFrame
     sessions: tuple[Session, ...]
-    ingested: tuple[Path, ...]
-    fused: tuple[Path, ...]
-    assessed: tuple[Path, ...]
+    entries: Mapping[str, tuple[Path, ...]]
     figures: Path
     inputs: Mapping[str, str]
-    whole: tuple[Path, ...]
     drawings: list[Job] = field(default_factory=list)
+
+    @cached_property
+    def measures(self) -> pd.DataFrame:
+        """The table `measures`, read once."""
+        return self.table("measures")
 
     def rows(self, table: str) -> list[Row]:
         """The rows of a table of results.json."""
         return list(self.results[table])
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the whole study."""
-        return tables.read(name, [folder for folder in self.whole if (folder / f"{name}.parquet").is_file()][:1])
+        """Any table by name; one that is kept for each session is read for all of them."""
+        return tables.read(name, self.entries[TABLES[name].stage])
+
+    def table_of(self, name: str, places: Iterable[int]) -> pd.DataFrame:
+        """A table that is kept for each session, read for those at these places in `sessions`."""
+        folders = self.entries[TABLES[name].stage]
+        return tables.read(name, [folders[place] for place in places])
 
     def used(self) -> list[int]:
         """The places, in `sessions`, of those that are not excluded as a whole."""

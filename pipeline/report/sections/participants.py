@@ -14,6 +14,8 @@ from pipeline.report.document import html
 from pipeline.report.document.model import Block, Document, Link, Pages, Paragraph, Section, Table, columns
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.report.sections.traces import PAGE as TRACES
+from pipeline.tables.catalogue import TABLES
+from pipeline.tables.columns import TEXT
 from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, measure_label, number, percent, seconds
 
@@ -58,7 +60,6 @@ _SHOWN: dict[str, tuple[str, tuple[tuple[str, str, Cell], ...]]] = {
         ),
     ),
 }
-_TEXTS = {"Session", "Stream", "Note", "Estimator", "Condition", "Measure", "What", "Reason"}
 
 
 def section(material: Material) -> Section | None:
@@ -150,6 +151,7 @@ def _sessions(mine: Mapping[str, int], rows: Mapping[str, list[Row]]) -> Iterato
 def _table(name: str, rows: Sequence[Row]) -> Table:
     caption, shown = _SHOWN[name]
     titles = [title for title, _, _ in shown]
-    texts = next((at for at, title in enumerate(titles) if title not in _TEXTS), len(titles))
+    kinds = {column.name: column.kind for column in TABLES[name].columns}
+    texts = next((at for at, (_, key, _) in enumerate(shown) if kinds[key] != TEXT), len(titles))
     cells = tuple(tuple(cell(row[key]) for _, key, cell in shown) for row in rows)
     return Table(f"table-{name}", caption, columns(titles, texts), cells)

@@ -9,7 +9,6 @@ from pipeline.report.document.model import Block, Section
 from pipeline.report.figures import captions
 from pipeline.report.figures.canvas import Plane
 from pipeline.report.sections.material import Material, first_of
-from pipeline.tables import table as tables
 
 _SESSIONS_MAX = 48  # drawn; a page of more would be slow to open
 _READ = ("tracks", "positions", "events")
@@ -30,7 +29,7 @@ def section(material: Material) -> Section | None:
 
 def _one(material: Material, used: list[int], plane: Plane) -> list[Block]:
     """The first session: the reference, what was displayed, and what the best fusion makes of it."""
-    tracks, positions, events = (_read(material, name, used[0]) for name in _READ)
+    tracks, positions, events = (material.table_of(name, used[:1]) for name in _READ)
     lines = [material.study.stream_of_kind("reference"), _displayed(material, used[0]), _fused(material)]
     there = {*positions["stream"], *tracks["estimator"]}
     shown = [line for line in dict.fromkeys(lines) if line in there]
@@ -52,17 +51,13 @@ def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
         return []
     found: dict[str, list[pd.DataFrame]] = {name: [] for name in _READ}
     for place in used:
-        tracks, positions, events = (_read(material, name, place) for name in _READ)
+        tracks, positions, events = (material.table_of(name, [place]) for name in _READ)
         found["tracks"].append(tracks[tracks["estimator"].isin(shown.values())].iloc[::_STEP])
         found["positions"].append(positions[positions["stream"].isin(shown.values())].iloc[::_STEP])
         found["events"].append(events)
     sessions = pd.DataFrame([material.sessions[place].ids for place in used])
     whole = [pd.concat(found[name]) for name in _READ]
     return [material.drawn("paths", figures.paths, captions.paths, *whole, sessions, ordered, plane, more=more)]
-
-
-def _read(material: Material, name: str, place: int) -> pd.DataFrame:
-    return tables.read(name, (material.fused if name == "tracks" else material.ingested)[place])
 
 
 def _displayed(material: Material, place: int) -> str | None:

@@ -14,7 +14,6 @@ from pipeline.report.sections import timeline
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
-from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 from pipeline.words import NOTHING, counted, listing, measure_label, number
 
@@ -231,8 +230,8 @@ def _noise(material: Material) -> list[Block]:
 def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:
     """Every session's residuals by stream; session by session, and names as numbers, for there may be millions."""
     parts = []
-    for folder in material.assessed:
-        rows = tables.read("noise_residuals", folder)[["stream", "residual"]]
+    for place in range(len(material.sessions)):
+        rows = material.table_of("noise_residuals", [place])[["stream", "residual"]]
         parts.append(rows.assign(stream=rows["stream"].astype(pd.CategoricalDtype(list(names)))))
     return pd.concat(parts)
 

@@ -13,10 +13,11 @@ _SESSIONS_MAX = 24  # a page holds no more rows
 
 def blocks(material: Material) -> list[Block]:
     """The first sessions' streams, silences and events; nothing for a study of tables alone."""
-    rates = tables.read("stream_rates", material.assessed[:_SESSIONS_MAX])
+    first = range(min(len(material.sessions), _SESSIONS_MAX))
+    rates = material.table_of("stream_rates", first)
     if rates.empty:
         return []
-    events = tables.read("events", material.ingested[:_SESSIONS_MAX])
+    events = material.table_of("events", first)
     exclusions = tables.frame("exclusions", material.rows("exclusions"))
     more = first_of(_SESSIONS_MAX, len(material.sessions), "sessions")
     return [material.drawn("timeline", figures.timeline, captions.timeline, rates, events, exclusions, more=more)]

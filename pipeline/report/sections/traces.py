@@ -29,7 +29,8 @@ def write(material: Material, path: Path) -> None:
 
 def _all(material: Material) -> Iterator[Traces]:
     """Session by session, for there may be thousands."""
-    for session, ingested, fused in zip(material.sessions, material.ingested, material.fused, strict=True):
+    ingested_of, fused_of = (material.entries[stage] for stage in ("ingest", "fuse"))
+    for session, ingested, fused in zip(material.sessions, ingested_of, fused_of, strict=True):
         yield _of_session(material, session, ingested, fused)
 
 

@@ -76,7 +76,7 @@ def test_several_studies_get_a_folder_each(
 
 
 def test_results_hold_the_lists_of_the_contract(folder: Folder, steadyhand: Steadyhand) -> None:
-    from pipeline.tables.columns import TABLES
+    from pipeline.tables.catalogue import TABLES
 
     assert steadyhand("compare", folder(SETTINGS, **{"measures.csv": MEASURES})).code == 0
     results = steadyhand.results()

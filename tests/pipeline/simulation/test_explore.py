@@ -22,7 +22,7 @@ from pipeline.simulation.session import Setting
 from pipeline.simulation.what_pays import MEASURES, Tracker, differences, means, what_pays
 from pipeline.study.folder import load_study
 from pipeline.tables import table as tables
-from pipeline.tables.columns import TABLES
+from pipeline.tables.catalogue import TABLES
 from tests.conftest import CLONE
 from tests.pipeline.helpers import Ran, run
 
@@ -105,7 +105,7 @@ def test_the_report_says_what_pays_and_where_it_comes_from(study: Path, command:
         assert "Simulated participants; direction and rough size only." in leaf.extract_text()
     read = pd.read_csv(out / "explore.csv")
     assert read["completion_time_s"].tolist() == pytest.approx([row["completion_time_s"] for row in content["explore"]])
-    assert tables.read("explore_people", out).shape == (8, len(TABLES["explore_people"]))
+    assert tables.read("explore_people", out).shape == (8, len(TABLES["explore_people"].names))
     provenance = json.loads((out / "provenance.json").read_text(encoding="utf-8"))
     assert provenance["settings"]["simulation"]["seed"] == 1
     assert not (study / "data").exists()

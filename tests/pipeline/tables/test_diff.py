@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.commands import explanation, replay
-from pipeline.tables import differences, results
-from pipeline.tables.columns import TABLES
-from pipeline.tables.differences import ABSENT, OF_A_REPLAY, OF_A_STUDY, between, changes
+from pipeline.commands import explanation
+from pipeline.tables import differences
+from pipeline.tables.differences import ABSENT, between, changes
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, run
 
@@ -316,15 +315,6 @@ def test_hostile_names_are_data(folder: Folder, diff: Diff) -> None:
     assert ran.code == 3
     assert "\x1b" not in ran.out
     assert hostile.replace("\x1b", "□") in ran.out
-
-
-def test_every_table_of_the_results_has_columns_that_tell_its_rows_apart() -> None:
-    assert set(OF_A_STUDY) == set(results.LISTS)
-    assert set(OF_A_REPLAY) == set(replay._IN_RESULTS)
-    for tables in (OF_A_STUDY, OF_A_REPLAY):
-        for name, columns in tables.items():
-            assert set(columns) <= set(TABLES[name].names)
-            assert all(str(TABLES[name].field(column).type) == "string" for column in columns)
 
 
 VALUES = st.none() | st.booleans() | st.integers(-9, 9) | st.floats(-1e6, 1e6) | st.text(max_size=3)
