@@ -1,20 +1,32 @@
-"""Tables to figures: one function a figure, one look for all. Each takes tables and gives a matplotlib Figure.
+"""Tables to figures: one drawing a figure, one look for all.
 
-Columns are those of pipeline.tables; `draw` and `save` write a figure as SVG.
+Each takes tables, whose columns docs/tables.md explains, and gives a matplotlib Figure; its `words` take the same and
+give a caption and a text alternative. `save` writes a figure as SVG.
 """
 
 from __future__ import annotations
 
-from pipeline.report.figures.accuracy import calibration, errors, lag_and_error, trade_off
-from pipeline.report.figures.canvas import path, paths, selection_errors, task_layout
-from pipeline.report.figures.outcomes import paired, scales, trials, workload
+from pipeline.report.figures.box_plots import workload
+from pipeline.report.figures.drawing import Drawing, Words
+from pipeline.report.figures.error_and_lag import errors, lag_and_error
+from pipeline.report.figures.excerpts import estimates, streams
+from pipeline.report.figures.hand_paths import path, paths
+from pipeline.report.figures.layout import task_layout
+from pipeline.report.figures.lead_curves import lead
 from pipeline.report.figures.power import Labels, power
-from pipeline.report.figures.sensors import estimates, lead, noise, streams
+from pipeline.report.figures.rainclouds import paired, scales
+from pipeline.report.figures.selections import selection_errors
+from pipeline.report.figures.sensor_noise import noise
+from pipeline.report.figures.stated_sd import calibration
 from pipeline.report.figures.style import draw, save
 from pipeline.report.figures.timeline import timeline
+from pipeline.report.figures.trial_by_trial import trials
+from pipeline.report.figures.variants import trade_off
 
 __all__ = [
+    "Drawing",
     "Labels",
+    "Words",
     "calibration",
     "draw",
     "errors",

@@ -15,8 +15,9 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.glyphs import showable
-from pipeline.simulation.what_pays import MOST, Tracker
+from pipeline.simulation.what_pays import MEASURES, MOST, Tracker
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words import NOTHING, number
 
@@ -40,9 +41,47 @@ class Surface:
 ERROR = Surface("selection_rmse_mm", "Selection error, RMSE (mm)", logarithmic=True)
 TIME = Surface("completion_time_s", "Completion time (s)")
 PARTICIPANTS = Surface("participants_needed", "Participants needed", 0, logarithmic=True, empty=f"> {MOST}")
+NAMES = dict(zip(MEASURES, ("selection error", "completion time"), strict=True))
+"""The two measures in a sentence."""
+_OUTLINED = "The outlined cell is the tracker closest to the study's own."
 
 
-def surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -> Figure:
+def _outcome_words(table: pd.DataFrame, surface: Surface, own: Tracker) -> Words:
+    caption = f"{surface.label} over the tracker's latency and noise, a panel a rate and estimator. {_OUTLINED}"
+    return Words(caption, _alt(surface))
+
+
+@drawing(_outcome_words)
+def outcome(table: pd.DataFrame, surface: Surface, own: Tracker) -> Figure:
+    """Error or time over trackers, a row of panels for each estimator; `table` has the columns of `explore`."""
+    return _surfaces(table, "estimator", surface, own)
+
+
+def _participants_words(differences: pd.DataFrame, own: Tracker) -> Words:
+    return Words(
+        f"Participants needed to show a difference in {NAMES[differences['measure'].iloc[0]]}; in brackets where the"
+        f" first of the two is the better one. {_OUTLINED} Grey: more than {MOST}, or no difference. The table says how"
+        " rough they are.",
+        _alt(PARTICIPANTS),
+    )
+
+
+@drawing(_participants_words)
+def participants(differences: pd.DataFrame, own: Tracker) -> Figure:
+    """Participants needed over trackers, a row of panels for each pair of estimators.
+
+    `differences` has the columns of `explore_differences`, of one measure.
+    """
+    pair = differences["first"] + " or " + differences["second"]
+    bracketed = differences["mean_difference"] < 0
+    return _surfaces(differences.assign(pair=pair, bracketed=bracketed), "pair", PARTICIPANTS, own)
+
+
+def _alt(surface: Surface) -> str:
+    return f"Heat maps of {surface.label} over latency and noise; the values stand in the table that follows."
+
+
+def _surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -> Figure:
     """A row of panels for each value of the text column `panels`, a panel in it for each rate; a frame marks `own`.
 
     All share a scale; a cell without a value is grey, and one whose row is true in `bracketed` stands in brackets.

@@ -80,7 +80,7 @@ def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:
     save(function(*arguments), path)
 
 
-def name(text: object, length: int = _NAME_LENGTH) -> str:
+def as_label(text: object, length: int = _NAME_LENGTH) -> str:
     """A name as a figure can show it: with glyphs for all of it, and no longer than leaves room for the data."""
     shown = showable(str(text))
     if shown.startswith("_"):  # matplotlib leaves such names out of legends
@@ -158,7 +158,7 @@ def finite(values: Any) -> FloatArray:
     return kept
 
 
-def interval(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], upright: bool = True) -> None:
+def draw_mean(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], upright: bool = True) -> None:
     """A mean with its 95 % interval at a place; `look` is its colour and mark."""
     mean, half = mean_and_interval(values)
     shade, mark = look

@@ -10,9 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, legend, name, panels, styled
+from pipeline.report.figures.drawing import Words, drawing
+from pipeline.report.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, as_label, legend, panels, styled
 from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
+from pipeline.words import counted, number
 
 _GAP_TIMES = 5  # a silence this many times as long as usual is marked
 _ROW = 0.17  # inches
@@ -21,6 +23,23 @@ _PALE = 0.93
 _CROSS: dict[str, Any] = {"marker": "X", "color": COLOURS[5], "edgecolor": BLACK, "linewidths": 0.5, "s": 26}
 
 
+def _timeline_words(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.DataFrame) -> Words:
+    """How many silences there are, the longest of them, and how many sessions were set aside."""
+    sessions, found = stream_rates["session"].nunique(), silences(stream_rates)
+    told = f"{counted(sessions, 'session')}, {counted(len(found), 'stretch', 'stretches')} with a silence"
+    if len(found):
+        worst = found.iloc[int(np.argmax(found["gap_max_s"].to_numpy(np.float64)))]
+        told += f", the longest {number(float(worst['gap_max_s']), 2)} s ({worst['session']}, {worst['stream']})"
+    aside = len(set_aside(exclusions))
+    told += f"; {counted(aside, 'session')} set aside." if aside else "; none set aside."
+    return Words(
+        f"What arrived when, a row a stream of each session: {told} The paler a stretch, the fewer"
+        " messages arrived; a cross marks a silence of five usual steps or longer, 50 ms at least.",
+        f"Timeline of every session's streams. {told}",
+    )
+
+
+@drawing(_timeline_words)
 @styled
 def timeline(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.DataFrame) -> Figure:
     """A row a stream of each session, shaded by how many of its usual messages arrived, silences and events marked.
@@ -38,9 +57,8 @@ def timeline(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.Da
         mine = [stream for one, stream in rows if one == session]
         for stream in mine:
             at[session, stream] = place
-            labels.append(
-                (place, f"{name(session, 22)}  {name(stream, 12)}" if stream == mine[0] else name(stream, 12))
-            )
+            whose = f"{as_label(session, 22)}  " if stream == mine[0] else ""
+            labels.append((place, whose + as_label(stream, 12)))
             place += 1
         _events(axes, stream_rates, events, session, (place - len(mine) - 0.5, place - 0.5))
         place += 0.6
@@ -50,7 +68,7 @@ def timeline(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.Da
     end = float((shares["begin_s"] + shares["duration_s"]).max()) if len(shares) else 1.0
     for session in aside:
         axes.plot([0, end], [place, place], color=GREY, linewidth=1, linestyle=(0, (1, 2)))
-        labels.append((place, f"{name(session, 22)}  set aside"))
+        labels.append((place, f"{as_label(session, 22)}  set aside"))
         place += 1.4
     axes.set_yticks([where for where, _ in labels], [label for _, label in labels])
     axes.tick_params(axis="y", length=0, labelsize=7.5)

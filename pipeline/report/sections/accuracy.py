@@ -6,7 +6,6 @@ import pandas as pd
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
-from pipeline.report.figures import captions
 from pipeline.report.sections.material import Material
 from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
@@ -129,12 +128,12 @@ def _session_table(rows: list[Row]) -> Table:
 
 def _over_sessions(material: Material, rows: pd.DataFrame) -> list[Block]:
     """Error and lag by estimator, one against the other, and the stated SD against what happened."""
-    blocks: list[Block] = [material.drawn("accuracy", figures.errors, captions.errors, rows)]
+    blocks: list[Block] = [material.drawn("accuracy", figures.errors, rows)]
     if rows["lag_s"].notna().any():
-        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, captions.lag_and_error, rows))
+        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, rows))
     counts = material.table("calibration")
     if len(counts):
-        blocks.append(material.drawn("calibration", figures.calibration, captions.calibration, counts))
+        blocks.append(material.drawn("calibration", figures.calibration, counts))
     return blocks
 
 
@@ -144,9 +143,9 @@ def _session_figures(material: Material) -> list[Block]:
     excerpts, curves = (material.table_of(name, first) for name in ("excerpts", "lead_curves"))
     blocks: list[Block] = []
     if len(excerpts):
-        blocks.append(material.drawn("streams", figures.streams, captions.streams, excerpts))
+        blocks.append(material.drawn("streams", figures.streams, excerpts))
     if (excerpts["kind"] == "estimate").any():
-        blocks.append(material.drawn("estimates", figures.estimates, captions.estimates, excerpts))
+        blocks.append(material.drawn("estimates", figures.estimates, excerpts))
     if len(curves):
-        blocks.append(material.drawn("lead", figures.lead, captions.lead, curves))
+        blocks.append(material.drawn("lead", figures.lead, curves))
     return blocks

@@ -9,10 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.report import figures
-from pipeline.report.document.model import Block, Document, Figure, Notice, Paragraph, Section, Strong, Table, columns
-from pipeline.report.figures import exploration as exploration_figures
-from pipeline.report.figures.exploration import ERROR, PARTICIPANTS, TIME, Surface
+from pipeline.report.document.model import Block, Document, Notice, Paragraph, Section, Strong, Table, columns
+from pipeline.report.figures.exploration import ERROR, NAMES, TIME, outcome, participants
+from pipeline.report.sections.material import draw_now
 from pipeline.report.sections.provenance import libraries
 from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.study.settings import Study
@@ -23,8 +22,6 @@ from pipeline.words import NOTHING, counted, interval, listing, number, percent,
 ORIGIN = "Simulated participants; direction and rough size only."
 _ROWS_MAX = 150
 _UNITS = dict(zip(MEASURES, ("mm", "s"), strict=True))
-_NAMES = dict(zip(MEASURES, ("selection error", "completion time"), strict=True))
-_OUTLINED = "The outlined cell is the tracker closest to the study's own."
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ def document(explored: Explored, drawn: Path) -> Document:
 
 def pays_sentence(pays: Pays, estimator: str) -> Sequence[str]:
     """What pays more for one measure, and its evidence; `estimator` is the first explored."""
-    name, now, by_filter, by_tracker = _NAMES[pays.measure], pays.now, pays.by_filter, pays.by_tracker
+    name, now, by_filter, by_tracker = NAMES[pays.measure], pays.now, pays.by_filter, pays.by_tracker
     head = {
         "filter": f"For {name} a better filter pays more",
         "tracker": f"For {name} a better tracker pays more",
@@ -177,8 +174,7 @@ def _less(row: Row, here: Row, column: str) -> str:
 def _surfaces(explored: Explored, drawn: Path) -> Iterator[Block]:
     table = explored.found["explore"]
     for surface, name in ((ERROR, "error"), (TIME, "time")):
-        caption = f"{surface.label} over the tracker's latency and noise, a panel a rate and estimator. {_OUTLINED}"
-        yield _draw(explored, table, "estimator", surface, drawn / f"{name}.svg", caption)
+        yield draw_now(drawn / f"{name}.svg", outcome, table, surface, explored.own)
     rows = explored.rows("explore")
     titles = ("Estimator", "Latency (ms)", "Noise (mm)", "Rate (Hz)", "Error, RMSE (mm)", "Time (s)", "Misses", "Left")
     cells = tuple(
@@ -205,12 +201,6 @@ def _more(rows: Sequence[Row]) -> str:
     return f" The first {_ROWS_MAX} of {len(rows)}; all are in results.json." if len(rows) > _ROWS_MAX else ""
 
 
-def _draw(explored: Explored, table: pd.DataFrame, panels: str, surface: Surface, path: Path, caption: str) -> Figure:
-    figures.draw(exploration_figures.surfaces, path, table, panels, surface, explored.own)
-    alt = f"Heat maps of {surface.label} over latency and noise; the values stand in the table that follows."
-    return Figure(f"figure-{path.stem}", path.name, caption, alt)
-
-
 def _needed(explored: Explored, drawn: Path) -> Iterator[Block]:
     table = explored.found["explore_differences"]
     yield Paragraph(
@@ -222,13 +212,7 @@ def _needed(explored: Explored, drawn: Path) -> Iterator[Block]:
     )
     for measure in MEASURES:
         of_measure = table[table["measure"] == measure]
-        pair = of_measure["first"] + " or " + of_measure["second"]
-        named = of_measure.assign(pair=pair, bracketed=of_measure["mean_difference"] < 0)
-        caption = (
-            f"Participants needed to show a difference in {_NAMES[measure]}; in brackets where the first of the two is"
-            f" the better one. {_OUTLINED} Grey: more than {MOST}, or no difference. The table says how rough they are."
-        )
-        yield _draw(explored, named, "pair", PARTICIPANTS, drawn / f"participants-{measure}.svg", caption)
+        yield draw_now(drawn / f"participants-{measure}.svg", participants, of_measure, explored.own)
     rows = explored.rows("explore_differences")
     titles = ("Measure", "Pair", "Latency (ms)", "Noise (mm)", "Rate (Hz)", "Difference", "d_z", "Participants")
     cells = tuple(_difference_cells(row) for row in rows[:_ROWS_MAX])

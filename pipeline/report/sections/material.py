@@ -15,7 +15,7 @@ import pandas as pd
 from pipeline.engine.two_processes import Job
 from pipeline.report import figures
 from pipeline.report.document.model import Figure
-from pipeline.report.figures import captions
+from pipeline.report.figures import Drawing
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -86,26 +86,25 @@ class Material:
     def figure(
         self,
         name: str,
-        function: Callable[..., matplotlib.figure.Figure],
+        drawing: Callable[..., matplotlib.figure.Figure],
         caption: str,
         alt: str,
         *arguments: Any,
     ) -> Figure:
-        """Have a figure drawn into the report's figures, and name it in the text."""
-        self.drawings.append(Job(figures.draw, (function, self.figures / f"{name}.svg", *arguments)))
+        """Have a figure drawn into the report's figures, under words of the section's own."""
+        self.drawings.append(Job(figures.draw, (drawing, self.figures / f"{name}.svg", *arguments)))
         return Figure(f"figure-{name}", f"{name}.svg", caption, alt)
 
-    def drawn(
-        self,
-        name: str,
-        function: Callable[..., matplotlib.figure.Figure],
-        said: Callable[..., captions.Said],
-        *arguments: Any,
-        more: str = "",
-    ) -> Figure:
-        """A figure with what its caption function says of the same arguments, and more, such as what is left out."""
-        caption, alt = said(*arguments)
-        return self.figure(name, function, f"{caption}{more}", alt, *arguments)
+    def drawn(self, name: str, drawing: Drawing[...], *arguments: Any, more: str = "") -> Figure:
+        """A figure with its own words, and more, such as what is left out."""
+        caption, alt = drawing.words(*arguments)
+        return self.figure(name, drawing, f"{caption}{more}", alt, *arguments)
+
+
+def draw_now(path: Path, drawing: Drawing[...], *arguments: Any) -> Figure:
+    """Draw a figure into a file, for a report that is not a study's, and name it in the text with its words."""
+    figures.draw(drawing, path, *arguments)
+    return Figure(f"figure-{path.stem}", path.name, *drawing.words(*arguments))
 
 
 def safe_name(text: str) -> str:

@@ -7,8 +7,7 @@ from itertools import groupby
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
-from pipeline.report.figures import captions
-from pipeline.report.figures.canvas import offsets_mm
+from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.study.measures import MEASURES, measure
@@ -120,9 +119,7 @@ def _measured(material: Material, measure: str) -> list[Block]:
     if not wide.notna().any().any():
         return []
     label = measure_label(measure)
-    blocks: list[Block] = [
-        material.drawn(f"measure-{safe_name(measure)}", figures.paired, captions.paired, wide, measure)
-    ]
+    blocks: list[Block] = [material.drawn(f"measure-{safe_name(measure)}", figures.paired, wide, measure)]
     for sentence in _sentences(material.comparisons_of(measure)):
         blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
     return blocks
@@ -131,7 +128,7 @@ def _measured(material: Material, measure: str) -> list[Block]:
 def _task(material: Material) -> list[Block]:
     """The layout of the task, where study.yaml has one."""
     task = getattr(material.study, "task", None)
-    return [] if task is None else [material.drawn("task", figures.task_layout, captions.task_layout, task)]
+    return [] if task is None else [material.drawn("task", figures.task_layout, task)]
 
 
 def _selected(material: Material) -> list[Block]:
@@ -143,15 +140,13 @@ def _selected(material: Material) -> list[Block]:
         scale = study.display.px_per_mm if study.display is not None and study.display.unit == "px" else None
         if len(offsets_mm(selections, plane)):
             shown = (selections, study.conditions, plane, scale)
-            blocks.append(
-                material.drawn("selection-errors", figures.selection_errors, captions.selection_errors, *shown)
-            )
+            blocks.append(material.drawn("selection-errors", figures.selection_errors, *shown))
     several = trials.groupby(["participant", "condition"])["trial"].nunique().max() if len(trials) else 0
     people = sorted(set(trials["participant"]))
     if several > 1:
         some = trials[trials["participant"].isin(people[:_PEOPLE_MAX])]
         more = first_of(_PEOPLE_MAX, len(people), "participants")
-        blocks.append(material.drawn("trials", figures.trials, captions.trials, some, study.conditions, more=more))
+        blocks.append(material.drawn("trials", figures.trials, some, study.conditions, more=more))
     return blocks
 
 
@@ -180,8 +175,8 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
     if tested:
         blocks.append(_tests_table(questionnaire, title, tested))
     called = f"ratings-{safe_name(questionnaire)}"
-    blocks.append(material.drawn(called, figures.workload, captions.workload, wide))
-    blocks.append(material.drawn(f"{called}-people", figures.scales, captions.scales, wide))
+    blocks.append(material.drawn(called, figures.workload, wide))
+    blocks.append(material.drawn(f"{called}-people", figures.scales, wide))
     return blocks
 
 

@@ -6,8 +6,7 @@ import pandas as pd
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Section
-from pipeline.report.figures import captions
-from pipeline.report.figures.canvas import Plane
+from pipeline.report.figures.plane import Plane
 from pipeline.report.sections.material import Material, first_of
 
 _SESSIONS_MAX = 48  # drawn; a page of more would be slow to open
@@ -35,7 +34,7 @@ def _one(material: Material, used: list[int], plane: Plane) -> list[Block]:
     shown = [line for line in dict.fromkeys(lines) if line in there]
     if not shown:
         return []
-    return [material.drawn("path", figures.path, captions.path, tracks, positions, events, shown, plane)]
+    return [material.drawn("path", figures.path, tracks, positions, events, shown, plane)]
 
 
 def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
@@ -57,7 +56,7 @@ def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
         found["events"].append(events)
     sessions = pd.DataFrame([material.sessions[place].ids for place in used])
     whole = [pd.concat(found[name]) for name in _READ]
-    return [material.drawn("paths", figures.paths, captions.paths, *whole, sessions, ordered, plane, more=more)]
+    return [material.drawn("paths", figures.paths, *whole, sessions, ordered, plane, more=more)]
 
 
 def _displayed(material: Material, place: int) -> str | None:

@@ -9,7 +9,6 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report import traffic_lights as session_quality
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
-from pipeline.report.figures import captions
 from pipeline.report.sections import timeline
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
@@ -216,7 +215,7 @@ def _noise(material: Material) -> list[Block]:
         "SD in study.yaml",
     )
     return [
-        material.drawn("sensor-noise", figures.noise, captions.noise, _residuals(material, names), units),
+        material.drawn("sensor-noise", figures.noise, _residuals(material, names), units),
         Table(
             "table-noise",
             "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",

@@ -12,7 +12,6 @@ from pipeline.report.document.model import (
     Block,
     Column,
     Document,
-    Figure,
     Notice,
     Paragraph,
     Section,
@@ -21,7 +20,7 @@ from pipeline.report.document.model import (
     columns,
 )
 from pipeline.report.sections.accuracy import SMOOTHED_REMARK
-from pipeline.report.sections.material import ORIGINS
+from pipeline.report.sections.material import ORIGINS, draw_now
 from pipeline.report.sections.provenance import libraries
 from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
@@ -108,16 +107,7 @@ def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[B
     if not ranked:
         yield Paragraph(("Neither lag nor jitter could be measured, so what less error costs cannot be drawn.",))
     else:
-        name = f"trade-off-{index}.svg"
-        figures.draw(figures.trade_off, drawn / name, tables.frame("replay_means", ranked))
-        yield Figure(
-            f"figure-trade-off-{index}",
-            name,
-            f"What less error costs, {where}: lag and jitter against RMSE, means over sessions with 95 % intervals; the"
-            " numbers are the ranks of the table, a ring marks an estimator's own settings. To the left and near zero"
-            " is better.",
-            f"Scatter plot of lag and jitter against RMSE for {counted(len(ranked), 'variant')}, {where}.",
-        )
+        yield draw_now(drawn / f"trade-off-{index}.svg", figures.trade_off, tables.frame("replay_means", ranked))
 
 
 def _called(row: Row) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block
-from pipeline.report.figures import captions
 from pipeline.report.sections.material import Material, first_of
 from pipeline.tables import table as tables
 
@@ -20,4 +19,4 @@ def blocks(material: Material) -> list[Block]:
     events = material.table_of("events", first)
     exclusions = tables.frame("exclusions", material.rows("exclusions"))
     more = first_of(_SESSIONS_MAX, len(material.sessions), "sessions")
-    return [material.drawn("timeline", figures.timeline, captions.timeline, rates, events, exclusions, more=more)]
+    return [material.drawn("timeline", figures.timeline, rates, events, exclusions, more=more)]

@@ -11,8 +11,7 @@ from matplotlib.collections import LineCollection
 from scipy import stats
 
 from pipeline.report import figures
-from pipeline.report.figures import captions
-from pipeline.report.figures.accuracy import nine_of_ten, shares
+from pipeline.report.figures.stated_sd import nine_of_ten, shares
 from pipeline.tables import table as tables
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
@@ -36,7 +35,7 @@ def test_least_error_and_least_lag_are_named(tmp_path: Path) -> None:
     shown = texts(figures.errors(FOUND), tmp_path)
     assert {"raw", "good", "quick", "RMSE against the reference (mm)", "Lag behind the reference (ms)"} <= set(shown)
     assert "Error (n = 2 sessions)" in shown
-    said = captions.errors(FOUND).caption
+    said = figures.errors.words(FOUND).caption
     assert "Least RMSE: good, 10.00 mm; most: raw, 32.00 mm. Least lag: quick, 0 ms." in said
 
 
@@ -47,7 +46,7 @@ def test_intervals_of_the_trade_off_are_over_sessions(tmp_path: Path) -> None:
     low, high = stats.t.interval(0.95, 1, 32, stats.sem([30, 34]))
     np.testing.assert_allclose(np.sort(np.asarray(bars.get_segments()[0])[:, 0]), [low, high])
     assert "raw (n = 2)" in texts(figure, tmp_path)
-    assert "than good and quick" in captions.lag_and_error(FOUND).caption
+    assert "than good and quick" in figures.lag_and_error.words(FOUND).caption
 
 
 @pytest.mark.parametrize(
@@ -60,7 +59,7 @@ def test_intervals_of_the_trade_off_are_over_sessions(tmp_path: Path) -> None:
     ],
 )
 def test_one_session_missing_and_constant_accuracy(found: pd.DataFrame, tmp_path: Path) -> None:
-    for draw, say in ((figures.errors, captions.errors), (figures.lag_and_error, captions.lag_and_error)):
+    for draw, say in ((figures.errors, figures.errors.words), (figures.lag_and_error, figures.lag_and_error.words)):
         saved(draw(found), tmp_path)
         assert "nan" not in f"{say(found)}"
 
@@ -93,7 +92,7 @@ def test_calibration_pools_instants_and_not_shares(tmp_path: Path) -> None:
     np.testing.assert_allclose(share, [0.09, 0.6])
     shown = texts(figures.calibration(table), tmp_path)
     assert {"gp (n = 2 sessions)", "raw (n = 1 session)", "normal", "k (stated SDs)", "Within k SD (%)"} <= set(shown)
-    assert "where a normal has 95 %: gp 60 %, raw 60 %" in captions.calibration(table).caption
+    assert "where a normal has 95 %: gp 60 %, raw 60 %" in figures.calibration.words(table).caption
 
 
 def test_many_sessions_are_a_band_of_nine_in_ten(tmp_path: Path) -> None:
@@ -105,7 +104,7 @@ def test_many_sessions_are_a_band_of_nine_in_ten(tmp_path: Path) -> None:
     np.testing.assert_allclose(high, np.percentile([n % 101 for n in range(1001)], 95) * np.array([1, 0]) + [0, 100])
     path = saved(figures.calibration(table), tmp_path)
     assert "nine of ten sessions" in texts(figures.calibration(table), tmp_path)
-    assert "band: nine of ten sessions" in captions.calibration(table).caption
+    assert "band: nine of ten sessions" in figures.calibration.words(table).caption
     assert path.stat().st_size < 200_000
 
 

@@ -12,8 +12,9 @@ import pytest
 from matplotlib.patches import Circle, Ellipse
 
 from pipeline.report import figures
-from pipeline.report.figures import captions
-from pipeline.report.figures.canvas import ellipse_95, offsets_mm, targets_of, way
+from pipeline.report.figures.hand_paths import way
+from pipeline.report.figures.layout import targets_of
+from pipeline.report.figures.selections import ellipse_95, offsets_mm
 from pipeline.tables import table as tables
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
@@ -39,7 +40,7 @@ def test_the_layout_has_every_target_in_its_size_and_the_window(tmp_path: Path) 
     shown = texts(figure, tmp_path)
     assert {"1", "2", "3", "x (mm)", "y (mm)", "path", "targets (n = 3)"} <= set(shown)
     assert "window, 48 × 86 mm, at target 1" in shown
-    said = captions.task_layout(task()).caption
+    said = figures.task_layout.words(task()).caption
     assert "a canvas of 2000 × 1000 mm with 3 targets of 20 mm; the window of 48 × 86 mm shows 0.2 % of it" in said
 
 
@@ -50,7 +51,7 @@ def test_rings_without_window_or_path(tmp_path: Path) -> None:
     assert len(places) == 13
     np.testing.assert_allclose(np.hypot(places[:, 0], places[:, 1] - 500), 200)
     assert "targets (n = 13)" in texts(figures.task_layout(ringed), tmp_path)
-    assert "window" not in captions.task_layout(ringed).caption
+    assert "window" not in figures.task_layout.words(ringed).caption
 
 
 @pytest.fixture
@@ -74,7 +75,7 @@ def test_a_path_has_its_lines_targets_and_selections(session: Any, tmp_path: Pat
     tracks, positions, events = session
     shown = texts(figures.path(tracks, positions, events, ["display", "fusion"]), tmp_path)
     assert {"display", "fusion", "targets (n = 1)", "selections (n = 1)", "x (mm)", "y (mm)"} <= set(shown)
-    said = captions.path(tracks, positions, events, ["display", "fusion"]).caption
+    said = figures.path.words(tracks, positions, events, ["display", "fusion"]).caption
     assert "in session P1_a" in said
     assert "display 200 × 50 mm, fusion 200 × 50 mm; 1 selection." in said
 
@@ -90,7 +91,7 @@ def test_a_path_of_nothing(session: Any, tmp_path: Path) -> None:
     tracks, positions, events = session
     empty = (tracks.assign(x_mm=np.nan), positions[:0], events[:0])
     saved(figures.path(*empty, ["fusion", "absent"]), tmp_path)
-    assert "nan" not in f"{captions.path(*empty, ['fusion', 'absent'])}"
+    assert "nan" not in f"{figures.path.words(*empty, ['fusion', 'absent'])}"
 
 
 def test_every_participant_has_a_panel_and_the_widest_way_is_named(session: Any, tmp_path: Path) -> None:
@@ -103,7 +104,7 @@ def test_every_participant_has_a_panel_and_the_widest_way_is_named(session: Any,
     assert {"P1", "P2", "a: fusion", "x (mm)", "y (mm)"} <= set(shown)
     assert not [text for text in shown if "n = " in text]  # a panel's number is not the figure's
     assert pictures(tmp_path / "figure.svg") == 2  # thousands of rows
-    said = captions.paths(both, positions, events, sessions, {"a": "fusion"}).caption
+    said = figures.paths.words(both, positions, events, sessions, {"a": "fusion"}).caption
     assert "2 participants" in said
     assert "The widest is session P2_a, 600 × 50 mm." in said
 
@@ -141,7 +142,7 @@ def test_selections_are_counted_and_described_in_the_display_s_unit(tmp_path: Pa
     ellipses = [patch for axes in figure.axes for patch in axes.patches if isinstance(patch, Ellipse)]
     assert len(ellipses) == 1  # three points have none
     x, y = 10 * offsets[1:].mean(axis=0)
-    said = captions.selection_errors(rows, ["a", "b", "c"], ("x", "y"), 10.0).caption
+    said = figures.selection_errors.words(rows, ["a", "b", "c"], ("x", "y"), 10.0).caption
     assert f"a: n = 39, 1 participant, mean ({x:.1f}, {y:.1f}) px, ellipse".replace("-", "−") in said
     assert "c: none" in said
 

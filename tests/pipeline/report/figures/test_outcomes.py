@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from pipeline.report import figures
-from pipeline.report.figures import captions
 from pipeline.tables import table as tables
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
@@ -42,7 +41,7 @@ def test_every_participant_is_a_mark_and_the_differences_have_an_axis_of_their_o
 
 
 def test_means_and_intervals_are_those_of_the_t_distribution() -> None:
-    said = captions.paired(TIMES, MEASURE)
+    said = figures.paired.words(TIMES, MEASURE)
     difference = TIMES["kinect"] - TIMES["fusion"]
     low, high = stats.t.interval(0.95, 4, difference.mean(), stats.sem(difference))
     told = f"kinect − fusion: {difference.mean():.2f} [{low:.2f}, {high:.2f}] s, 4 of 5 lower under fusion"
@@ -53,14 +52,14 @@ def test_means_and_intervals_are_those_of_the_t_distribution() -> None:
 
 def test_a_caption_follows_the_data_and_not_a_wish() -> None:
     turned = TIMES.rename(columns={"kinect": "fusion", "fusion": "kinect"})[["kinect", "fusion"]]
-    assert "1 of 5 lower under fusion" in captions.paired(turned, MEASURE).caption
+    assert "1 of 5 lower under fusion" in figures.paired.words(turned, MEASURE).caption
 
 
 def test_missing_cells_are_not_paired_and_n_says_so(tmp_path: Path) -> None:
     gap = TIMES.copy()
     gap.loc["P2", "fusion"] = np.nan
     assert "Participants (n = 4 complete)" in texts(figures.paired(gap, MEASURE), tmp_path)
-    said = captions.paired(gap, MEASURE).caption
+    said = figures.paired.words(gap, MEASURE).caption
     assert "4 participants complete" in said
     assert "(n = 5)" in said  # of kinect, which all have
     assert "(n = 4)" in said
@@ -73,7 +72,7 @@ def test_more_conditions_are_held_against_the_first(count: int, tmp_path: Path) 
     shown = texts(figures.paired(wide, "m_mm"), tmp_path)
     assert {f"− c{place}" for place in range(1, count)} <= set(shown)
     assert "c0 − the other" in shown
-    assert captions.paired(wide, "m_mm").caption.count("lower under") == min(count - 1, 8)
+    assert figures.paired.words(wide, "m_mm").caption.count("lower under") == min(count - 1, 8)
 
 
 @pytest.mark.parametrize(
@@ -92,14 +91,18 @@ def test_odd_data_are_drawn_and_described(values: list[list[float]], tmp_path: P
     saved(figures.paired(wide, "m"), tmp_path)
     saved(figures.scales({"q/one": wide, "q/two": wide + 1}), tmp_path)
     saved(figures.workload({"q/one": wide, "q/two": wide + 1}), tmp_path)
-    for said in (captions.paired(wide, "m"), captions.scales({"q/one": wide}), captions.workload({"q/one": wide})):
+    for said in (
+        figures.paired.words(wide, "m"),
+        figures.scales.words({"q/one": wide}),
+        figures.workload.words({"q/one": wide}),
+    ):
         assert "nan" not in f"{said.caption}{said.alt}"
 
 
 def test_one_condition_has_no_differences() -> None:
     wide = TIMES[["kinect"]]
     assert len(figures.paired(wide, MEASURE).axes) == 1
-    assert "difference" not in captions.paired(wide, MEASURE).caption
+    assert "difference" not in figures.paired.words(wide, MEASURE).caption
 
 
 def test_a_name_that_begins_with_an_underscore_is_in_the_legend(tmp_path: Path) -> None:
@@ -113,7 +116,7 @@ def test_hostile_names_are_text(name: str, tmp_path: Path) -> None:
     path = saved(figures.paired(wide, f"../{name}_mm"), tmp_path)
     assert "<script" not in path.read_text(encoding="utf-8")
     saved(figures.workload({f"q/{name}": wide}), tmp_path)
-    assert name in captions.paired(wide, MEASURE).caption  # the pages escape it
+    assert name in figures.paired.words(wide, MEASURE).caption  # the pages escape it
 
 
 def test_a_notebook_without_our_style_draws_names_as_they_are(tmp_path: Path) -> None:
@@ -135,15 +138,15 @@ def test_scales_are_of_one_height_and_none_is_cut() -> None:
     assert figure.axes[1].get_ylim() == (low, high)
     assert low == 0
     assert high > TIMES.to_numpy().max()
-    said = captions.scales(wide).caption
+    said = figures.scales.words(wide).caption
     assert "furthest apart in effort: 44.74 under kinect, 34.84 under fusion" in said
 
 
 def test_the_box_plot_says_where_medians_are_lowest() -> None:
     wide = {"q/a": TIMES, "q/b": TIMES[["fusion", "kinect"]].set_axis(["kinect", "fusion"], axis=1)}
-    assert "the lowest median is in 1 under kinect and 1 under fusion" in captions.workload(wide).caption
+    assert "the lowest median is in 1 under kinect and 1 under fusion" in figures.workload.words(wide).caption
     equal = {"q/a": TIMES.assign(fusion=TIMES["kinect"])}
-    assert "0 under kinect and 0 under fusion; others tie" in captions.workload(equal).caption
+    assert "0 under kinect and 0 under fusion; others tie" in figures.workload.words(equal).caption
 
 
 def trial_rows(people: int, trials: int) -> pd.DataFrame:
@@ -169,7 +172,7 @@ def test_trials_are_those_recorded_a_panel_a_participant(tmp_path: Path) -> None
     table.loc[0, "position_error_mm"] = np.nan
     shown = texts(figures.trials(table, ["a", "b"]), tmp_path)
     assert {"P0 (n = 7)", "P1 (n = 8)", "Error (mm)", "Trial", "a", "b"} <= set(shown)
-    said = captions.trials(table, ["a", "b"]).caption
+    said = figures.trials.words(table, ["a", "b"]).caption
     assert "3 participants, 23 selections" in said
     assert "b 7.5 to 2.9 mm" in said
 

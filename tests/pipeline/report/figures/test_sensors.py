@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from pipeline.report import figures
-from pipeline.report.figures import captions
-from pipeline.report.figures.sensors import errors_in
+from pipeline.report.figures.excerpts import errors_in
 from pipeline.tables import table as tables
 from tests.pipeline.report.figures.drawn import saved, texts
 
@@ -38,7 +37,7 @@ def test_streams_name_their_units_and_how_many_readings_there_are(excerpts: pd.D
     shown = texts(figures.streams(excerpts), tmp_path)
     assert {"Position, x (mm)", "tracker, as it arrives (n = 120)", "acceleration (n = 360)", "reference"} <= set(shown)
     assert "Time since the session's start (s)" in shown
-    said = captions.streams(excerpts)
+    said = figures.streams.words(excerpts)
     assert "session P1_a, axis x, 2.0 to 6.0 s" in said.caption
     assert "on arrival a frame is 5.0 mm (RMS) off the reference" in said.caption
 
@@ -47,7 +46,7 @@ def test_streams_alone(excerpts: pd.DataFrame, tmp_path: Path) -> None:
     frames = excerpts[excerpts["kind"] == "tracker"]
     assert len(figures.streams(frames).axes) == 1
     assert "reference" not in texts(figures.streams(frames), tmp_path)
-    assert "off the reference" not in captions.streams(frames).caption
+    assert "off the reference" not in figures.streams.words(frames).caption
 
 
 def test_estimates_stand_beside_their_errors(excerpts: pd.DataFrame, tmp_path: Path) -> None:
@@ -57,17 +56,17 @@ def test_estimates_stand_beside_their_errors(excerpts: pd.DataFrame, tmp_path: P
     assert len(figure.axes) == 4
     shown = texts(figure, tmp_path)
     assert {"late", "good", "error: RMS 10.0 mm here", "error: RMS 1.0 mm here", "x (mm)", "error (mm)"} <= set(shown)
-    said = captions.estimates(excerpts).caption
+    said = figures.estimates.words(excerpts).caption
     assert "good 1.0 mm, 0 % within ± 2 SD; late 10.0 mm, 100 % within ± 2 SD" in said
 
 
 def test_estimates_without_reference_or_overlap(excerpts: pd.DataFrame, tmp_path: Path) -> None:
     alone = excerpts[excerpts["kind"] != "reference"]
     assert len(figures.estimates(alone).axes) == 2
-    assert "RMS" not in captions.estimates(alone).caption
+    assert "RMS" not in figures.estimates.words(alone).caption
     elsewhere = excerpts.assign(time_s=excerpts["time_s"].where(excerpts["kind"] != "reference", 900.0))
     assert "error: not known" in texts(figures.estimates(elsewhere), tmp_path)
-    assert "nan" not in captions.estimates(elsewhere).caption
+    assert "nan" not in figures.estimates.words(elsewhere).caption
 
 
 def test_a_band_that_is_still_wide_does_not_flatten_the_errors(excerpts: pd.DataFrame) -> None:
@@ -88,7 +87,7 @@ def test_the_peaks_of_the_lead_are_named(tmp_path: Path) -> None:
     shown = texts(figures.lead(curves), tmp_path)
     assert {"fusion: peak at +111 ms", "raw: peak at 0 ms", "late: peak at −100 ms", "off"} <= set(shown)
     assert any("(ms)" in text for text in shown)
-    said = captions.lead(curves).caption
+    said = figures.lead.words(curves).caption
     assert "fusion +111 ms; raw 0 ms; off has no peak within half a second; late −100 ms" in said
     saved(figures.lead(curves.assign(correlation_mm2=0.0)), tmp_path)
 
@@ -100,6 +99,6 @@ def test_noise_names_unit_number_and_tails(tmp_path: Path) -> None:
     shown = texts(figures.noise(residuals, units), tmp_path)
     assert {"Reading − slow drift (mm)", "Reading − slow drift (mm/s²)"} <= set(shown)
     assert any(text.startswith("tracker: SD 1 mm") for text in shown)
-    said = captions.noise(residuals, units).caption
+    said = figures.noise.words(residuals, units).caption
     assert "tracker: SD 1.0 mm, n = 100, 0.0 % beyond 3 SD" in said
     assert "none: SD 0.0 mm, n = 0" in said

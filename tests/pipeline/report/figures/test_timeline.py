@@ -7,7 +7,6 @@ from pathlib import Path
 import pandas as pd
 
 from pipeline.report import figures
-from pipeline.report.figures import captions
 from pipeline.report.figures.timeline import silences
 from pipeline.tables import table as tables
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
@@ -57,14 +56,14 @@ def test_every_stream_has_a_row_and_what_was_set_aside_is_there(tmp_path: Path) 
     shown = texts(figures.timeline(RATES, EVENTS, ASIDE), tmp_path)
     assert {"P1_a  tracker", "<imu>", "P2_a  tracker", "P9_a  set aside", "silence", "selection"} <= set(shown)
     assert "Time since the session's first message (s)" in shown
-    said = captions.timeline(RATES, EVENTS, ASIDE).caption
+    said = figures.timeline.words(RATES, EVENTS, ASIDE).caption
     assert "2 sessions, 1 stretch with a silence, the longest 0.87 s (P1_a, tracker); 1 session set aside." in said
 
 
 def test_nothing_befell(tmp_path: Path) -> None:
     calm = RATES[RATES["stream"] == "<imu>"]
     saved(figures.timeline(calm, EVENTS[:0], ASIDE[:0]), tmp_path)
-    assert "0 stretches with a silence; none set aside" in captions.timeline(calm, EVENTS, ASIDE[:0]).caption
+    assert "0 stretches with a silence; none set aside" in figures.timeline.words(calm, EVENTS, ASIDE[:0]).caption
 
 
 def test_a_long_study_stays_small(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What sensors delivered in a few seconds of a session, and what estimators made of it: the paper's Figures 6 to 9."""
+"""What sensors delivered in a few seconds of a session, and what estimators made of it: the paper's Figures 6 to 8."""
 
 from __future__ import annotations
 
@@ -10,27 +10,46 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import (
     BLACK,
     COLOURS,
     GREY,
     WIDTH,
-    colour,
+    as_label,
     finite,
     grouped,
     legend,
-    marker,
-    name,
     panels,
     styled,
 )
+from pipeline.report.figures.wording import listed
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import MINUS, seconds
+from pipeline.words import counted, number, percent
 
 _TIME = "Time since the session's start (s)"
 _SHADES = 6  # the seventh colour is the reference's
 
 
+def _streams_words(excerpts: pd.DataFrame) -> Words:
+    """How far the frames are from the reference when they arrive, and how many there are of each."""
+    counts = excerpts["kind"].value_counts()
+    felt, frames = int(counts.get("acceleration", 0)), excerpts[excerpts["kind"] == "tracker"]
+    told = f"{counted(len(frames), 'frame')} of the tracker"
+    told += f" against {counted(felt, 'acceleration')}" if felt else ""
+    reference = excerpts[excerpts["kind"] == "reference"]
+    if len(reference) > 1 and len(frames):
+        at = np.interp(frames["time_s"], reference["time_s"], reference["value"], left=np.nan, right=np.nan)
+        error = finite(frames["value"].to_numpy(np.float64) - at)
+        if len(error):
+            told += f"; on arrival a frame is {number(float(np.sqrt(np.mean(error**2))), 1)} mm (RMS) off the reference"
+    return Words(
+        f"What the sensors delivered ({_span(excerpts)}): {told}.",
+        f"Tracker positions over time{', accelerations below' if felt else ''}: {told}.",
+    )
+
+
+@drawing(_streams_words)
 @styled
 def streams(excerpts: pd.DataFrame) -> Figure:
     """The tracker's frames as they arrive with the reference, and the accelerations below (paper, Fig. 6).
@@ -57,6 +76,26 @@ def streams(excerpts: pd.DataFrame) -> Figure:
     return figure
 
 
+def _estimates_words(excerpts: pd.DataFrame) -> Words:
+    """Each estimator's error in the stretch and how often it is within the stated band."""
+    names = list(dict.fromkeys(excerpts.loc[excerpts["kind"] == "estimate", "name"]))
+    parts = []
+    for name in names:
+        _, error, sd = errors_in(excerpts, name)
+        known = np.isfinite(error)
+        if known.any():
+            rms = float(np.sqrt(np.mean(error[known] ** 2)))
+            inside = float(np.mean(np.abs(error[known]) <= 2 * sd[known]))
+            parts.append((rms, f"{name} {number(rms, 1)} mm, {percent(inside, 0)} within ± 2 SD"))
+    told = f" Error (RMS) here, least first: {listed(text for _, text in sorted(parts))}." if parts else ""
+    return Words(
+        f"What each estimator makes of them ({_span(excerpts)}): its mean and two stated SDs"
+        f"{', and beside it its error in the band it states' if parts else ''}.{told}",
+        f"One panel an estimator ({listed(names, ', ')}) with mean, band and tracker frames.{told}",
+    )
+
+
+@drawing(_estimates_words)
 @styled
 def estimates(excerpts: pd.DataFrame) -> Figure:
     """Each estimator's mean and two SDs (paper, Figs. 7 and 8), and with a reference its error beside it.
@@ -79,6 +118,12 @@ def estimates(excerpts: pd.DataFrame) -> Figure:
     for axes in every[-1]:
         axes.set_xlabel(_TIME)
     return figure
+
+
+def _span(excerpts: pd.DataFrame) -> str:
+    time = finite(excerpts["time_s"])
+    where = f"session {excerpts['session'].iloc[0]}, axis {excerpts['axis'].iloc[0]}"
+    return f"{where}, {number(time.min(), 1)} to {number(time.max(), 1)} s, where the tracker moves most"
 
 
 def _errors_range(excerpts: pd.DataFrame, names: Sequence[str]) -> tuple[float, float]:
@@ -105,7 +150,7 @@ def _estimate(axes: Axes, excerpts: pd.DataFrame, estimator: str, shade: str) ->
         axes.plot(*reference, color=BLACK, linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
     if frames is not None:
         axes.scatter(*frames, s=4, color=GREY, label="tracker, as it arrives", zorder=3)
-    axes.set_title(name(estimator))
+    axes.set_title(as_label(estimator))
     axes.set_ylabel(f"{_axis(excerpts)} (mm)")
     grouped(axes)
 
@@ -150,64 +195,3 @@ def _axis(excerpts: pd.DataFrame) -> str:
 
 def _n(stream: tuple[FloatArray, FloatArray]) -> int:
     return len(stream[0])
-
-
-@styled
-def lead(lead_curves: pd.DataFrame) -> Figure:
-    """Cross-correlation of each estimator with the tracker as it arrived, peaks marked (paper, Fig. 9).
-
-    `lead_curves` has the columns of that table, of one session.
-    """
-    figure, (axes,) = panels(height=2.9)
-    for index, (estimator, rows) in enumerate(lead_curves.groupby("estimator", sort=False)):
-        shift, correlation = rows["lead_s"].to_numpy(np.float64), rows["correlation_mm2"].to_numpy(np.float64)
-        highest = np.max(np.abs(correlation), initial=0.0)
-        if not highest > 0:
-            continue
-        peak = peak_s(rows)
-        label = name(estimator) if peak is None else f"{name(estimator)}: peak at {seconds(peak)} ms"
-        axes.plot(1000 * shift, correlation / highest, color=colour(index), label=label)
-        if peak is not None:
-            mark: dict[str, Any] = {"markersize": 7, "markeredgecolor": "white", "color": colour(index)}
-            axes.plot([1000 * peak], [float(correlation.max() / highest)], marker(index), **mark)
-    axes.axvline(0, color=GREY, linewidth=0.8)
-    axes.set_xlabel("Lead over the tracker (ms); to the right: ahead of it")
-    axes.set_ylabel("Cross-correlation\n(share of its peak)")
-    legend(figure, [axes], 1, "outside right center")
-    return figure
-
-
-def peak_s(rows: pd.DataFrame) -> float | None:
-    """Where one estimator's curve is highest, in s; None at the edge of what was looked at, or where there is none."""
-    correlation = rows["correlation_mm2"].to_numpy(np.float64)
-    if not len(correlation):
-        return None
-    at = int(np.argmax(correlation))
-    inside = 0 < at < len(correlation) - 1 and correlation[at] > 0
-    return float(rows["lead_s"].iloc[at]) if inside else None
-
-
-@styled
-def noise(residuals: pd.DataFrame, units: pd.Series) -> Figure:
-    """Histogram of each sensor's readings in still stretches with the Gaussian of the same SD.
-
-    `residuals` has the columns `stream` and `residual` of `noise_residuals`, `units` each stream's unit, by its name,
-    in the order in which they are drawn.
-    """
-    from scipy import stats
-
-    figure, axes = panels(1, max(len(units), 1), 2.7)
-    for index, (panel, (stream, unit)) in enumerate(zip(axes, units.items(), strict=False)):
-        values = finite(residuals.loc[residuals["stream"] == stream, "residual"])
-        sd = float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
-        reach = 4 * sd or 1.0
-        bins = int(np.clip(np.sqrt(len(values)), 12, 60))
-        panel.hist(values, bins=bins, range=(-reach, reach), density=sd > 0, color=colour(index), alpha=0.35)
-        if sd > 0:
-            grid = np.linspace(-reach, reach, 200)
-            panel.plot(grid, stats.norm.pdf(grid, scale=sd), color=colour(index), linewidth=2)
-        panel.set_xlabel(f"Reading {MINUS} slow drift ({unit})")
-        panel.set_title(f"{name(stream, 20)}: SD {sd:.3g} {unit}\n(n = {len(values)})")
-        panel.set_yticks([])
-        panel.spines["left"].set_visible(False)
-    return figure

@@ -1,4 +1,4 @@
-"""What people did and felt: every participant in every condition, the differences, and a questionnaire's scales."""
+"""Every participant in every condition, and the differences: of one measure, or of each scale of a questionnaire."""
 
 from __future__ import annotations
 
@@ -10,31 +10,64 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import (
     BLACK,
     COLOURS,
     GREY,
     MARKS_MAX,
-    as_pixels,
+    as_label,
     colour,
+    draw_mean,
     finite,
     grouped,
-    interval,
-    legend,
-    lowest,
     marker,
     multiples,
-    name,
     panels,
     styled,
 )
+from pipeline.report.figures.wording import complete_counts, listed, mean_with_interval, spaced
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import MINUS, measure_label, short_label, unit_of
+from pipeline.words import MINUS, counted, measure_label, number, short_label, unit_of
 
 _CLOUD = 0.3  # of the way to the next condition
 _BOX = 0.07
 
 
+def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
+    """The means, the differences, and how many participants go the same way."""
+    label, unit, complete = measure_label(measure), spaced(unit_of(measure)), wide.dropna()
+    means = listed(
+        f"{name} {mean_with_interval(finite(wide[name]))}{unit} (n = {wide[name].count()})" for name in wide.columns
+    )
+    head = (
+        f"{label} by condition, {counted(len(complete), 'participant')} complete. Means with 95 % intervals: {means}."
+    )
+    alt = f"{label}: a raincloud a condition. {means}."
+    if len(wide.columns) > 1 and len(complete) > 1:
+        told = _differences_words(complete, unit)
+        head += f" {told}"
+        alt += f" {told}"
+    reading = (
+        " Small marks are participants"
+        + (", lines join the same one" if len(wide.columns) > 1 else "")
+        + "; shapes are their density, thick bars the middle half; large marks are means with 95 % intervals."
+    )
+    return Words(head + reading, alt)
+
+
+def _differences_words(complete: pd.DataFrame, unit: str) -> str:
+    first, *others = complete.columns
+    parts = []
+    for other in others:
+        difference = finite(complete[first] - complete[other])
+        lower = int(np.sum(difference > 0))
+        mean = mean_with_interval(difference)
+        parts.append(f"{first} {MINUS} {other}: {mean}{unit}, {lower} of {len(difference)} lower under {other}")
+    return f"Right, differences: {listed(parts)}."
+
+
+@drawing(_paired_words)
 @styled
 def paired(wide: pd.DataFrame, measure: str) -> Figure:
     """Raincloud of a measure: each participant in each condition, and beside it the differences to the first.
@@ -49,23 +82,53 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     figure, axes = panels(1, 2 if compared else 1, 3.1, **options)
     _rainclouds(axes[0], wide)
     _from_zero(axes[0], [wide])
-    axes[0].set_ylabel(name(measure_label(measure)))
+    axes[0].set_ylabel(as_label(measure_label(measure)))
     axes[0].set_title(f"Participants (n = {len(complete)} complete)")
     if compared:
         _differences(axes[1], complete)
         unit = unit_of(measure)
-        axes[1].set_ylabel(name(f"Difference ({unit})") if unit else "Difference")
+        axes[1].set_ylabel(as_label(f"Difference ({unit})") if unit else "Difference")
         axes[1].set_title(f"Differences (n = {len(complete)})")
     return figure
 
 
+def _scales_words(wide: Mapping[str, pd.DataFrame]) -> Words:
+    """How many scales lean which way, and which most."""
+    conditions = list(next(iter(wide.values())).columns)
+    head = f"Every scale by participant ({complete_counts(wide)}), drawn as the measures above."
+    alt = f"A raincloud a scale: {listed(short_label(name) for name in wide)}."
+    if len(conditions) > 1:
+        told = _furthest(wide, conditions)
+        return Words(f"{head} {told}", f"{alt} {told}")
+    return Words(head, alt)
+
+
+def _furthest(wide: Mapping[str, pd.DataFrame], conditions: Sequence[str]) -> str:
+    """The scale whose means lie furthest apart."""
+    spread: dict[str, tuple[float, pd.Series]] = {}
+    for measure, table in wide.items():
+        means = table.dropna().mean()
+        if means.notna().all() and len(means):
+            spread[measure] = (float(means.max() - means.min()), means)
+    if not spread:
+        return "No scale has a participant with every condition."
+    measure, (apart, means) = max(spread.items(), key=lambda one: one[1][0])
+    if apart == 0:
+        return "The means are the same in every scale."
+    return (
+        f"The means lie furthest apart in {short_label(measure).lower()}: {number(means.max())} under {means.idxmax()},"
+        f" {number(means.min())} under {means.idxmin()}."
+    )
+
+
+@drawing(_scales_words)
 @styled
 def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
     """The same for every scale of a questionnaire, a small panel a scale, all of one height."""
     figure, every, across = multiples(len(wide), 1.9, a_row=3, sharex=False)
     for index, (axes, (measure, table)) in enumerate(zip(every, wide.items(), strict=True)):
         _rainclouds(axes, table, small=True)
-        axes.set_title(f"{name(short_label(measure), 24)} (n = {len(table.dropna())})")
+        axes.set_title(f"{as_label(short_label(measure), 24)} (n = {len(table.dropna())})")
         if index % across == 0:
             axes.set_ylabel("Rating")
     _from_zero(every[0], wide.values())
@@ -83,7 +146,7 @@ def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
         side = -1 if index == 0 and len(at) > 1 else 1  # lines leave the first to the right
         _raincloud(axes, index, side, finite(wide[condition]), (colour(index), marker(index)))
     length = max(8, (24 if small else 40) // len(at))
-    axes.set_xticks(at, [name(condition, length) for condition in wide.columns])
+    axes.set_xticks(at, [as_label(condition, length) for condition in wide.columns])
     axes.set_xlim(-0.6, len(at) - 0.4)
     grouped(axes)
 
@@ -111,7 +174,7 @@ def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple
         place = at + side * 0.2
         axes.vlines(place, low, high, color=shade, linewidth=5, alpha=0.35, zorder=2)
         axes.hlines(middle, place - _BOX, place + _BOX, color=shade, linewidth=1.2, zorder=3)
-    interval(axes, at + side * 0.1, values, look)
+    draw_mean(axes, at + side * 0.1, values, look)
 
 
 def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArray] | None:
@@ -146,74 +209,7 @@ def _differences(axes: Axes, complete: pd.DataFrame) -> None:
     labels = [f"{first} {MINUS} {other}" for other in others]
     if len(others) > 1:
         labels = [f"{MINUS} {other}" for other in others]
-        axes.set_xlabel(f"{name(first)} {MINUS} the other")
-    axes.set_xticks(range(len(others)), [name(label, length) for label in labels])
+        axes.set_xlabel(f"{as_label(first)} {MINUS} the other")
+    axes.set_xticks(range(len(others)), [as_label(label, length) for label in labels])
     axes.set_xlim(-0.5, len(others) - 0.3)
     grouped(axes)
-
-
-@styled
-def workload(wide: Mapping[str, pd.DataFrame]) -> Figure:
-    """Box plots of every scale of a questionnaire, a box a condition, with the ratings on them (paper, Fig. 14)."""
-    figure, (axes,) = panels(height=3.2)
-    conditions = list(next(iter(wide.values())).columns)
-    width = 0.8 / len(conditions)
-    for index, condition in enumerate(conditions):
-        shade = colour(index)
-        centres = np.arange(len(wide)) + (index - (len(conditions) - 1) / 2) * width
-        ratings = [finite(table[condition]) for table in wide.values()]
-        axes.boxplot(
-            ratings,
-            positions=centres,
-            widths=0.75 * width,
-            showfliers=False,
-            patch_artist=True,
-            boxprops={"facecolor": shade, "alpha": 0.3, "edgecolor": shade},
-            medianprops={"color": shade, "linewidth": 2.2},
-            whiskerprops={"color": shade},
-            capprops={"color": shade},
-            manage_ticks=False,
-        )
-        many = sum(map(len, ratings)) > MARKS_MAX
-        for centre, values in zip(centres, ratings, strict=True):
-            spread = np.linspace(-0.22, 0.22, len(values)) * width
-            look: dict[str, Any] = {"color": shade, "marker": marker(index), "alpha": 0.8, "rasterized": many}
-            axes.scatter(centre + spread, np.sort(values), s=9, **look)
-        axes.plot([], [], color=shade, marker=marker(index), linewidth=5, alpha=0.6, label=name(condition))
-    length = max(10, 84 // len(wide))
-    axes.set_xticks(np.arange(len(wide)), [name(short_label(measure), length) for measure in wide])
-    if len(wide) > 8:
-        axes.tick_params(axis="x", rotation=60)
-    axes.set_ylabel("Rating")
-    grouped(axes)
-    legend(figure, figure.axes, min(len(conditions), 6))
-    return figure
-
-
-@styled
-def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
-    """Each participant's selection errors trial by trial, a small panel a participant, a line a condition.
-
-    `table` has the columns of `trials`; rows whose estimator is `recorded` are shown.
-    """
-    recorded = table[(table["estimator"] == "recorded") & table["position_error_mm"].notna()]
-    people = sorted(set(recorded["participant"]))
-    figure, every, across = multiples(len(people), 1.35)
-    for index, (axes, person) in enumerate(zip(every, people, strict=True)):
-        zorder = as_pixels(axes, len(recorded))
-        mine = recorded[recorded["participant"] == person]
-        for place, condition in enumerate(conditions):
-            rows = mine[mine["condition"] == condition].sort_values("trial", kind="stable")
-            look: dict[str, Any] = {"color": colour(place), "marker": marker(place), "zorder": zorder}
-            where = rows["trial"].to_numpy(np.float64), rows["position_error_mm"].to_numpy(np.float64)
-            axes.plot(
-                *where, markersize=2.5, linewidth=0.5 if zorder > 0 else 0, alpha=0.75, label=name(condition), **look
-            )
-        axes.set_title(f"{name(person, 18)} (n = {len(mine)})", fontsize=8.5)
-        if index % across == 0:
-            axes.set_ylabel("Error (mm)")
-    every[0].set_ylim(bottom=0)
-    for axes in lowest(every, across):
-        axes.set_xlabel("Trial")
-    legend(figure, [every[0]], min(len(conditions), 6))
-    return figure

@@ -1,0 +1,210 @@
+"""The hand's path past its targets, of one session and of all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.drawing import Words, drawing
+from pipeline.report.figures.plane import XY, Plane, square
+from pipeline.report.figures.style import (
+    BLACK,
+    MARKS_MAX,
+    as_label,
+    as_pixels,
+    colour,
+    legend,
+    lowest,
+    multiples,
+    panels,
+    styled,
+    thinned,
+)
+from pipeline.report.figures.wording import listed
+from pipeline.statistics.arrays import FloatArray
+from pipeline.words import counted, number
+
+_VERTICES = 1500  # of a path; a line of more looks the same
+
+
+def _path_words(
+    tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
+) -> Words:
+    """What each line spans, and how many targets and selections there are."""
+    sessions = [*tracks["session"].iloc[:1], *positions["session"].iloc[:1]]
+    where = f" in session {sessions[0]}" if sessions else ""
+    spans = listed((f"{line} {_size_words(way(tracks, positions, line, plane))}" for line in lines), ", ")
+    told = f"Extent of each line: {spans}; {counted(int((events['type'] == 'selection').sum()), 'selection')}."
+    return Words(
+        f"The hand's way{where}, {plane[0]} against {plane[1]}; it begins at the arrow. {told} Look where lines leave"
+        " each other and how much each trembles.",
+        f"Lines of the hand's path in the plane{where}. {told}",
+    )
+
+
+@drawing(_path_words)
+@styled
+def path(
+    tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
+) -> Figure:
+    """One session's way past its targets: a line for each stream of `positions` or estimator of `tracks` in `lines`."""
+    found = [(line, way(tracks, positions, line, plane)) for line in lines]
+    extent = _extent([*(points for _, points in found), _targets(events, plane)])
+    figure, (axes,) = panels(height=0.9 + 6.0 * float(np.clip(extent[1] / extent[0], 0.25, 0.8)))
+    for index, (line, points) in enumerate(found):
+        if len(points):
+            begin = points[np.isfinite(points).all(axis=1)][:1]
+            look: dict[str, Any] = {"linewidth": 1.1, "alpha": 0.85, "color": colour(index)}
+            axes.plot(*points.T, label=as_label(line), **look)
+            axes.scatter(begin[:, 0], begin[:, 1], s=30, marker=">", color=colour(index), edgecolor="white", zorder=4)
+    _marked(axes, events, plane)
+    square(axes, plane)
+    legend(figure, figure.axes, 5)
+    return figure
+
+
+def _paths_words(
+    tracks: pd.DataFrame,
+    positions: pd.DataFrame,
+    events: pd.DataFrame,
+    sessions: pd.DataFrame,
+    shown: Mapping[str, str],
+    plane: Plane = XY,
+) -> Words:
+    """How many ways there are of each condition, and which reaches furthest."""
+    told = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
+    counts, furthest = [], ("", 0.0, "")
+    for condition, line in shown.items():
+        mine = list(told.loc[told["condition"] == condition, "session"])
+        if mine:
+            counts.append(f"{condition} ({line}), n = {len(mine)}")
+        for one in mine:
+            points = way(tracks[tracks["session"] == one], positions[positions["session"] == one], line, plane)
+            reach = float(np.hypot(*_span_of(points)))
+            if reach > furthest[1]:
+                furthest = (str(one), reach, _size_words(points))
+    summary = f"{listed(counts)}."
+    summary += f" The widest is session {furthest[0]}, {furthest[2]}." if furthest[0] else ""
+    people = counted(told["participant"].nunique(), "participant")
+    return Words(
+        f"The way of each session in the plane, a panel a participant ({people}): {summary} Look for ways"
+        " that leave the others.",
+        f"Paths of {people} in the plane: {summary}",
+    )
+
+
+@drawing(_paths_words)
+@styled
+def paths(
+    tracks: pd.DataFrame,
+    positions: pd.DataFrame,
+    events: pd.DataFrame,
+    sessions: pd.DataFrame,
+    shown: Mapping[str, str],
+    plane: Plane = XY,
+) -> Figure:
+    """Every participant's ways past the targets, a small panel a participant, a line a session.
+
+    `sessions` says whose each is (participant, condition, session: any table that has them); `shown` which stream or
+    estimator is drawn of each condition, in the study's order.
+    """
+    told = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
+    people = sorted(set(told["participant"]))
+    seen = [tracks, positions, events]
+    extent = _extent([rows[[f"{axis}_mm" for axis in plane]].to_numpy(np.float64) for rows in seen])
+    row_height = 0.35 + 1.5 * float(np.clip(extent[1] / extent[0], 0.3, 1.2))
+    figure, every, across = multiples(len(people), row_height)
+    for index, (axes, person) in enumerate(zip(every, people, strict=True)):
+        mine = told[told["participant"] == person]
+        zorder = as_pixels(axes, len(tracks) + len(positions))
+        for place, (condition, line) in enumerate(shown.items()):
+            for session in mine.loc[mine["condition"] == condition, "session"]:
+                one, found = tracks[tracks["session"] == session], positions[positions["session"] == session]
+                points = way(one, found, line, plane)
+                axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(place), zorder=zorder)
+        _marked(axes, events[events["session"].isin(mine["session"])], plane, small=True)
+        axes.set_aspect("equal", adjustable="box")
+        axes.set_title(as_label(person, 18), fontsize=8.5)
+        if index % across == 0:
+            axes.set_ylabel(f"{plane[1]} (mm)")
+    for axes in lowest(every, across):
+        axes.set_xlabel(f"{plane[0]} (mm)")
+    for place, (condition, line) in enumerate(shown.items()):
+        every[0].plot([], [], color=colour(place), label=f"{as_label(condition)}: {as_label(line)}")
+    legend(figure, [every[0]], 3)
+    return figure
+
+
+def _span_of(points: FloatArray) -> tuple[float, float]:
+    known = points[np.isfinite(points).all(axis=1)]
+    across, up = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
+    return float(across), float(up)
+
+
+def _size_words(points: FloatArray) -> str:
+    across, up = _span_of(points)
+    return f"{number(across, 0)} × {number(up, 0)} mm"
+
+
+def way(tracks: pd.DataFrame, positions: pd.DataFrame, line: str, plane: Plane) -> FloatArray:
+    """Points (n, 2) in mm of a stream, or of an estimator where no stream has that name, in the order of time."""
+    rows = positions[positions["stream"] == line]
+    if rows.empty:
+        rows = tracks[tracks["estimator"] == line]
+    rows = rows.sort_values("time_ns", kind="stable").iloc[thinned(len(rows), _VERTICES)]
+    points: FloatArray = rows[[f"{axis}_mm" for axis in plane]].to_numpy(np.float64)
+    return points
+
+
+def _targets(events: pd.DataFrame, plane: Plane) -> FloatArray:
+    """Where targets were (n, 2), each place once."""
+    places = events[[f"target_{axis}_mm" for axis in plane]].dropna().drop_duplicates()
+    found: FloatArray = places.to_numpy(np.float64)
+    return found
+
+
+def _marked(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False) -> None:
+    """Targets and selections."""
+    targets = _targets(events, plane)
+    chosen = events.loc[events["type"] == "selection", [f"{axis}_mm" for axis in plane]].dropna().to_numpy(np.float64)
+    size = 9 if small else 60
+    many: dict[str, Any] = {"rasterized": len(targets) + len(chosen) > MARKS_MAX}
+    if len(targets):
+        ring: dict[str, Any] = {
+            "facecolors": "none",
+            "edgecolors": BLACK,
+            "linewidths": 0.6 if small else 0.9,
+            "zorder": 3,
+        }
+        axes.scatter(
+            targets[:, 0],
+            targets[:, 1],
+            s=size,
+            label="targets" if small else f"targets (n = {len(targets)})",
+            **ring,
+            **many,
+        )
+    if len(chosen):
+        cross: dict[str, Any] = {"marker": "x", "color": BLACK, "linewidths": 0.5 if small else 0.9, "zorder": 4}
+        axes.scatter(
+            chosen[:, 0],
+            chosen[:, 1],
+            s=size / 2.5,
+            label="selections" if small else f"selections (n = {len(chosen)})",
+            **cross,
+            **many,
+        )
+
+
+def _extent(parts: Sequence[FloatArray]) -> tuple[float, float]:
+    """How wide and how high everything is, in mm; never nothing."""
+    every = np.concatenate([part[np.isfinite(part).all(axis=1)] for part in parts])
+    if not len(every):
+        return 1.0, 1.0
+    across, up = np.ptp(every, axis=0)
+    return max(float(across), 1.0), max(float(up), 1.0)

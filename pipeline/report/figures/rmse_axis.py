@@ -1,0 +1,24 @@
+"""What figures of accuracy share: the axis of the error and the names of others."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import matplotlib.ticker
+import pandas as pd
+from matplotlib.axes import Axes
+
+LAG_LABEL = "Lag behind the reference (ms)"
+_WIDE = 100.0  # from end to end: so far apart, only powers of ten have room for their numbers
+
+
+def along_rmse(axes: Axes, rmse_mm: pd.Series) -> None:
+    """RMSE along x; by its logarithm where the largest is many times the least."""
+    if rmse_mm.max() > 15 * rmse_mm.min() > 0:
+        axes.set_xscale("log")
+        low, high = axes.get_xlim()
+        axes.xaxis.set_major_locator(mpl.ticker.LogLocator(subs=(1.0, 2.0, 5.0) if high < _WIDE * low else (1.0,)))
+        axes.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
+    else:
+        axes.set_xlim(left=0)
+    axes.set_xlabel("RMSE against the reference (mm)")
