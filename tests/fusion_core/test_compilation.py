@@ -57,10 +57,10 @@ def edit(file: Path, old: str, new: str) -> None:
 def test_an_edit_of_a_nested_file_is_never_answered_by_code_compiled_before(package: Path, users_folder: bool) -> None:
     """And code of earlier sources is removed, unless the folder is the user's."""
     environment = {"NUMBA_CACHE_DIR": str(package.parent / "kept")} if users_folder else {}
-    assert noise_and_hits(package, **environment) == (pytest.approx(1 / 20), 0)
-    assert noise_and_hits(package, **environment) == (pytest.approx(1 / 20), 1)
+    assert noise_and_hits(package, **environment) == pytest.approx((1 / 20, 0))
+    assert noise_and_hits(package, **environment) == pytest.approx((1 / 20, 1))
     edit(package / "kalman" / "motion.py", NOISE, NOISE.replace("20.0", "10.0"))
-    assert noise_and_hits(package, **environment) == (pytest.approx(1 / 10), 0)
+    assert noise_and_hits(package, **environment) == pytest.approx((1 / 10, 0))
     assert len(list(package.parent.rglob("compiled-*"))) == (2 if users_folder else 1)
 
 
@@ -69,9 +69,9 @@ def test_a_package_that_cannot_be_written_to_compiles_in_memory(package: Path) -
     (package / "__pycache__").write_text("no folder can be made here, not even by root")
     before = sorted(package.parent.rglob("*"))
     for _ in range(2):
-        assert noise_and_hits(package) == (pytest.approx(1 / 20), 0)
+        assert noise_and_hits(package) == pytest.approx((1 / 20, 0))
     assert sorted(package.parent.rglob("*")) == before
 
 
 def test_numbas_own_setting_stays_the_users() -> None:
-    assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
+    assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR  # type: ignore[attr-defined]

@@ -252,7 +252,8 @@ def test_a_second_submovement_counts_if_it_stands_out_by_a_tenth_of_the_peak_spe
     """The speed rises to 1000 mm/s and falls to 100: the second rise must reach 200."""
     speed = np.interp(np.arange(0, 1, 0.01), [0, 0.3, 0.6, 0.8, 1], [0, 1000, 100, second_mm_s, 0])
     time = np.arange(len(speed) + 1) * 0.01
-    path = HandPath(time, np.column_stack([np.concatenate([[0], np.cumsum(speed * 0.01)]), 0 * time]))
+    x_mm = np.concatenate([[0.0], np.cumsum(speed * 0.01)])
+    path = HandPath(time.astype(np.float64), np.column_stack([x_mm, np.zeros(len(time))]))
     assert movements.corrections(path) == expected
 
 
