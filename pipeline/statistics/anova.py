@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import combinations
 from typing import Any
@@ -12,10 +12,11 @@ import numpy as np
 from scipy import stats
 
 from pipeline.statistics import NO_ERROR, OK
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.diagnostics import normality
 from pipeline.statistics.effect_size import partial_eta_squared_interval
 from pipeline.statistics.result import Result, degenerate, negligible, too_few
+from pipeline.statistics.sphericity import sphericity
 
 
 def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
@@ -27,17 +28,17 @@ def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
     also say whether the residuals are normal.
     """
     n, levels = values.shape[0], values.shape[1:]
-    flat = values.reshape(n, int(np.prod(levels)))
-    effects = [c for size in range(1, len(levels) + 1) for c in combinations(range(len(levels)), size)]
+    (flat,), _ = at_unit_scale([values.reshape(n, int(np.prod(levels)))])
+    effects = effects_of(levels)
     if too_few(n) or degenerate(flat):
         status = too_few(n) or degenerate(flat) or ""
-        return [_result(_name(factors, effect), n, status=status) for effect in effects]
-    scores = [flat @ contrasts(levels, effect) for effect in effects]
-    errors = [float(np.sum((score - score.mean(axis=0)) ** 2)) for score in scores]
+        return [_blank(effect_name(factors, effect), n, status) for effect in effects]
+    strata = [_stratum(flat @ contrasts(levels, effect)) for effect in effects]
     between = float(np.prod(levels) * np.sum((flat.mean(axis=1) - flat.mean()) ** 2))
+    variation = between + sum(stratum.error for stratum in strata)
     found = [
-        _tested(_name(factors, effect), score, error, between + sum(errors), flat)
-        for effect, score, error in zip(effects, scores, errors, strict=True)
+        tested(_blank(effect_name(factors, effect), n), stratum, variation, flat)
+        for effect, stratum in zip(effects, strata, strict=True)
     ]
     if len(effects) == 1 and levels[0] > 2 and found[0].status == OK:
         residuals = flat - flat.mean(axis=0) - flat.mean(axis=1, keepdims=True) + flat.mean()
@@ -45,7 +46,14 @@ def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
     return found
 
 
-def _name(factors: Sequence[str], effect: tuple[int, ...]) -> str:
+def effects_of(levels: Sequence[int]) -> list[tuple[int, ...]]:
+    """Each main effect, then each interaction, as the places of its factors."""
+    places = range(len(levels))
+    return [effect for size in range(1, len(levels) + 1) for effect in combinations(places, size)]
+
+
+def effect_name(factors: Sequence[str], effect: tuple[int, ...]) -> str:
+    """`condition:task`."""
     return ":".join(factors[index] for index in effect)
 
 
@@ -57,42 +65,68 @@ def contrasts(levels: Sequence[int], effect: tuple[int, ...]) -> FloatArray:
     return reduce(np.kron, parts)
 
 
-def _result(effect: str, n: int, **known: Any) -> Result:
-    return Result(
-        effect=effect,
-        statistic_name="F",
-        method="repeated-measures ANOVA, uncorrected; sphericity corrections in details",
-        effect_size_name="generalized eta squared",
-        n=n,
-        **known,
-    )
+@dataclass(frozen=True)
+class Stratum:
+    """An effect and what it is tested against: sums of squares, the errors' cross products (d, d), degrees of freedom.
+
+    `error_df` is of one contrast: participants less groups.
+    """
+
+    explained: float
+    df1: int
+    errors: FloatArray
+    error_df: int
+
+    @property
+    def error(self) -> float:
+        """The error's sum of squares."""
+        return float(np.trace(self.errors))
+
+    @property
+    def df2(self) -> int:
+        """The error's degrees of freedom."""
+        return len(self.errors) * self.error_df
 
 
-def _tested(effect: str, scores: FloatArray, error: float, other_variation: float, values: FloatArray) -> Result:
-    n, contrasts = scores.shape
-    explained = float(n * np.sum(scores.mean(axis=0) ** 2))
-    df1, df2 = float(contrasts), float(contrasts * (n - 1))
-    if negligible(error, values):
-        return _result(effect, n, status=NO_ERROR, df1=df1, df2=df2)
+def _stratum(scores: FloatArray) -> Stratum:
+    """Of scores (n, d), whose mean is the effect."""
+    n, d = scores.shape
+    apart = scores - scores.mean(axis=0)
+    return Stratum(float(n * np.sum(scores.mean(axis=0) ** 2)), d, apart.T @ apart, n - 1)
+
+
+def _blank(effect: str, n: int, status: str = OK) -> Result:
+    method = "repeated-measures ANOVA, uncorrected; sphericity corrections in details"
+    return Result(effect, "F", method, "generalized eta squared", n, status=status)
+
+
+def tested(blank: Result, stratum: Stratum, variation: float, values: FloatArray) -> Result:
+    """The row of an effect. `variation`: all strata's error together, beside which generalized η² sets the effect."""
+    df1, df2 = float(stratum.df1), float(stratum.df2)
+    if negligible(stratum.error, values):
+        return replace(blank, status=NO_ERROR, df1=df1, df2=df2)
+    explained, error = stratum.explained, stratum.error
     statistic = (explained / df1) / (error / df2)
     interval = partial_eta_squared_interval(statistic, df1, df2)
-    low, high = (_generalized(bound, other_variation / error) for bound in interval)
-    return _result(
-        effect,
-        n,
+    low, high = (_generalized(bound, variation / error) for bound in interval)
+    covariance = stratum.errors / stratum.error_df
+    details: dict[str, Any] = {
+        **blank.details,
+        **sphericity(covariance, stratum.error_df, values.shape[1], statistic, df1, df2),
+        "partial_eta_squared": explained / (explained + error),
+        "partial_eta_squared_ci": list(interval),
+        "partial_eta_squared_ci90": list(partial_eta_squared_interval(statistic, df1, df2, 0.9)),
+    }
+    return replace(
+        blank,
         statistic=statistic,
         df1=df1,
         df2=df2,
         p=float(stats.f.sf(statistic, df1, df2)),
-        effect_size=explained / (explained + other_variation),
+        effect_size=explained / (explained + variation),
         ci_low=low,
         ci_high=high,
-        details={
-            **_sphericity(scores, values.shape[1], statistic, df1, df2),
-            "partial_eta_squared": explained / (explained + error),
-            "partial_eta_squared_ci": list(interval),
-            "partial_eta_squared_ci90": list(partial_eta_squared_interval(statistic, df1, df2, 0.9)),
-        },
+        details=details,
     )
 
 
@@ -103,46 +137,3 @@ def _generalized(partial: float | None, others: float) -> float | None:
     the true value, 95 % on average.
     """
     return None if partial is None else partial / (partial + (1 - partial) * others)
-
-
-def _sphericity(scores: FloatArray, cells: int, statistic: float, df1: float, df2: float) -> dict[str, float | None]:
-    """Mauchly's test and the corrected p values; nothing of it applies to a single contrast."""
-    n, d = scores.shape
-    names = ("p_gg", "p_hf", "epsilon_gg", "epsilon_hf", "mauchly_w", "mauchly_p")
-    if d == 1:
-        return dict.fromkeys(names)
-    covariance = np.cov(scores, rowvar=False)
-    trace = float(np.trace(covariance))
-    gg = trace**2 / (d * float(np.sum(covariance**2)))
-    # Huynh and Feldt as corrected by Lecoutre; without groups both are the same.
-    room = n - 1 - d * gg
-    hf = None  # of two participants there is one contrast, and 0 / 0
-    if n > 2:
-        hf = min(1.0, (n * d * gg - 2) / (d * room)) if room > 0 else 1.0
-    w = p = None
-    if n - 1 >= d:
-        w = float(np.linalg.det(covariance)) / (trace / d) ** d
-        p = _mauchly_p(w, d, n - 1, cells)
-    return {
-        "p_gg": float(stats.f.sf(statistic, gg * df1, gg * df2)),
-        "p_hf": None if hf is None else float(stats.f.sf(statistic, hf * df1, hf * df2)),
-        "epsilon_gg": gg,
-        "epsilon_hf": hf,
-        "mauchly_w": w,
-        "mauchly_p": p,
-    }
-
-
-def _mauchly_p(w: float, d: int, df: int, cells: int) -> float | None:
-    """χ² approximation to second order (Anderson 1958, section 10.7), as R's mauchly.test computes it.
-
-    R puts the number of cells for d in one term of the second order; followed here, so that figures compare. The
-    difference is below 1e-4.
-    """
-    if w <= 0:
-        return None
-    rho = 1 - (2 * d**2 + d + 2) / (6 * d * df)
-    second = (d + 2) * (d - 1) * (d - 2) * (2 * d**3 + 6 * d**2 + 3 * cells + 2) / (288 * (df * d * rho) ** 2)
-    statistic, freedom = -df * rho * np.log(w), d * (d + 1) / 2 - 1
-    first = stats.chi2.sf(statistic, freedom)
-    return float(first + second * (stats.chi2.sf(statistic, freedom + 4) - first))

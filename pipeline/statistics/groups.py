@@ -48,16 +48,6 @@ def varies(values: FloatArray) -> bool:
     return not negligible(float(np.sum((values - values.mean()) ** 2)), values)
 
 
-def at_unit_scale(arrays: Sequence[FloatArray]) -> tuple[list[FloatArray], int]:
-    """The arrays over 2ᵉ with their largest value near 1, and e: the square of 1e95's square is no number.
-
-    A power of two, so that nothing is rounded.
-    """
-    largest = max((float(np.max(np.abs(array), initial=0.0)) for array in arrays), default=0.0)
-    exponent = int(np.frexp(largest)[1])
-    return [np.ldexp(array, -exponent) for array in arrays], exponent
-
-
 def midranks(values: FloatArray) -> FloatArray:
     """Ranks (n,) from 1; values apart by no more than the round-off of a mean tie and share the mean of their ranks."""
     order = np.argsort(values, kind="stable")

@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from pipeline.statistics import NO_VARIATION, with_pingouin
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.effect_size import partial_eta_squared_interval
-from pipeline.statistics.groups import at_unit_scale, midranks, missing, varies
+from pipeline.statistics.groups import midranks, missing, varies
 from pipeline.statistics.mann_whitney import mann_whitney
 from pipeline.statistics.result import Result
 

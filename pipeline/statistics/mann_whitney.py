@@ -14,8 +14,8 @@ import numpy as np
 from scipy import optimize, stats
 
 from pipeline.statistics import NO_VARIATION
-from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.groups import at_unit_scale, midranks, missing, varies
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
+from pipeline.statistics.groups import midranks, missing, varies
 from pipeline.statistics.result import Result
 
 EXACT_UP_TO = 200_000_000  # additions: about a second

@@ -9,16 +9,18 @@ from itertools import combinations, product
 import numpy as np
 
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import Result
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two values of each participant, first minus second being the contrast."""
+    """Two values of each participant, or one of each in two groups, first minus second being the contrast."""
 
     effect: str
     contrast: str
     first: FloatArray
     second: FloatArray
+    paired: bool = True
 
 
 def of_conditions(values: FloatArray, conditions: Sequence[str]) -> list[Pair]:
@@ -26,6 +28,22 @@ def of_conditions(values: FloatArray, conditions: Sequence[str]) -> list[Pair]:
     return [
         Pair("condition", f"{conditions[i]} - {conditions[j]}", values[:, i], values[:, j])
         for i, j in combinations(range(len(conditions)), 2)
+    ]
+
+
+@dataclass(frozen=True)
+class FollowUp:
+    """A pair and its test."""
+
+    pair: Pair
+    result: Result
+
+
+def of_groups(groups: Sequence[FloatArray], names: Sequence[str], effect: str = "group", at: str = "") -> list[Pair]:
+    """Every two groups, in order; `at` says where they are compared."""
+    return [
+        Pair(effect, f"{names[i]} - {names[j]}" + (f" | {at}" if at else ""), groups[i], groups[j], paired=False)
+        for i, j in combinations(range(len(groups)), 2)
     ]
 
 
@@ -38,14 +56,15 @@ def follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequence[Sequ
     """
     sizes = range(1, len(factors) + 1)
     effects = [effect for size in sizes for effect in combinations(range(len(factors)), size)]
-    return [pair for effect in effects for pair in _of_effect(values, factors, levels, effect)]
+    # Of a factor of two levels F is the comparison.
+    left_open = [effect for effect in effects if len(effect) > 1 or len(levels[effect[0]]) > 2]
+    return [pair for effect in left_open for pair in of_effect(values, factors, levels, effect)]
 
 
-def _of_effect(
+def of_effect(
     values: FloatArray, factors: Sequence[str], levels: Sequence[Sequence[str]], effect: tuple[int, ...]
 ) -> Iterator[Pair]:
-    if len(effect) == 1 and len(levels[effect[0]]) < 3:
-        return  # its F is the comparison
+    """The pairs of one effect, given as the places of its factors."""
     name = ":".join(factors[index] for index in effect)
     compared = next((index for index in effect if factors[index] == "condition"), effect[0])
     held = [index for index in effect if index != compared]

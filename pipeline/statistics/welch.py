@@ -11,10 +11,10 @@ import numpy as np
 from scipy import stats
 
 from pipeline.statistics import with_pingouin
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.diagnostics import normality
 from pipeline.statistics.effect_size import hedges_correction, partial_eta_squared_interval, standardized_interval
-from pipeline.statistics.groups import at_unit_scale, untestable, unweightable
+from pipeline.statistics.groups import untestable, unweightable
 from pipeline.statistics.result import Result
 
 Interval = tuple[float | None, float | None]
