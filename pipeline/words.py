@@ -19,10 +19,13 @@ _EFFECT_SIZES = {
     "generalized eta squared": "η²G",
     "partial eta squared": "η²p",
     "Cohen's d_z": "d_z",
+    "Cohen's d_s": "d_s",
     "matched-pairs rank-biserial": "r_rb",
+    "rank-biserial": "r_rb",
+    "rank epsilon squared": "ε²",
     "Kendall's W": "W",
 }
-_NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W")  # printed without a leading zero, as APA has it
+_NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W", "ε²")  # printed without a leading zero, as APA has it
 EFFECTS_OF_CONDITION = ("condition", "treatment")
 """What a test calls the effect of the conditions."""
 _SEVERAL = "the differences between conditions are"

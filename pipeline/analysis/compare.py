@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.audit.beside_computed import compare_printed
-from pipeline.analysis.comparisons import all_requests, compared
+from pipeline.analysis.comparisons import People, all_requests, compared
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.simulated_reductions import reductions
@@ -41,12 +41,13 @@ def run(work: Work) -> Outcome:
         "descriptives": tables.frame("descriptives", descriptives(study, measures)),
     }
     observations = tables.read("observations", measured)
-    rows, left_out = compared(study, measures, observations)
+    people = _columns_of_people(work)
+    rows, left_out = compared(study, measures, observations, people)
     found["comparisons"] = tables.frame("comparisons", rows)
-    rows, uncomparable = _of_all_data(study, measured / ALL_DATA)
+    rows, uncomparable = _of_all_data(study, measured / ALL_DATA, people)
     found["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
-    requests = [one for entry in all_requests(study, measures, observations) for one in entry]
+    requests = [one for entry in all_requests(study, measures, observations, people) for one in entry]
     checked = findings(study, requests, tables.read("orders", measured), found["trials"], work.sessions)
     found["design_check"] = tables.frame("design_check", checked)
     told = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
@@ -76,7 +77,7 @@ def run(work: Work) -> Outcome:
     return Outcome()
 
 
-def _of_all_data(study: Study, folder: Path) -> tuple[list[Row], list[Row]]:
+def _of_all_data(study: Study, folder: Path, people: People) -> tuple[list[Row], list[Row]]:
     """The comparisons as they would be without the exclusions of study.yaml, and what cannot be said of them.
 
     None where nothing is excluded. Values that somebody decided to leave out may be such that no test takes them.
@@ -84,7 +85,7 @@ def _of_all_data(study: Study, folder: Path) -> tuple[list[Row], list[Row]]:
     if not study.exclusions:
         return [], []
     try:
-        return compared(study, tables.read("measures", folder), tables.read("observations", folder))[0], []
+        return compared(study, tables.read("measures", folder), tables.read("observations", folder), people)[0], []
     except PipelineError as error:
         return [], [{"what": "no comparison without the exclusions", "reason": str(error)}]
 
@@ -109,6 +110,14 @@ def _people(work: Work, measures: pd.DataFrame) -> Row:
         return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants))
     people = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     return {"n": len(people)}
+
+
+def _columns_of_people(work: Work) -> People:
+    """What participants.csv says of each participant, by column."""
+    if work.study.participants is None:
+        return {}
+    table = study_tables.read_participants(work.folder / work.study.participants).set_index("participant")
+    return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
 
 
 def _sessions(work: Work) -> list[Row]:

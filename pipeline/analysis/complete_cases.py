@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -19,13 +19,18 @@ from pipeline.tables.table import Row
 
 @dataclass(frozen=True)
 class Request:
-    """What one entry asks of one measure. `observations` are the same values with their period and sequence."""
+    """What one entry asks of one measure.
+
+    `observations` are the same values with their period and sequence, `people` the columns of participants.csv by
+    their names: what each says of each participant.
+    """
 
     study: Study
     entry: Comparison
     measure: str
     measures: pd.DataFrame
     observations: pd.DataFrame
+    people: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

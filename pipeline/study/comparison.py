@@ -36,6 +36,7 @@ class Comparison(Frozen):
     within: tuple[Id, ...] = ("condition",)
     adjust: AdjustmentName = "none"
     follow_up: AdjustmentName = "holm"
+    between: Id | None = None
     family: Id | None = None
     missing: Literal["listwise", "available"] = "listwise"
     zeros: Literal["dropped", "pratt"] = "dropped"

@@ -113,6 +113,7 @@ class Study(Frozen):
     measures: str | None = None
     printed: str | None = None
     repeats: str | None = None
+    factors: Mapping[Id, Literal["between"]] = {}
     scoring: Mapping[Id, Scoring] = {}
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+Design = Literal["within", "between", "mixed"]
 Question = Literal["difference", "equivalence", "evidence"]
 
 
@@ -33,6 +34,7 @@ class StatisticalTest:
     complete_cases: bool = True
     symbol_tells: bool = False
     question: Question = "difference"
+    design: Design = "within"
     cite: tuple[str, ...] = ()
     cited_for: str = ""
 
@@ -125,6 +127,56 @@ TESTS: Mapping[str, StatisticalTest] = {
             assumes_normality=True,
             question="evidence",
             cite=("rouder2009",),
+        ),
+        StatisticalTest(
+            "t_welch",
+            "Welch's t",
+            "Welch's t test",
+            "Welch's t tests between groups (two-sided; Cohen's d_s)",
+            options=("between",),
+            assumes_normality=True,
+            design="between",
+            cite=("welch1947",),
+        ),
+        StatisticalTest(
+            "mann_whitney",
+            "Mann-Whitney",
+            "Mann-Whitney test",
+            "Mann-Whitney tests between groups (two-sided; rank-biserial correlation, Hodges-Lehmann shift)",
+            options=("between",),
+            symbol_tells=True,
+            design="between",
+            cite=("mann1947",),
+        ),
+        StatisticalTest(
+            "anova_welch",
+            "Welch's ANOVA",
+            "Welch's analysis of variance",
+            "Welch's analysis of variance between groups (partial η²)",
+            options=("between", "follow_up"),
+            assumes_normality=True,
+            design="between",
+            cite=("welch1951", "games1976"),
+        ),
+        StatisticalTest(
+            "kruskal",
+            "Kruskal-Wallis",
+            "Kruskal-Wallis test",
+            "the Kruskal-Wallis test between groups (rank ε²)",
+            options=("between", "follow_up"),
+            symbol_tells=True,
+            design="between",
+            cite=("kruskal1952",),
+        ),
+        StatisticalTest(
+            "mixed_anova",
+            "mixed ANOVA",
+            "mixed analysis of variance",
+            "mixed analysis of variance, groups between and conditions within participants (type III; generalized η²)",
+            options=("within", "between", "follow_up"),
+            assumes_normality=True,
+            assumes_sphericity=True,
+            design="mixed",
         ),
     )
 }

@@ -1,0 +1,69 @@
+"""Rows of the table `comparisons`, from what a test says and from the two things it compares."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.analysis.complete_cases import CompleteCases, Request
+from pipeline.statistics import OK, diagnostics
+from pipeline.statistics.pairs import Pair
+from pipeline.statistics.result import Result
+from pipeline.study.measures import measure
+from pipeline.tables.table import Row
+
+Answer = tuple[list[Row], list[Row]]
+"""Rows of `comparisons`, and the exclusions that came of incomplete participants."""
+
+
+def group_pair_row(request: Request, result: Result, pair: Pair) -> Row:
+    return {**row_of(request, result), **change_of(request, pair), "contrast": pair.contrast}
+
+
+def row_of(request: Request, result: Result) -> Row:
+    """A result as a row."""
+    return {
+        "measure": request.measure,
+        "test": request.entry.test,
+        "effect": result.effect,
+        "contrast": result.contrast,
+        "n": result.n,
+        "statistic_name": result.statistic_name,
+        "statistic": result.statistic,
+        "df1": result.df1,
+        "df2": result.df2,
+        "p": result.p,
+        "adjust": request.entry.adjust,
+        "method": result.method,
+        "effect_size_name": result.effect_size_name,
+        "effect_size": result.effect_size,
+        "ci_low": result.ci_low,
+        "ci_high": result.ci_high,
+        "status": result.status,
+        "details": dict(result.details),
+    }
+
+
+def change_of(request: Request, pair: Pair) -> Row:
+    """The mean difference of a pair, if anybody is in it, and the reduction.
+
+    A share of the first mean says something only where zero means none: never on a scale known to be of another kind,
+    and not where a mean is zero or negative, which contradicts such a zero.
+    """
+    if not len(pair.first):
+        return {}
+    first, second = float(np.mean(pair.first)), float(np.mean(pair.second))
+    has_zero = measure(request.measure).scale in ("ratio", "unknown") and first > 0 and second > 0
+    return {"mean_difference": first - second, "reduction": 1 - second / first if has_zero else None}
+
+
+def pair_row(request: Request, result: Result, pair: Pair, cases: CompleteCases) -> Row:
+    """The row of a test of two conditions."""
+    return diagnosed({**row_of(request, result), **change_of(request, pair), "contrast": pair.contrast}, pair, cases)
+
+
+def diagnosed(row: Row, pair: Pair, cases: CompleteCases) -> Row:
+    """The row with what is to be said of the differences that it rests on."""
+    if row["status"] != OK:
+        return row
+    diagnosis = diagnostics.differences(pair.first, pair.second, cases.participants)
+    return {**row, "details": {**row["details"], **diagnosis}}

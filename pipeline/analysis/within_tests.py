@@ -1,0 +1,82 @@
+"""The tests of study.yaml within participants: from complete cases to rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import groupby
+
+from pipeline.analysis import complete_cases, model_rows
+from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of
+from pipeline.analysis.complete_cases import Request
+from pipeline.statistics import pairs
+from pipeline.statistics.anova import rm_anova
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.art import art_anova
+from pipeline.statistics.crossover import crossover
+from pipeline.statistics.mixed import mixed_model
+from pipeline.statistics.paired import t_paired
+from pipeline.statistics.rank import friedman
+from pipeline.statistics.result import Result
+from pipeline.tables.table import Row
+
+
+def anova(request: Request) -> Answer:
+    """A row an effect, and the pairs that follow up those of more than two levels."""
+    cases = complete_cases.by_factors_of(request)
+    rows = [row_of(request, result) for result in rm_anova(cases.values, request.entry.within)]
+    if cases.values.shape[1:] == (2,):
+        (pair,) = pairs.of_conditions(cases.values, cases.levels[0])
+        rows = [diagnosed({**rows[0], **change_of(request, pair)}, pair, cases)]
+    if request.entry.follow_up != "none":
+        for pair in pairs.follow_ups(cases.values, request.entry.within, cases.levels):
+            row = pair_row(request, t_paired(pair.first, pair.second, pair.effect), pair, cases)
+            rows.append({**row, "adjust": request.entry.follow_up})
+    return rows, cases.left_out
+
+
+def art(request: Request) -> Answer:
+    cases = complete_cases.by_factors_of(request)
+    return [row_of(request, result) for result in art_anova(cases.values, request.entry.within)], cases.left_out
+
+
+def friedman_test(request: Request) -> Answer:
+    cases = complete_cases.by_condition(request)
+    row = row_of(request, friedman(cases.values))
+    of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
+    return [{**row, **change_of(request, of_conditions[0])} if len(of_conditions) == 1 else row], cases.left_out
+
+
+def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Callable[[Request], Answer]:
+    """What gives a row a pair of conditions."""
+
+    def answer(request: Request) -> Answer:
+        cases = complete_cases.by_condition(request)
+        of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
+        rows = [pair_row(request, test(request, pair.first, pair.second), pair, cases) for pair in of_conditions]
+        return rows, cases.left_out
+
+    return answer
+
+
+def mixed_models(request: Request) -> Answer:
+    """A row a term, and the pairs of levels of those that have more than two."""
+    model = model_rows.of_model(request)
+    rows = [
+        row_of(request, result) for result in mixed_model(model.values, model.participants, model.columns, model.terms)
+    ]
+    if model_rows.CARRY_OVER in model.columns:
+        rows = [{**row, "method": f"{row['method']}; without first periods, before which nothing came"} for row in rows]
+    kept: list[Row] = []
+    for _, of_term in groupby(rows, key=lambda row: row["effect"]):
+        whole, *levels = of_term
+        kept.append(whole)
+        if request.entry.follow_up != "none":
+            kept += [{**row, "adjust": request.entry.follow_up} for row in levels]
+    return kept, model.left_out
+
+
+def crossover_design(request: Request) -> Answer:
+    """The rows treatment, period and carry-over."""
+    cases = model_rows.of_crossover(request)
+    results = crossover(cases.values, cases.first_came_first, cases.conditions, cases.sequences)
+    return [row_of(request, result) for result in results], cases.left_out
