@@ -12,6 +12,7 @@ import pandas as pd
 from pipeline.analysis import model_rows, orders
 from pipeline.analysis.complete_cases import Request, rows_and_factors
 from pipeline.analysis.factors import Factors, missing_cells
+from pipeline.analysis.groups import one_condition_each
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
 from pipeline.statistics.counterbalancing import balance
@@ -21,6 +22,7 @@ from pipeline.statistics.result import Result
 from pipeline.study.comparison import Comparison
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import counted, listing, p_phrase, statistic
 
@@ -44,12 +46,31 @@ def findings(
     one_each = list({one.measure: one for one in requests}.values())
     people = sorted(set(requests[0].measures["participant"]))
     known = _complete_orders(study.conditions, orders.run_orders(told))
+    met = set(zip(requests[0].measures["participant"], requests[0].measures["condition"], strict=True))
+    if one_condition_each(study, met):
+        return [*_between(study, requests), *_trials(trials, one_each), *_sessions(requests[0].observations, sessions)]
     rows = [*_known_orders(people, known), *_disagreements(told)]
     if known:
         rows += _balance(study.conditions, list(known.values()))
         rows += [row for one in one_each for row in _order_effects(one)]
     rows += [*_complete_people(study, one_each), *_trials(trials, one_each)]
     return [*rows, *_sessions(requests[0].observations, sessions)]
+
+
+def _between(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
+    """How many people each condition has, where each met one; and tests that need people to meet several."""
+    measures = requests[0].measures
+    counts = measures.groupby("condition")["participant"].nunique()
+    sizes = ", ".join(f"{condition} {counts.get(condition, 0)}" for condition in study.conditions)
+    within = list(dict.fromkeys(one.entry.test for one in requests if TESTS[one.entry.test].design != "between"))
+    remark = None
+    if within:
+        remark = (
+            f"{listing(within)} {'needs' if len(within) == 1 else 'need'} people who met several conditions; use"
+            " t_welch, mann_whitney, anova_welch or kruskal with between: condition"
+        )
+    row = {"what": "participants of each condition, who met one each", "found": sizes, "expected": "as many in each"}
+    yield {**row, "remark": remark}
 
 
 def _complete_orders(conditions: Sequence[str], run: pd.DataFrame) -> dict[str, Order]:

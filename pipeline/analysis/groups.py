@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from pipeline.analysis.factors import parsed
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.result import IntArray
+from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 
 CONDITION = "condition"
@@ -39,6 +41,18 @@ class MixedCases:
     values: FloatArray
     levels: list[list[str]]
     left_out: list[Row]
+
+
+def one_condition_each(study: Study, seen: Iterable[tuple[object, object]]) -> bool:
+    """Do conditions tell groups of people apart: as study.yaml says, or because nobody met two of them?
+
+    `seen` are participants with conditions they met. A study whose second condition nobody met yet is no such design.
+    """
+    if CONDITION in study.factors:
+        return True
+    met = Counter(person for person, _ in set(seen))
+    conditions = Counter(condition for _, condition in set(seen))
+    return len(conditions) > 1 and min(conditions.values()) > 1 and max(met.values()) == 1
 
 
 def by_group(request: Request) -> GroupCases:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.factors import BETWEEN_FACTORS, factors_of, folded, missing_cells
+from pipeline.analysis.groups import one_condition_each
 from pipeline.analysis.values import CELL, table_path
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, did_you_mean
@@ -120,6 +121,8 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
         listed |= set(named)
     seen = set(zip(measures["participant"], measures["condition"], strict=True))
     seen |= {(session.participant, session.condition) for session in work.sessions}
+    if one_condition_each(work.study, seen):
+        return [*rows, *_look_alikes(listed, seen, ()), *_missing_cells(work.study, measures, seen)]
     for participant in sorted(listed):
         for condition in work.study.conditions:
             if (participant, condition) not in seen and not _decided(work.study, participant, condition, None):

@@ -41,10 +41,20 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     if len(conditions) == 1:
         yield f"There were {people} and one condition, {conditions[0]}."
         return
-    yield (
-        f"There were {people} and {counted(len(conditions), 'condition')}, compared within participants:"
-        f" {listing(conditions)}; {conditions[0]} was the baseline."
-    )
+    designs = {TESTS[row["test"]].design for row in results["comparisons"]}
+    if designs == {"between"} and {row["effect"] for row in results["comparisons"]} == {"condition"}:
+        how = "each participant met one"
+    elif designs:
+        how = (
+            "compared within participants" if "within" in designs or "mixed" in designs else "met by every participant"
+        )
+    else:
+        how = "not compared"
+    told = f"{counted(len(conditions), 'condition')}, {how}: {listing(conditions)}"
+    yield f"There were {people} and {told}; {conditions[0]} was the baseline."
+    groups = [factor for factor in study.factors if factor != "condition"]
+    if groups and designs - {"within"}:
+        yield f"Participants were in groups by {listing(groups)}, compared between participants."
 
 
 def _who(facts: Mapping[str, Any]) -> str:
