@@ -40,9 +40,9 @@ def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
     means = listed(
         f"{name} {mean_with_interval(finite(wide[name]))}{unit} (n = {wide[name].count()})" for name in wide.columns
     )
-    head = (
-        f"{label} by condition, {counted(len(complete), 'participant')} complete. Means with 95 % intervals: {means}."
-    )
+    between = met_one_each(wide)
+    who = f"{counted(len(wide), 'participant')}, one condition each" if between else _complete_of(complete)
+    head = f"{label} by condition, {who}. Means with 95 % intervals: {means}."
     alt = f"{label}: a raincloud a condition. {means}."
     if len(wide.columns) > 1 and len(complete) > 1:
         told = _differences_words(complete, unit)
@@ -50,10 +50,19 @@ def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
         alt += f" {told}"
     reading = (
         " Small marks are participants"
-        + (", lines join the same one" if len(wide.columns) > 1 else "")
+        + (", lines join the same one" if len(wide.columns) > 1 and not between else "")
         + "; shapes are their density, thick bars the middle half; large marks are means with 95 % intervals."
     )
     return Words(head + reading, alt)
+
+
+def met_one_each(wide: pd.DataFrame) -> bool:
+    """Has every participant a value in one condition only, of several? Then none is "incomplete"."""
+    return len(wide.columns) > 1 and int(wide.notna().sum(axis=1).max()) <= 1
+
+
+def _complete_of(complete: pd.DataFrame) -> str:
+    return f"{counted(len(complete), 'participant')} complete"
 
 
 def _differences_words(complete: pd.DataFrame, unit: str) -> str:
@@ -83,7 +92,7 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     _rainclouds(axes[0], wide)
     _from_zero(axes[0], [wide])
     axes[0].set_ylabel(as_label(measure_label(measure)))
-    axes[0].set_title(f"Participants (n = {len(complete)} complete)")
+    axes[0].set_title(f"Participants (n = {len(wide) if met_one_each(wide) else f'{len(complete)} complete'})")
     if compared:
         _differences(axes[1], complete)
         unit = unit_of(measure)

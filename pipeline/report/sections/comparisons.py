@@ -61,6 +61,8 @@ def section(material: Material) -> Section | None:
 
 
 def _who_counts(tests: Sequence[str]) -> str:
+    if {TESTS[name].design for name in tests} == {"between"}:
+        return "Every participant with a value counts (n)."
     every = "Only participants with a value in every condition count (n)"
     of_all = [TESTS[name].label for name in tests if not TESTS[name].complete_cases]
     return f"{every}, but in the {listing(of_all)} all." if of_all else f"{every}."

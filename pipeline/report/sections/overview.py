@@ -17,6 +17,7 @@ from pipeline.report.document.model import (
     Strong,
     Text,
 )
+from pipeline.report.figures.rainclouds import met_one_each
 from pipeline.report.sections import traces
 from pipeline.report.sections.cautions import cautions
 from pipeline.report.sections.material import ORIGINS, Material
@@ -152,8 +153,9 @@ def _figure(material: Material) -> list[Figure]:
 
 
 def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
-    label, two = measure_label(measure), len(material.study.conditions) == 2
+    label, compared = measure_label(measure), len(material.study.conditions) == 2 and len(wide.dropna()) > 1
     differences = " Right: each participant's difference and their mean with its interval; zero is no difference."
+    mark = "a mark is a participant" if met_one_each(wide) else "a line is a participant"
     told = [
         f"{row['condition']} {_mean(row)}"
         for row in material.rows("descriptives")
@@ -162,7 +164,7 @@ def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
     return material.figure(
         "answer",
         figures.paired,
-        f"{label}: a line is a participant, large marks are means with 95 % intervals.{differences if two else ''}",
+        f"{label}: {mark}, large marks are means with 95 % intervals.{differences if compared else ''}",
         f"{label} of each participant by condition. Means with 95 % intervals: {'; '.join(told)}.",
         wide,
         measure,
