@@ -1,6 +1,6 @@
 """The recipes of CONTRIBUTING.md, walked in a copy of the packages: what they add works, and touches no other files."""
 
-# ruff: noqa: E501 - what is written into files stands as it is written
+
 
 from __future__ import annotations
 
