@@ -20,6 +20,8 @@ EQUAL_IN_GROUP = "undefined: all values of one group are equal, so its mean has 
 EQUAL_IN_GROUPS = "undefined: no value varies within its group, so there is no error to test against"
 ONE_ITEM = "undefined: a scale of one item has no internal consistency"
 NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
+NO_RESIDUAL = "undefined: no value varies within its cell, so the model has no residual"
+NOT_CONVERGED = "undefined: the fit of the model did not converge"
 
 STATUSES = (
     OK,
@@ -39,4 +41,6 @@ STATUSES = (
     EQUAL_IN_GROUPS,
     ONE_ITEM,
     NO_TOTAL_VARIES,
+    NO_RESIDUAL,
+    NOT_CONVERGED,
 )

@@ -21,12 +21,12 @@ from pipeline.statistics import (
     ONE_COMPLETE,
     TOO_FEW_VALUES,
 )
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.effect_size import partial_eta_squared_interval
-from pipeline.statistics.random_intercept import Fit, Rows, degrees_of_freedom, f_test, fit
+from pipeline.statistics.random_intercept import PARTICIPANT, Rows
+from pipeline.statistics.random_intercepts import described, fitted
 from pipeline.statistics.result import IntArray, Result, negligible
-
-_METHOD = "linear mixed model, random intercept, REML, Satterthwaite degrees of freedom"
+from pipeline.statistics.satterthwaite import Fit, degrees_of_freedom, f_test
 
 
 @dataclass(frozen=True)
@@ -59,32 +59,73 @@ Column = Factor | Covariate
 
 
 def mixed_model(
-    values: FloatArray, participants: Sequence[str], columns: Mapping[str, Column], terms: Sequence[str]
+    values: FloatArray,
+    participants: Sequence[str],
+    columns: Mapping[str, Column],
+    terms: Sequence[str],
+    random: Mapping[str, IntArray] | None = None,
 ) -> list[Result]:
     """Test each term, a column's name or factors' names joined by ":", of values (N,) with all rows that there are.
 
     A term of one degree of freedom gives one row, its t; a larger one its F, and for a factor the t of every two of
     its levels. Estimates are first minus second level, averaged over the levels of the other factors; a covariate's
     is its slope. Effect size: the estimate, of an F partial η² (from F and its degrees of freedom).
+
+    Beside (1 | participant) the model has a random intercept for each of `random`, by name which group each row is of
+    (N,). Where participants have several rows in a condition it takes `cells_of`, as "participant:condition": without
+    it the rows of a cell count as if each had met the condition anew. Intercepts without variance, or that the data
+    cannot tell apart, are left out, and the method says so.
     """
     people = {name: index for index, name in enumerate(dict.fromkeys(participants))}
     index = np.array([people[name] for name in participants], dtype=np.int64)
-    rows = Rows(values, _design(columns, terms, len(values)), index)
-    blank = Result("", "t", _METHOD, "estimate", len(people))
-    status = _undefined(rows, columns)
-    if status is not None:
-        return [replace(blank, effect=term, contrast=_contrast(columns, term), status=status) for term in terms]
-    fitted = fit(rows)
-    method = _METHOD + ("; singular fit: no variance between participants is found" if fitted.singular else "")
-    told = {
-        "singular": fitted.singular,
-        "log_likelihood": fitted.log_likelihood,
-        "variance_participant": fitted.variance_participant,
-        "variance_residual": fitted.variance_residual,
-        "n_observations": len(values),
+    (scaled,), exponent = at_unit_scale([values])
+    rows = Rows(scaled, _design(columns, terms, len(values)), index)
+    groupings = {PARTICIPANT: index, **(random or {})}
+    blank = Result("", "t", described(groupings), "estimate", len(people))
+    found = _undefined(rows, columns) or fitted(rows, groupings)
+    if isinstance(found, str):
+        return [replace(blank, effect=term, contrast=_contrast(columns, term), status=found) for term in terms]
+    details = _told(found.fit, len(values), exponent, rows.free)
+    blank = replace(blank, method=described(groupings, found), details=details)
+    results = [result for term in terms for result in _tested(found.fit, columns, terms, replace(blank, effect=term))]
+    return [_unscaled(result, exponent) for result in results]
+
+
+def cells_of(participants: Sequence[str], condition: Factor) -> IntArray:
+    """Which participant's which condition each row is of (N,): the groups of (1 | participant:condition)."""
+    people = np.unique(np.asarray(participants), return_inverse=True)[1]
+    cells: IntArray = people * len(condition.levels) + condition.codes
+    return cells
+
+
+def _told(model: Fit, count: int, exponent: int, free: int) -> dict[str, Any]:
+    """What of the fit is the same for every term, in the values' own unit."""
+    variances = {name: _power(variance, 2 * exponent) for name, variance in model.variances.items()}
+    return {
+        "singular": bool(model.zero),
+        "log_likelihood": model.log_likelihood - free * exponent * float(np.log(2)),
+        "variance_participant": variances.get(PARTICIPANT),
+        "variance_residual": _power(model.variance_residual, 2 * exponent),
+        "variances": variances,
+        "n_observations": count,
     }
-    blank = replace(blank, method=method, details=told)
-    return [result for term in terms for result in _tested(fitted, columns, terms, replace(blank, effect=term))]
+
+
+def _power(value: float | None, exponent: int) -> float | None:
+    """value · 2ᵉ; None beyond the largest number."""
+    with np.errstate(over="ignore", under="ignore"):
+        result = float(np.ldexp(value or 0.0, exponent))
+    return result if np.isfinite(result) else None
+
+
+def _unscaled(result: Result, exponent: int) -> Result:
+    """A row in the values' own unit; an F and its η² have none."""
+    if result.effect_size_name != "estimate":
+        return result
+    estimate, low, high, error = (
+        _power(value, exponent) for value in (result.effect_size, result.ci_low, result.ci_high, result.details["se"])
+    )
+    return replace(result, effect_size=estimate, ci_low=low, ci_high=high, details={**result.details, "se": error})
 
 
 def _undefined(rows: Rows, columns: Mapping[str, Column]) -> str | None:

@@ -15,10 +15,12 @@ from scipy import optimize
 
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.result import IntArray
+from pipeline.statistics.satterthwaite import Fit
+
+PARTICIPANT = "participant"
 
 _RATIOS = np.concatenate([[0.0], np.logspace(-6, 25, 125)])  # of σ_b² to σ_e²: among them the search begins
 _SINGULAR = 1e-8  # a ratio so small is zero, as in lme4
-_SAME = 1e-8  # degrees of freedom closer than this, relatively, are one number
 
 
 @dataclass(frozen=True)
@@ -52,28 +54,6 @@ class Rows:
         return total[self.participants]
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Estimates of p coefficients and of the variances.
-
-    `derivatives` (2, p, p) say how the coefficients' covariance changes with σ_e² and σ_b², `uncertainty` (2, 2) is
-    the covariance of those two. In a singular fit, where σ_b² is estimated as zero, they are of σ_e² alone.
-    """
-
-    coefficients: FloatArray
-    covariance: FloatArray
-    derivatives: FloatArray
-    uncertainty: FloatArray
-    variance_residual: float
-    variance_participant: float
-    log_likelihood: float
-
-    @property
-    def singular(self) -> bool:
-        """Is the participants' variance estimated as zero?"""
-        return self.variance_participant == 0
-
-
 def fit(rows: Rows) -> Fit:
     """The fit. Rows within and between participants must each leave a degree of freedom, or nothing determines it."""
     ratio = _variance_ratio(rows)
@@ -88,7 +68,7 @@ def fit(rows: Rows) -> Fit:
         derivatives,
         uncertainty,
         solved.residual,
-        solved.participant,
+        {PARTICIPANT: solved.participant},
         -criterion / 2,
     )
 
@@ -183,24 +163,3 @@ class _Solved:
                 trace += np.trace(self.covariance @ self._inner[i] @ self.covariance @ self._inner[j])
                 curvature[i, j] = 2 * self._moved[i] @ projected[j] - trace
         return curvature
-
-
-def degrees_of_freedom(fitted: Fit, hypothesis: FloatArray) -> float:
-    """Satterthwaite's, of one linear combination (p,) of the coefficients: 2v² / Var(v̂)."""
-    variance = hypothesis @ fitted.covariance @ hypothesis
-    slope = np.array([hypothesis @ matrix @ hypothesis for matrix in fitted.derivatives])
-    return float(2 * variance**2 / (slope @ fitted.uncertainty @ slope))
-
-
-def f_test(fitted: Fit, hypotheses: FloatArray) -> tuple[float, float, float]:
-    """F and its two degrees of freedom for q linear combinations (q, p), by Fai and Cornelius (1996)."""
-    variances, directions = np.linalg.eigh(hypotheses @ fitted.covariance @ hypotheses.T)
-    combined, q = directions.T @ hypotheses, len(hypotheses)
-    statistic = float(np.sum((combined @ fitted.coefficients) ** 2 / variances) / q)
-    single = np.array([degrees_of_freedom(fitted, row) for row in combined])
-    if np.ptp(single) < _SAME * single.mean():
-        return statistic, float(q), float(single.mean())
-    if np.any(single <= 2):
-        return statistic, float(q), 2.0
-    expected = float(np.sum(single / (single - 2)))
-    return statistic, float(q), 2 * expected / (expected - q)

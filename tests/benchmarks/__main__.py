@@ -1,4 +1,4 @@
-"""`make bench`: estimators beside other libraries and the plain loop, reading logs, the start, an archive."""
+"""`make bench`: estimators beside other libraries and a plain loop, reading logs, the start, an archive; error rates."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from fusion_core import ESTIMATORS, Estimator, FusionKalman, Samples, Sensor, WindowGP, replay_loop
 from tests.benchmarks import archive, peers
+from tests.benchmarks.error_rates import error_rates
 from tests.benchmarks.people import people
 from tests.benchmarks.reading import reading
 from tests.benchmarks.timing import fastest
@@ -145,3 +146,4 @@ if __name__ == "__main__":
     starting()
     people()
     archive.measure(archive.SMALL)
+    error_rates()

@@ -22,8 +22,9 @@ from pipeline.statistics.diagnostics import differences, far_out, normality
 from pipeline.statistics.equivalence import tost
 from pipeline.statistics.mixed import Column, Covariate, Factor, mixed_model
 from pipeline.statistics.paired import t_paired
-from pipeline.statistics.random_intercept import Rows, degrees_of_freedom, fit
+from pipeline.statistics.random_intercept import Rows, fit
 from pipeline.statistics.result import Result
+from pipeline.statistics.satterthwaite import degrees_of_freedom
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.reference import (
     CASES,
@@ -242,7 +243,7 @@ def dense_criterion(variances: np.ndarray, values: np.ndarray, design: np.ndarra
 def test_the_random_intercept_by_matrices_written_out_and_differences_for_derivatives(seed: int) -> None:
     values, design, people = unbalanced(seed, 3.0)
     found = fit(Rows(values, design, people))
-    start = np.array([found.variance_residual, found.variance_participant])
+    start = np.array([found.variance_residual, found.variances["participant"]])
 
     def criterion(logs: np.ndarray) -> float:
         return dense_criterion(np.exp(logs), values, design, people)
