@@ -22,6 +22,7 @@ ONE_ITEM = "undefined: a scale of one item has no internal consistency"
 NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
 NO_RESIDUAL = "undefined: no value varies within its cell, so the model has no residual"
 NOT_CONVERGED = "undefined: the fit of the model did not converge"
+NOT_POSITIVE = "undefined: a logarithm needs values above zero"
 
 STATUSES = (
     OK,
@@ -43,4 +44,5 @@ STATUSES = (
     NO_TOTAL_VARIES,
     NO_RESIDUAL,
     NOT_CONVERGED,
+    NOT_POSITIVE,
 )

@@ -1,4 +1,4 @@
-"""`make bench`: estimators beside other libraries and a plain loop, reading logs, the start, an archive; error rates."""
+"""`make bench`: estimators beside other libraries and a plain loop, reading logs, the start, archives, error rates."""
 
 from __future__ import annotations
 
