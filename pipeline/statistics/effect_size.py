@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from scipy import optimize, special, stats
+
+from pipeline.statistics.arrays import FloatArray
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 _STEP = np.array([-9.0, 9.0])  # where Φ is neither 0 nor 1
@@ -46,12 +49,21 @@ def noncentral_t_cdf(t: float, df: float, noncentrality: float) -> float:
     SciPy's own gives NaN for negative t far from zero; in the middle the two agree to 1e-10. For a large t, Φ is a
     step as narrow as 1/t: its surroundings are integrated apart.
     """
-    edges = np.sqrt(np.array([stats.chi2.ppf(1e-18, df), stats.chi2.isf(1e-18, df)]) / df)
+    edges = _reach(df)
     if t != 0:
         edges = np.unique(np.clip([*edges, *((noncentrality + _STEP) / t)], *edges))
     at = (_NODES + 1) / 2 * np.diff(edges)[:, None] + edges[:-1, None]
-    density = _WEIGHTS * np.diff(edges)[:, None] / 2 * stats.chi.pdf(at * np.sqrt(df), df) * np.sqrt(df)
+    # Of s: 2 (df/2)^(df/2) / Γ(df/2) · s^(df − 1) · exp(−df s² / 2)
+    log_density = np.log(2) + df / 2 * np.log(df / 2) - special.gammaln(df / 2)
+    density = np.exp(log_density + (df - 1) * np.log(at) - df * at**2 / 2) * _WEIGHTS * np.diff(edges)[:, None] / 2
     return float(np.sum(density * special.ndtr(t * at - noncentrality)))
+
+
+@lru_cache(maxsize=1024)
+def _reach(df: float) -> FloatArray:
+    """Between which numbers √(χ²/df) lies, but for 1e-18 on either side."""
+    bounds: FloatArray = np.sqrt(np.array([stats.chi2.ppf(1e-18, df), stats.chi2.isf(1e-18, df)]) / df)
+    return bounds
 
 
 def hedges_correction(df: float) -> float | None:
