@@ -15,7 +15,7 @@ from pipeline.statistics import NO_ERROR, OK
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.diagnostics import normality
 from pipeline.statistics.effect_size import partial_eta_squared_interval
-from pipeline.statistics.result import Result, degenerate, negligible, too_few
+from pipeline.statistics.result import Result, degenerate, from_first, negligible, too_few
 from pipeline.statistics.sphericity import sphericity
 
 
@@ -28,20 +28,21 @@ def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
     also say whether the residuals are normal.
     """
     n, levels = values.shape[0], values.shape[1:]
-    (flat,), _ = at_unit_scale([values.reshape(n, int(np.prod(levels)))])
+    flat = values.reshape(n, int(np.prod(levels)))
     effects = effects_of(levels)
-    if too_few(n) or degenerate(flat):
-        status = too_few(n) or degenerate(flat) or ""
+    if status := too_few(n) or degenerate(flat):
         return [_blank(effect_name(factors, effect), n, status) for effect in effects]
-    strata = [_stratum(flat @ contrasts(levels, effect)) for effect in effects]
+    # Contrasts sum to zero, so that what all of a participant's values share drops out: better before than after.
+    (flat, apart), _ = at_unit_scale([flat, from_first(flat)])
+    strata = [_stratum(apart @ contrasts(levels, effect)) for effect in effects]
     between = float(np.prod(levels) * np.sum((flat.mean(axis=1) - flat.mean()) ** 2))
     variation = between + sum(stratum.error for stratum in strata)
     found = [
-        tested(_blank(effect_name(factors, effect), n), stratum, variation, flat)
+        tested(_blank(effect_name(factors, effect), n), stratum, variation, apart)
         for effect, stratum in zip(effects, strata, strict=True)
     ]
     if len(effects) == 1 and levels[0] > 2 and found[0].status == OK:
-        residuals = flat - flat.mean(axis=0) - flat.mean(axis=1, keepdims=True) + flat.mean()
+        residuals = apart - apart.mean(axis=0) - apart.mean(axis=1, keepdims=True) + apart.mean()
         found[0] = replace(found[0], details={**found[0].details, **normality(residuals.ravel(), "residual_")})
     return found
 

@@ -14,7 +14,7 @@ from pipeline.statistics.anova import effect_name, effects_of, rm_anova
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import FollowUp
-from pipeline.statistics.result import Result, degenerate, rounded, too_few
+from pipeline.statistics.result import Result, degenerate, room_of, tied, too_few
 
 _METHOD = "aligned rank transform, F in the effect's own error stratum, uncorrected"
 _CONTRASTS = "ART-C contrast: paired t test of ranks aligned for the pair's factors together, two-sided"
@@ -36,7 +36,7 @@ def art_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
             found.append(_on_ranks(plain))
             continue
         aligned = values - values.mean(axis=0) + _effect(values.mean(axis=0), effect)
-        ranks = stats.rankdata(rounded(aligned, values)).reshape(values.shape)
+        ranks = _ranked(aligned, values)
         found.append(_on_ranks(next(result for result in rm_anova(ranks, factors) if result.effect == plain.effect)))
     return found
 
@@ -97,5 +97,15 @@ def _ranked_together(values: FloatArray, effect: tuple[int, ...]) -> FloatArray:
     outside = tuple(place for place in range(values.ndim - 1) if place not in effect)
     means = values.mean(axis=0)
     aligned = values - means + means.mean(axis=outside, keepdims=True) - means.mean()
-    ranks: FloatArray = stats.rankdata(rounded(aligned, values)).reshape(values.shape)
+    ranks = _ranked(aligned, values)
+    return ranks
+
+
+def _ranked(aligned: FloatArray, values: FloatArray) -> FloatArray:
+    """Midranks of aligned values over all of them, in their shape.
+
+    Each is made of means over all participants, so each has the round-off of the largest of the values.
+    """
+    room = np.broadcast_to(room_of(np.max(np.abs(values), keepdims=True)).ravel(), values.size)
+    ranks: FloatArray = stats.rankdata(tied(aligned.ravel(), room)).reshape(values.shape)
     return ranks

@@ -10,8 +10,15 @@ import numpy.typing as npt
 from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NO_COMPLETE, NO_ERROR, ONE_ORDER, TOO_FEW_VALUES
-from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.result import Result, negligible, rounded, rounded_differences
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
+from pipeline.statistics.result import (
+    Result,
+    negligible,
+    room_of,
+    rounded_differences,
+    step_of,
+    tied,
+)
 
 EFFECTS = ("treatment", "period", "carry-over")
 
@@ -45,7 +52,8 @@ def crossover(
         status = TOO_FEW_VALUES
     if status is not None:
         return [replace(result, status=status) for result in blank]
-    differences, sums = rounded_differences(values[:, 0], values[:, 1]), rounded(values.sum(axis=1))
+    differences = rounded_differences(values[:, 0], values[:, 1])
+    sums = tied(values.sum(axis=1), room_of(np.abs(values).sum(axis=1), step_of(values)))
     return [
         _tested(blank[0], differences, early, (0.5, 0.5)),
         _tested(blank[1], differences, early, (0.5, -0.5)),
@@ -55,6 +63,7 @@ def crossover(
 
 def _tested(blank: Result, values: FloatArray, early: npt.NDArray[np.bool_], weights: tuple[float, float]) -> Result:
     """The t of a weighted sum of the groups' means; the weights differ in sign at most."""
+    (values,), exponent = at_unit_scale([values])
     groups = values[early], values[~early]
     df = len(values) - 2
     squares = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups)
@@ -63,12 +72,15 @@ def _tested(blank: Result, values: FloatArray, early: npt.NDArray[np.bool_], wei
     error = abs(weights[0]) * float(np.sqrt(squares / df * (1 / len(groups[0]) + 1 / len(groups[1]))))
     estimate = sum(weight * float(group.mean()) for weight, group in zip(weights, groups, strict=True))
     margin = float(stats.t.ppf(0.975, df)) * error
+    effect_size, low, high = (
+        float(np.ldexp(figure, exponent)) for figure in (estimate, estimate - margin, estimate + margin)
+    )
     return replace(
         blank,
         statistic=estimate / error,
         df2=float(df),
         p=float(2 * stats.t.sf(abs(estimate) / error, df)),
-        effect_size=estimate,
-        ci_low=estimate - margin,
-        ci_high=estimate + margin,
+        effect_size=effect_size,
+        ci_low=low,
+        ci_high=high,
     )

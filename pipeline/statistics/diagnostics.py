@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.result import negligible, rounded_differences
 
 OUTLIER_RULE = "modified z beyond 3.5 (Iglewicz and Hoaglin 1993)"
@@ -31,8 +31,10 @@ def differences(first: FloatArray, second: FloatArray, participants: Sequence[st
 def normality(values: FloatArray, prefix: str = "") -> dict[str, float | None]:
     """Shapiro and Wilk's W and p by their names in details; None below three values, or where they do not vary."""
     w = p = None
-    if 3 <= len(values) <= _SHAPIRO_UP_TO and not negligible(float(np.sum((values - values.mean()) ** 2)), values):
-        found = stats.shapiro(values)
+    (values,), _ = at_unit_scale([values])
+    apart = values - np.mean(values) if len(values) else values
+    if 3 <= len(values) <= _SHAPIRO_UP_TO and not negligible(float(np.sum(apart**2)), values):
+        found = stats.shapiro(apart / np.max(np.abs(apart)))  # SciPy takes a range below 1e-19 for none
         w, p = float(found.statistic), float(found.pvalue)
     return {f"{prefix}shapiro_w": w, f"{prefix}shapiro_p": p}
 
@@ -41,6 +43,7 @@ def far_out(values: FloatArray) -> list[int] | None:
     """Where |0.6745·(x − median) / MAD| is beyond 3.5 (Iglewicz and Hoaglin 1993); None where the MAD is zero."""
     if not len(values):
         return None
+    (values,), _ = at_unit_scale([values])
     apart = values - np.median(values)
     spread = float(np.median(np.abs(apart)))
     if negligible(spread**2, values):

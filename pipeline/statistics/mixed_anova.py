@@ -27,7 +27,7 @@ from pipeline.statistics.groups import missing, varies
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import FollowUp, of_effect, of_groups
 from pipeline.statistics.pairs import follow_ups as within_pairs
-from pipeline.statistics.result import IntArray, Result, negligible, rounded_differences
+from pipeline.statistics.result import IntArray, Result, from_first, negligible, rounded_differences
 from pipeline.statistics.welch import spreads, t_welch
 
 _METHOD = "mixed ANOVA, type III, uncorrected; sphericity corrections in details"
@@ -42,7 +42,8 @@ def mixed_anova(values: FloatArray, codes: IntArray, between: str, factors: Sequ
     factor of two levels their difference, averaged over the groups, and its interval.
     """
     n, levels = values.shape[0], values.shape[1:]
-    (flat,), _ = at_unit_scale([values.reshape(n, int(np.prod(levels)))])
+    flat = values.reshape(n, int(np.prod(levels)))
+    (flat, apart), _ = at_unit_scale([flat, from_first(flat)])
     groups = [np.flatnonzero(codes == code) for code in range(int(codes.max(initial=-1)) + 1)]
     details = {"n_groups": [len(rows) for rows in groups]}
     blank = Result("", "F", _METHOD, "generalized eta squared", n, details=details)
@@ -51,20 +52,20 @@ def mixed_anova(values: FloatArray, codes: IntArray, between: str, factors: Sequ
         names = [name for effect in effects for name in _names(between, factors, effect)]
         return [replace(blank, effect=name, status=status) for name in (between, *names)]
     people = _strata(flat @ contrasts(levels, ()), groups)[1]
-    within = [_strata(flat @ contrasts(levels, effect), groups) for effect in effects]
+    within = [_strata(apart @ contrasts(levels, effect), groups) for effect in effects]
     variation = people.error + sum(of_group.error for _, of_group in within)
     found = [_group_row(replace(blank, effect=between), people, variation, flat, groups)]
     for effect, strata in zip(effects, within, strict=True):
         for name, stratum in zip(_names(between, factors, effect), strata, strict=True):
-            found.append(_within_row(replace(blank, effect=name), stratum, variation, flat))
+            found.append(_within_row(replace(blank, effect=name), stratum, variation, apart))
         if len(effect) == 1 and levels[effect[0]] == 2 and found[-2].status == OK:
             first, second = (values.take(level, effect[0] + 1).reshape(n, -1).mean(axis=1) for level in (0, 1))
             compared = t_in_groups(first, second, codes).details
             told = {name: compared[name] for name in ("difference", "ci_difference")}
             found[-2] = replace(found[-2], details={**found[-2].details, **told})
     if len(effects) == 1 and levels[0] > 2 and found[1].status == OK:
-        apart = flat - flat.mean(axis=1, keepdims=True)
-        residuals = np.concatenate([(apart[rows] - apart[rows].mean(axis=0)).ravel() for rows in groups])
+        centred = apart - apart.mean(axis=1, keepdims=True)
+        residuals = np.concatenate([(centred[rows] - centred[rows].mean(axis=0)).ravel() for rows in groups])
         found[1] = replace(found[1], details={**found[1].details, **normality(residuals, "residual_")})
     return found
 
@@ -96,9 +97,9 @@ def _strata(scores: FloatArray, groups: Sequence[IntArray]) -> tuple[Stratum, St
     return Stratum(float(plain), d, errors, error_df), Stratum(float(differ), d * (len(groups) - 1), errors, error_df)
 
 
-def _within_row(blank: Result, stratum: Stratum, variation: float, flat: FloatArray) -> Result:
-    result = tested(blank, stratum, variation, flat)
-    if result.status == NO_ERROR and negligible(stratum.explained, flat):
+def _within_row(blank: Result, stratum: Stratum, variation: float, apart: FloatArray) -> Result:
+    result = tested(blank, stratum, variation, apart)
+    if result.status == NO_ERROR and negligible(stratum.explained, apart):
         return replace(result, status=ALL_ZERO)
     return result
 
@@ -118,15 +119,14 @@ def t_in_groups(first: FloatArray, second: FloatArray, codes: IntArray, effect: 
     As emmeans computes contrasts of a mixed ANOVA's within-factor from its multivariate model. Of one group it is the
     paired t test. Effect size: the difference over the pooled SD of the differences.
     """
-    (one, other), exponent = at_unit_scale([first, second])
+    (differences,), exponent = at_unit_scale([rounded_differences(first, second)])
     groups = [np.flatnonzero(codes == code) for code in np.unique(codes)]
     blank = Result(effect, "t", _POOLED, "Cohen's d_z", len(first))
     df = len(first) - len(groups)
     if df < 1:
         return replace(blank, status=TOO_FEW_VALUES)
-    differences = rounded_differences(one, other)
     squares = sum(float(np.sum((differences[rows] - differences[rows].mean()) ** 2)) for rows in groups)
-    if negligible(squares, np.stack([one, other])):
+    if negligible(squares, differences):
         return replace(blank, status=NO_ERROR if np.any(differences) else ALL_ZERO)
     mean = float(np.mean([differences[rows].mean() for rows in groups]))
     sd = float(np.sqrt(squares / df))

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NO_ERROR
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.effect_size import cohen_dz, dz_interval, hedges_correction
-from pipeline.statistics.result import Result, negligible, rounded_differences, too_few
+from pipeline.statistics.result import Result, rounded_differences, too_few
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,17 @@ class Differences:
 def differences_of(first: FloatArray, second: FloatArray) -> Differences | str:
     """The differences first − second, or the status where they cannot be tested."""
     n = len(first)
-    values = rounded_differences(first, second)
     if status := too_few(n):
         return status
+    (values,), exponent = at_unit_scale([rounded_differences(first, second)])
     if not np.any(values):
         return ALL_ZERO
-    if negligible(float(np.sum((values - values.mean()) ** 2)), np.stack([first, second])):
+    if np.ptp(values) == 0:
         return NO_ERROR
-    error = float(np.std(values, ddof=1)) / np.sqrt(n)
-    return Differences(n, float(np.mean(values)), error, cohen_dz(values))
+    mean, error = (
+        float(np.ldexp(figure, exponent)) for figure in (np.mean(values), np.std(values, ddof=1) / np.sqrt(n))
+    )
+    return Differences(n, mean, error, cohen_dz(values))
 
 
 def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -> Result:
@@ -47,7 +49,8 @@ def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -
     statistic, margin = found.mean / found.error, float(stats.t.ppf(0.975, df)) * found.error
     low, high = dz_interval(found.dz, found.n)
     correction = hedges_correction(df)
-    pooled = float(np.sqrt((np.var(first, ddof=1) + np.var(second, ddof=1)) / 2))
+    (one, other), exponent = at_unit_scale([first, second])
+    pooled = float(np.ldexp(np.sqrt((np.var(one, ddof=1) + np.var(other, ddof=1)) / 2), exponent))
     return replace(
         blank,
         statistic=float(statistic),

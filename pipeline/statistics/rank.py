@@ -10,7 +10,16 @@ from scipy import optimize, signal, special, stats
 
 from pipeline.statistics import ALL_ZERO
 from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.result import IntArray, Result, degenerate, rounded, rounded_differences, too_few
+from pipeline.statistics.result import (
+    IntArray,
+    Result,
+    degenerate,
+    room_of,
+    rounded_differences,
+    step_of,
+    tied,
+    too_few,
+)
 
 EXACT_UP_TO = 3000  # pairs: beyond, the Walsh averages alone would fill the memory
 _BLOCK = 256
@@ -156,7 +165,8 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
     status = too_few(n) or degenerate(values)
     if status is not None:
         return replace(blank, status=status)
-    ranks = np.apply_along_axis(stats.rankdata, 1, rounded(values))
+    room = room_of(values, step_of(values))
+    ranks = np.array([stats.rankdata(tied(*row)) for row in zip(values, room, strict=True)])
     agreement = float(_agreement(n, ranks.sum(axis=0), np.sum(ranks**2)))
     statistic = n * (k - 1) * agreement
     low, high = _agreement_interval(ranks)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from pipeline.statistics.arrays import FloatArray
 IntArray = npt.NDArray[np.int64]
 
 _ROUND_OFF = 1e-12  # of the largest value: what arithmetic on decimal data leaves behind
+_ROUND_OFF_STEPS = 64
+_TOLD_APART = 4  # spacings of floats: decimals closer than that are lost in their own round-off
+_KNOWN_TO = 1e-6
 
 
 @dataclass(frozen=True)
@@ -43,33 +47,68 @@ def too_few(n: int) -> str | None:
     return {0: NO_COMPLETE, 1: ONE_COMPLETE}.get(n)
 
 
-def rounded(values: FloatArray, *beside: FloatArray) -> FloatArray:
-    """Values with round-off taken out, so that 0.3 − 0.2 and 0.2 − 0.1 tie.
+def room_of(sizes: FloatArray, step: float = 0.0) -> FloatArray:
+    """How far round-off can have moved figures that were computed from values of these sizes, each by its own.
 
-    12 digits count, of the largest of the values and of what they were made from.
+    64 times the spacing of floats at that size, which a mean of dozens of values stays below, and no less than their
+    spacing at the median size. Where floats still tell the data's decimals apart (`step`, one in the last of them), it
+    is no more than half a step: microseconds since 1970 have sixteen digits, and all of them count. Whole numbers
+    below 2⁵³ are exact.
     """
-    largest = max(float(np.max(np.abs(array), initial=0.0)) for array in (beside or (values,)))
-    if largest == 0:
-        return values
-    quantum = 10.0 ** (np.floor(np.log10(largest)) - 11)
-    result: FloatArray = np.rint(values / quantum) * quantum
-    return result
+    spacing = np.spacing(np.abs(sizes))
+    room: FloatArray = np.maximum(_ROUND_OFF_STEPS * spacing, np.spacing(np.median(np.abs(sizes))) if sizes.size else 0)
+    told_apart = (step >= _TOLD_APART * spacing) | ((step >= 1) & (spacing <= 1))
+    return np.where(told_apart, np.minimum(room, step / 2), room)
+
+
+def tied(values: FloatArray, room: FloatArray) -> FloatArray:
+    """Values (n,) of which those that round-off alone parts are equal in size, and those within their room are zero.
+
+    No other value moves by more than a millionth of itself: a value known less well than that ties with nothing.
+    """
+    sizes = np.abs(values)
+    sizes = np.where(sizes <= room, 0.0, sizes)
+    order = np.argsort(sizes, kind="stable")
+    ascending, near = sizes[order], np.minimum(room, _KNOWN_TO * sizes)[order]
+    apart = np.diff(ascending) > np.maximum(near[1:], near[:-1])
+    group = np.concatenate([np.zeros(min(1, len(values)), dtype=np.int64), np.cumsum(apart)])
+    result = np.empty_like(sizes)
+    result[order] = ascending[np.searchsorted(group, group)]
+    return np.copysign(result, values) + 0.0
+
+
+def step_of(*arrays: FloatArray) -> float:
+    """One in the last decimal that any of the values is written with: 0.001 for 1.5 and 2.375."""
+    values = np.unique(np.concatenate([array.ravel() for array in arrays]))
+    return float(10.0 ** min((_exponent(value) for value in values.tolist()), default=0))
+
+
+def _exponent(value: float) -> int:
+    exponent = Decimal(repr(value)).normalize().as_tuple().exponent
+    return exponent if isinstance(exponent, int) else 0
 
 
 def rounded_differences(first: FloatArray, second: FloatArray) -> FloatArray:
-    """first − second, zero and tied where the data's decimals say so."""
-    return rounded(first - second, first, second)
+    """first − second, zero and tied where the data's decimals say so: 0.3 − 0.2 and 0.2 − 0.1 are one difference.
+
+    What counts as round-off is a matter of each pair's own size, so that one giant value does not level the others.
+    """
+    return tied(first - second, room_of(np.maximum(np.abs(first), np.abs(second)), step_of(first, second)))
+
+
+def from_first(values: FloatArray) -> FloatArray:
+    """Values (n, k) less each row's first, zero and tied as `rounded_differences` has it: what within-tests rest on."""
+    return np.column_stack([rounded_differences(column, values[:, 0]) for column in values.T])
 
 
 def negligible(sum_of_squares: float, values: FloatArray) -> bool:
-    """Is a sum of squares nothing but round-off?"""
+    """Is a sum of squares nothing but round-off of the values it was made from?"""
     return sum_of_squares <= values.size * (_ROUND_OFF * float(np.max(np.abs(values), initial=0.0))) ** 2
 
 
 def degenerate(values: FloatArray) -> str | None:
     """The status for data (n, k) without any difference between conditions, else None."""
-    if negligible(float(np.sum((values - values.mean()) ** 2)), values):
-        return NO_VARIATION if values.shape[1] > 2 else ALL_ZERO
-    if negligible(float(np.sum((values - values.mean(axis=1, keepdims=True)) ** 2)), values):
-        return ALL_ZERO
-    return None
+    if np.any(from_first(values)):
+        return None
+    alike = not np.any(from_first(values[:, :1].T))
+    return NO_VARIATION if alike and values.shape[1] > 2 else ALL_ZERO

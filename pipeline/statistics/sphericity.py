@@ -21,8 +21,8 @@ def sphericity(
     d = len(covariance)
     if d == 1:
         return dict.fromkeys(NAMES)
-    trace = float(np.trace(covariance))
-    gg = trace**2 / (d * float(np.sum(covariance**2)))
+    relative = covariance / np.trace(covariance)
+    gg = 1 / (d * float(np.sum(relative**2)))
     # Huynh and Feldt as corrected by Lecoutre (1991); without groups both are the same.
     room = error_df - d * gg
     hf = None  # with one degree of freedom there is one contrast, and 0 / 0
@@ -30,7 +30,7 @@ def sphericity(
         hf = min(1.0, ((error_df + 1) * d * gg - 2) / (d * room)) if room > 0 else 1.0
     w = p = None
     if error_df >= d:
-        w = float(np.linalg.det(covariance / (trace / d)))
+        w = float(np.linalg.det(relative * d))
         p = _mauchly_p(w, d, error_df, cells)
     return {
         "p_gg": float(stats.f.sf(statistic, gg * df1, gg * df2)),
