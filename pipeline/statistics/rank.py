@@ -1,4 +1,4 @@
-"""Rank tests: exact Wilcoxon signed-rank with ties and zeros, and Friedman."""
+"""Rank tests: Wilcoxon signed-rank and Friedman, both exact with ties and zeros."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy import optimize, signal, special, stats
 
 from pipeline.statistics import ALL_ZERO
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.friedman_exact import friedman_p
 from pipeline.statistics.result import (
     IntArray,
     Result,
@@ -24,6 +25,9 @@ from pipeline.statistics.result import (
 EXACT_UP_TO = 3000  # pairs: beyond, the Walsh averages alone would fill the memory
 _BLOCK = 256
 _SHARPEST = -50.0
+_BY_CHI2 = "Friedman, chi-squared approximation, ties corrected"
+_BY_ORDERS = "Friedman, exact over all orders of each participant's ranks, ties corrected"
+_BY_SIGNS = "Friedman of two conditions, exact: the sign test"
 
 
 def wilcoxon(
@@ -156,12 +160,13 @@ def hodges_lehmann(differences: FloatArray, level: float = 0.95) -> tuple[float,
 
 
 def friedman(values: FloatArray, effect: str = "condition") -> Result:
-    """Friedman's test of values (n, k) with ties corrected; Iman and Davenport's F beside.
+    """Friedman's test of values (n, k) with ties corrected, exact where that takes no longer than about a second.
 
-    Effect size: Kendall's W, with an interval by the jackknife over participants.
+    Of two conditions it is the sign test. Beside it the p of χ² and Iman and Davenport's F. Effect size: Kendall's W,
+    with an interval by the jackknife over participants.
     """
     n, k = values.shape
-    blank = Result(effect, "chi2", "Friedman, chi-squared approximation, ties corrected", "Kendall's W", n, df1=k - 1)
+    blank = Result(effect, "chi2", _BY_CHI2, "Kendall's W", n, df1=k - 1)
     status = too_few(n) or degenerate(values)
     if status is not None:
         return replace(blank, status=status)
@@ -172,20 +177,28 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
     low, high = _agreement_interval(ranks)
     left = n * (k - 1) - statistic
     f = (n - 1) * statistic / left if left > 1e-9 else None
-    details = {
-        "iman_davenport_f": f,
-        "iman_davenport_p": None if f is None else float(stats.f.sf(f, k - 1, (k - 1) * (n - 1))),
-    }
-    p = float(stats.chi2.sf(statistic, k - 1))
+    by_chi2 = float(stats.chi2.sf(statistic, k - 1))
+    exact = _sign_p(ranks) if k == 2 else friedman_p(ranks)
     return replace(
         blank,
+        method=_BY_CHI2 if exact is None else _BY_SIGNS if k == 2 else _BY_ORDERS,
         statistic=statistic,
-        p=p,
+        p=by_chi2 if exact is None else exact,
         effect_size=agreement,
         ci_low=low,
         ci_high=high,
-        details=details,
+        details={
+            "chi2_p": by_chi2,
+            "iman_davenport_f": f,
+            "iman_davenport_p": None if f is None else float(stats.f.sf(f, k - 1, (k - 1) * (n - 1))),
+        },
     )
+
+
+def _sign_p(ranks: FloatArray) -> float:
+    """Of two conditions: how many participants rank the first above the second, by the binomial distribution."""
+    above, below = int(np.sum(ranks[:, 0] > ranks[:, 1])), int(np.sum(ranks[:, 0] < ranks[:, 1]))
+    return float(stats.binomtest(above, above + below).pvalue)
 
 
 def _agreement(n: int, sums: FloatArray, squares: FloatArray) -> FloatArray:
