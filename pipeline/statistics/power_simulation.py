@@ -20,7 +20,7 @@ from pipeline.statistics.search import smallest
 
 BoolArray = npt.NDArray[np.bool_]
 
-_AT_ONCE = 2_000_000  # values in memory
+VALUES_AT_ONCE = 2_000_000  # in memory
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,13 @@ class Simulated:
     corrected: Share | None
 
 
-def simulate(design: Design, n: int, studies: int, seed: int) -> Simulated:
-    """Draw `studies` studies of n participants; the same for the same seed and n, whatever else is drawn."""
+def simulate(design: Design, n: int, studies: int, seed: int, values_at_once: int = VALUES_AT_ONCE) -> Simulated:
+    """Draw `studies` studies of n participants; the same for the same seed and n, whatever else is drawn.
+
+    At most `values_at_once` values are in memory, or those of one study.
+    """
     own = corrected = 0
-    for values in _drawn(design, n, studies, np.random.default_rng([seed, n])):
+    for values in _drawn(design, n, studies, values_at_once, np.random.default_rng([seed, n])):
         if design.test == "rm_anova":
             p, p_gg = rm_anova_p(values)
             own += int(np.sum(p < design.alpha))
@@ -63,11 +66,13 @@ def simulate(design: Design, n: int, studies: int, seed: int) -> Simulated:
     return Simulated(Share(own, studies), Share(corrected, studies) if has_correction else None)
 
 
-def _drawn(design: Design, n: int, studies: int, random: np.random.Generator) -> Iterator[FloatArray]:
-    """Values (studies, n, k), as many studies at a time as memory takes."""
+def _drawn(
+    design: Design, n: int, studies: int, values_at_once: int, random: np.random.Generator
+) -> Iterator[FloatArray]:
+    """Values (studies, n, k), a part of the studies at a time."""
     k, r = design.conditions, design.correlation
     factor = linalg.cholesky((1 - r) * np.eye(k) + r, lower=True)
-    at_once = max(1, _AT_ONCE // (n * k))
+    at_once = max(1, values_at_once // (n * k))
     for start in range(0, studies, at_once):
         count = min(at_once, studies - start)
         yield random.standard_normal((count, n, k)) @ factor.T + design.means

@@ -289,7 +289,7 @@ def test_a_run_that_is_stopped_leaves_the_files_of_the_run_before(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as during:
-        during.setattr(study_files, "_tables", stopped)
+        during.setattr(study_files, "made_from", stopped)  # the last thing before the files take their places
         run(capsys, monkeypatch, "simulate", study, "--jobs", "1")
     after = {path.relative_to(study): path.read_bytes() for path in study.rglob("*") if path.is_file()}
     assert {name for name in before if before[name] != after[name]} == {Path("study.yaml")}

@@ -199,11 +199,10 @@ def test_six_pairs_are_significant_when_all_signs_agree(dz: float) -> None:
     assert simulate(Design("wilcoxon", dz), 5, 1000, 2).own.significant == 0
 
 
-def test_a_draw_depends_on_its_seed_and_n_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_draw_depends_on_its_seed_and_n_alone() -> None:
     design = of_f(0.3, 3)
     whole = simulate(design, 10, 2000, 3)
-    monkeypatch.setattr("pipeline.statistics.power_simulation._AT_ONCE", 700)  # in pieces
-    assert simulate(design, 10, 2000, 3) == whole
+    assert simulate(design, 10, 2000, 3, values_at_once=700) == whole
     assert simulate(design, 10, 2000, 4) != whole
 
 

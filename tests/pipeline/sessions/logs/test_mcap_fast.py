@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
+from mcap.records import Schema
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Content, Readings, Wanted
-from pipeline.sessions.logs.mcap import cdr, ros2
+from pipeline.sessions.logs.mcap import cdr
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 from pipeline.sessions.logs.mcap.writer import _IMU, _POINT_STAMPED
 from tests.conftest import CLONE, write_session
@@ -167,19 +169,31 @@ def test_random_messages_as_the_stock_decoder_reads_them(
     assert (fast.lost, fast.notes) == (slow.lost, slow.notes)
 
 
+def payloads_decoded_by(factory: type[Any], monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """What a stock package's decoders are given from now on."""
+    payloads: list[bytes] = []
+    decoder_for = factory.decoder_for
+
+    def counting(self: object, encoding: str, schema: Schema | None) -> Callable[[bytes], Any]:
+        decode = decoder_for(self, encoding, schema)
+
+        def counted(payload: bytes) -> Any:
+            payloads.append(payload)
+            return decode(payload)
+
+        return counted
+
+    monkeypatch.setattr(factory, "decoder_for", counting)
+    return payloads
+
+
 def test_the_stock_decoder_is_not_called_for_each_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-    kept = ros2._kept
-
-    def counted(message: object, content: str) -> list[float]:
-        calls.append(content)
-        return kept(message, content)
-
-    monkeypatch.setattr(ros2, "_kept", counted)
+    calls = payloads_decoded_by(DecoderFactory, monkeypatch)
     frames = [b"a", b"a name of another length", "имя".encode()]
     numbers = [float(value) for value in range(37)]
     sent = [encoded("<>"[at % 2], at, 0, frames[at % 3], numbers) for at in range(600)]
-    readings = read_topic(write_log(tmp_path / "a.mcap", "acceleration", sent), "acceleration")
+    definition = f"# its decoder is not remembered from another test\n{_IMU}"
+    readings = read_topic(write_log(tmp_path / "a.mcap", "acceleration", sent, definition), "acceleration")
     assert readings.read == 600
     assert len(calls) == 6  # one for every length and byte order
 
