@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate explore power plan test test-browser test-pdf lint docs bench lock clean
+.PHONY: help report check replay simulate explore power plan test mutants test-browser test-pdf lint docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -39,6 +39,9 @@ plan: .venv/installed ## counterbalanced orders: ARGS="kinect fusion --participa
 
 test: lint ## lint, then every test
 	@$(python) -m pytest -n auto $(ARGS)
+
+mutants: .venv/installed ## small faults put into accuracy, statistics and analysis: which does no test notice? (half an hour)
+	@$(python) -m tests.mutants $(ARGS)
 
 test-browser: .venv/installed ## the pages in Chromium at three widths, with axe-core (needs chromium; npm for axe-core)
 	@$(python) -m tests.browser

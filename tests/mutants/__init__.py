@@ -1,0 +1,1 @@
+"""Small faults put into the sources on purpose: does a test notice each of them?"""
