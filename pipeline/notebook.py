@@ -86,7 +86,7 @@ class Tables(Mapping[str, pd.DataFrame]):
         return Tables(self.study, (self.sessions[at],), folders)
 
     def participant_means(self, measure: str) -> pd.DataFrame:
-        """A row a participant, a column a condition in the study's order; what `figures.paired` draws."""
+        """One row per participant and one column per condition, in the study's order; what `figures.paired` draws."""
         known = list(dict.fromkeys(self["measures"]["measure"]))
         if measure not in known:
             raise KeyError(f'there is no measure "{measure}"{did_you_mean(measure, known)}')

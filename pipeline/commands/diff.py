@@ -62,7 +62,7 @@ def _warn(side: Made, identity: Mapping[str, Sequence[str]]) -> None:
 
 
 def _changes(found: Differences, of_number: bool) -> Iterator[tuple[Identified, Change]]:
-    return ((one.row, change) for one in found.moved for change in one.changes if change.of_number == of_number)
+    return ((one.row, change) for one in found.moved for change in one.changes if change.is_numeric == of_number)
 
 
 def _show(found: Differences) -> None:
@@ -72,12 +72,12 @@ def _show(found: Differences) -> None:
         return
     numbers, texts = ([*_changes(found, one)] for one in (True, False))
     told = f"{counted(len(numbers), 'number')} moved and {counted(len(texts), 'text')} changed"
-    only = f"{counted(len(found.gone), 'row')} only in A, {counted(len(found.came), 'row')} only in B"
+    only = f"{counted(len(found.removed), 'row')} only in A, {counted(len(found.added), 'row')} only in B"
     console.say(f"{told}, of {found.compared} figures in both; {only}")
     for table, changes in _by_table(numbers):
         lines = [(name, *change.cells) for name, change in changes]
         _table((table, "A", "B", "difference", "relative"), lines, left=1)
-    for side, rows in (("A", found.gone), ("B", found.came)):
+    for side, rows in (("A", found.removed), ("B", found.added)):
         if rows:
             console.say(f"Only in {side}:")
         for row in rows:
@@ -151,8 +151,8 @@ def _as_object(old: Made, new: Made, tolerance: float, found: Differences, why: 
         "compared": found.compared,
         "numbers": list(figures(True)),
         "texts": list(figures(False)),
-        "only_in_a": rows(found.gone),
-        "only_in_b": rows(found.came),
+        "only_in_a": rows(found.removed),
+        "only_in_b": rows(found.added),
         "making_known": why.complete,
         **{part: [{"name": one.name, **sides(one)} for one in changes] for part, changes in parts.items()},
     }

@@ -1,4 +1,4 @@
-"""Two sets of results, figure by figure: what is the same but for rounding, what moved, what came and what went."""
+"""Compare two sets of results, value by value: which moved, which rows were added, and which are gone."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ The name of the study's folder tells no rows apart there, and is not compared: r
 OF_A_REPLAY: Mapping[str, tuple[str, ...]] = {name: TABLES[name].key for name in in_results_of("replay")}
 """The same for the results.json of a replay, where a row belongs to one of several studies."""
 
-_NEAR_ZERO = 1e-12  # a difference that should be none is as large as the rounding of what was subtracted
+_NEAR_ZERO = 1e-12  # where the true difference is zero, what is left is the rounding of what was subtracted
 _FACTS: Mapping[str, tuple[str, ...]] = {_STUDY: (), _STUDIES: ("name",)}
 
 
 class _Absent:
-    """There is no such figure."""
+    """Stands for a value that one of the two results does not have."""
 
 
 ABSENT = _Absent()
@@ -38,14 +38,14 @@ ABSENT = _Absent()
 
 @dataclass(frozen=True)
 class Change:
-    """A figure that is another, new or gone: its name, and its value before and now, or ABSENT."""
+    """A value that changed, was added or is gone: its name, and what it was and is, ABSENT if nothing."""
 
     name: str
     before: Any
     now: Any
 
     @property
-    def of_number(self) -> bool:
+    def is_numeric(self) -> bool:
         """Is or was it a number?"""
         return is_number(self.before) or is_number(self.now)
 
@@ -74,7 +74,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Identified:
-    """A row by its table and what tells it from the others there."""
+    """A row, identified by its table and the values of the table's key."""
 
     table: str
     key: Mapping[str, str | None]
@@ -87,7 +87,7 @@ class Identified:
 
 @dataclass(frozen=True)
 class Moved:
-    """A row that is in both, and its figures that changed."""
+    """A row that both results have, and its values that changed."""
 
     row: Identified
     changes: Sequence[Change]
@@ -95,24 +95,24 @@ class Moved:
 
 @dataclass
 class Differences:
-    """What two sets of results do not share; `compared` is the number of figures that both have."""
+    """What differs between two sets of results; `compared` counts the values that both have."""
 
     compared: int = 0
     moved: list[Moved] = field(default_factory=list)
-    gone: list[Identified] = field(default_factory=list)
-    came: list[Identified] = field(default_factory=list)
+    removed: list[Identified] = field(default_factory=list)
+    added: list[Identified] = field(default_factory=list)
 
     def __bool__(self) -> bool:
-        return bool(self.moved or self.gone or self.came)
+        return bool(self.moved or self.removed or self.added)
 
 
 def is_number(value: object) -> bool:
-    """A number, and not true or false."""
+    """Is it a number? True and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def cell(value: object) -> str:
-    """A figure as a table shows it."""
+    """A value as a table of differences shows it."""
     if value is ABSENT:
         return "absent"
     if value is None:
@@ -121,7 +121,7 @@ def cell(value: object) -> str:
 
 
 def figures(row: Row) -> Iterator[tuple[str, Any]]:
-    """A row's columns, and instead of `details` what is in them."""
+    """A row's values by column, with those of `details` by their own names."""
     for column, value in row.items():
         if column == "details":
             yield from detailed(value)
@@ -130,7 +130,7 @@ def figures(row: Row) -> Iterator[tuple[str, Any]]:
 
 
 def detailed(details: Figures | None) -> Iterator[tuple[str, Any]]:
-    """The details of a comparison by their names, the parts of a list each with its index."""
+    """The details of a comparison by name; each part of a list has its index in the name."""
     for name, detail in (details or {}).items():
         parts = detail if isinstance(detail, list) else [detail]
         for index, part in enumerate(parts):
@@ -138,12 +138,12 @@ def detailed(details: Figures | None) -> Iterator[tuple[str, Any]]:
 
 
 def changes(before: Figures, now: Figures, relative: float) -> list[Change]:
-    """The figures that are new, gone, or differ by more than `relative` of the larger; in their order.
+    """The values that were added, are gone, or differ by more than `relative` times the larger of the two.
 
-    Numbers that differ by less than 1e-12 are the same too, unless `relative` is 0.
+    Numbers that differ by less than 1e-12 count as equal, unless `relative` is 0.
     """
     absolute = _NEAR_ZERO if relative else 0.0
-    found = []
+    changed = []
     for name in dict.fromkeys([*before, *now]):
         old, new = before.get(name, ABSENT), now.get(name, ABSENT)
         if is_number(old) and is_number(new):
@@ -151,65 +151,65 @@ def changes(before: Figures, now: Figures, relative: float) -> list[Change]:
         else:
             same = old == new and type(old) is type(new)
         if not same:
-            found.append(Change(name, old, new))
-    return found
+            changed.append(Change(name, old, new))
+    return changed
 
 
 def between(
     before: Mapping[str, Any], now: Mapping[str, Any], identity: Mapping[str, Sequence[str]], relative: float
 ) -> Differences:
-    """What changed in the tables that `identity` names, and in what is said of participants or studies.
+    """Compare the tables that `identity` names, and what is known about the participants or the studies.
 
     `before` and `now` are contents of results.json.
     """
-    found = Differences()
+    differences = Differences()
     for table, columns in [*_FACTS.items(), *identity.items()]:
         olds, news = (_by_key(_rows(content, table), columns) for content in (before, now))
         for key in dict.fromkeys([*olds, *news]):
             row = Identified(table, dict(zip(columns, key, strict=True)))
-            pairs, gone, came = _paired(olds.get(key, []), news.get(key, []))
+            pairs, removed, added = _paired(olds.get(key, []), news.get(key, []))
             for old, new in pairs:
-                _compare(found, row, _others(old, columns), _others(new, columns), relative)
-            found.gone += [row] * gone
-            found.came += [row] * came
-    return found
+                _compare(differences, row, _others(old, columns), _others(new, columns), relative)
+            differences.removed += [row] * removed
+            differences.added += [row] * added
+    return differences
 
 
 def _rows(content: Mapping[str, Any], table: str) -> Sequence[Row]:
-    """A table's rows; what is said of a study's participants, and of the studies of a replay, as tables too."""
+    """A table's rows. The participants of a study and the studies of a replay are compared like tables, too."""
     if table == _STUDY:
         people = content[_STUDY].get("participants", {}) if _STUDY in content else {}
         return [{f"participants {name}": value for name, value in people.items()}]
     if table == _STUDIES:
         return [{"name": study["name"], "sessions": study.get("sessions")} for study in content.get(_STUDIES, [])]
-    found: Sequence[Row] = content.get(table, [])
-    return found
+    rows: Sequence[Row] = content.get(table, [])
+    return rows
 
 
-def _compare(found: Differences, row: Identified, before: Row, now: Row, relative: float) -> None:
+def _compare(differences: Differences, row: Identified, before: Row, now: Row, relative: float) -> None:
     old, new = dict(figures(before)), dict(figures(now))
-    found.compared += len(old.keys() & new.keys())
+    differences.compared += len(old.keys() & new.keys())
     moved = changes(old, new, relative)
     if moved:
-        found.moved.append(Moved(row, moved))
+        differences.moved.append(Moved(row, moved))
 
 
 def _by_key(rows: Sequence[Row], columns: Sequence[str]) -> dict[tuple[str | None, ...], list[Row]]:
-    found: dict[tuple[str | None, ...], list[Row]] = {}
+    by_key: dict[tuple[str | None, ...], list[Row]] = {}
     for row in rows:
-        found.setdefault(tuple(row[column] for column in columns), []).append(row)
-    return found
+        by_key.setdefault(tuple(row[column] for column in columns), []).append(row)
+    return by_key
 
 
 def _others(row: Row, columns: Sequence[str]) -> Row:
-    """What does not tell a row from others, and is not the name of its study's folder."""
+    """The values to compare: not the key, nor the name of the study's folder, which two copies need not share."""
     return {column: value for column, value in row.items() if column not in (*columns, _STUDY)}
 
 
 def _paired(before: Sequence[Row], now: Sequence[Row]) -> tuple[list[tuple[Row, Row]], int, int]:
-    """Rows of one key in pairs, and how many are left on each side: equal ones first, the others in their order.
+    """Pair the rows that share a key: equal ones first, then the others in order; and count those left over.
 
-    A key stands twice where study.yaml asks for one test with several options.
+    Several rows share a key where study.yaml asks for one test with different options.
     """
     olds, news = list(before), list(now)
     pairs = []

@@ -1,4 +1,4 @@
-"""results.json: every number the report shows, in lists of objects with the tables' columns."""
+"""Write and read results.json: every number of the report, as lists of objects with the tables' columns."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from pipeline.tables.differences import OF_A_REPLAY, OF_A_STUDY
 SCHEMA_VERSION = 1
 
 
-def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
-    """The file; `details` of a comparison as an object, what does not apply as null."""
+def write(path: Path, name: str, study: Study, frames: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
+    """Write a study's file; `details` of a comparison become an object, and what does not apply is null."""
     head = {
         "name": name,
         "title": study.title,
@@ -30,7 +30,7 @@ def write(path: Path, name: str, study: Study, found: Mapping[str, pd.DataFrame]
         "participants": dict(people),
     }
     rows: dict[str, Iterable[Mapping[str, Any]]] = {
-        table: tables.records(table, found[table]) if table in found else () for table in IN_STUDY_RESULTS
+        table: tables.records(table, frames[table]) if table in frames else () for table in IN_STUDY_RESULTS
     }
     for table in ("comparisons", "comparisons_all_data"):
         rows[table] = map(_with_details, rows[table])
@@ -41,25 +41,25 @@ def _with_details(row: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**row, "details": None if row["details"] is None else json.loads(row["details"])}
 
 
-def write_replay(path: Path, studies: Sequence[Mapping[str, Any]], found: Mapping[str, pd.DataFrame]) -> None:
-    """The file of a replay: what is known of its studies, and its tables."""
+def write_replay(path: Path, studies: Sequence[Mapping[str, Any]], frames: Mapping[str, pd.DataFrame]) -> None:
+    """Write a replay's file: its studies, and its tables."""
     lists: dict[str, Iterable[Mapping[str, Any]]] = {"studies": studies}
-    _dump(path, {}, lists | {name: tables.records(name, table) for name, table in found.items()})
+    _dump(path, {}, lists | {name: tables.records(name, table) for name, table in frames.items()})
 
 
 def write_exploration(
     path: Path,
     settings: Mapping[str, Any],
-    found: Mapping[str, pd.DataFrame],
+    frames: Mapping[str, pd.DataFrame],
     pays: Sequence[Mapping[str, Any]],
 ) -> None:
-    """The file of an exploration: what was asked of which study, its tables, and what pays for each measure."""
+    """Write an exploration's file: its settings, its tables, and what pays for each measure."""
     lists: dict[str, Iterable[Mapping[str, Any]]] = {"what_pays": pays}
-    _dump(path, {"explored": settings}, lists | {name: tables.records(name, table) for name, table in found.items()})
+    _dump(path, {"explored": settings}, lists | {name: tables.records(name, table) for name, table in frames.items()})
 
 
 def _dump(path: Path, head: Mapping[str, Any], lists: Mapping[str, Iterable[Mapping[str, Any]]]) -> None:
-    """One object, written as it is made, for an archive's rows are many: each stands on a line of its own."""
+    """Write one object row by row, each on a line of its own: an archive's rows never stand in memory as one text."""
     as_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
     with path.open("w", encoding="utf-8") as file:
         file.write(f'{{\n "schema_version": {SCHEMA_VERSION}')
@@ -80,26 +80,29 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """The one object in a user's JSON file; PipelineError where there is none, or numbers that JSON does not have."""
+    """The object in a user's JSON file.
+
+    Raises PipelineError for a file without one, and for NaN and infinity, which are not JSON.
+    """
     try:
         text = path.read_text(encoding="utf-8")
         content = json.loads(text, parse_int=_number, parse_float=_number, parse_constant=_number)
     except (ValueError, OverflowError, RecursionError) as error:
         raise PipelineError(f"{path}: not valid JSON: {error}") from None
     if not isinstance(content, dict):
-        raise PipelineError(f"{path}: should hold one object")
+        raise PipelineError(f"{path}: should hold one JSON object")
     return content
 
 
 def _number(text: str) -> int | float:
     value = int(text) if text.lstrip("-").isdigit() else float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text} is no finite number")
+        raise ValueError(f"{text} is not a finite number")
     return value
 
 
 def identity_of(content: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]] | None:
-    """What tells the rows of its tables apart: those of a study's results, or of a replay's; None for neither."""
+    """The key of each table in the results of a study or of a replay; None for any other file."""
     if "study" in content:
         return OF_A_STUDY if isinstance(content["study"], dict) else None
     return OF_A_REPLAY if isinstance(content.get("studies"), list) else None
@@ -108,18 +111,18 @@ def identity_of(content: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]] | N
 def read_checked(path: Path) -> dict[str, Any]:
     """The content of a results.json that a user names.
 
-    Raises PipelineError where it cannot be read, is none, or is of another schema_version.
+    Raises PipelineError for a file that cannot be read, is no results.json, or has another schema_version.
     """
     content = read_object(path)
     version, identity = content.get("schema_version"), identity_of(content)
     if version is not None and version != SCHEMA_VERSION:
         raise PipelineError(
-            f"{path}: has schema_version {version!r}, and this Steadyhand reads {SCHEMA_VERSION}; write the results"
+            f"{path}: has schema_version {version!r}, but this Steadyhand reads {SCHEMA_VERSION}; write the results"
             " again with: steadyhand compare STUDY"
         )
     if version is None or identity is None:
-        lacking = "schema_version" if version is None else "study"
-        raise PipelineError(f"{path}: is no results.json of Steadyhand: it has no {lacking}")
+        missing = "schema_version" if version is None else "study"
+        raise PipelineError(f"{path}: is not a results.json of Steadyhand: it has no {missing}")
     _require_objects(path, "studies", content.get("studies", []), ("name",))
     if not isinstance(content.get("study", {}).get("participants", {}), dict):
         raise PipelineError(f"{path}: study: participants should be an object")
@@ -129,12 +132,12 @@ def read_checked(path: Path) -> dict[str, Any]:
 
 
 def _require_objects(path: Path, table: str, rows: Any, columns: Sequence[str]) -> None:
-    """A list of objects that have these columns, as text or null, and details that are an object or null."""
+    """Raise PipelineError unless `rows` is a list of objects with these columns, and with details if any."""
     if not isinstance(rows, list):
         raise PipelineError(f"{path}: {table} should be a list")
     for number, row in enumerate(rows, 1):
         if not isinstance(row, dict) or not isinstance(row.get("details"), dict | None):
-            raise PipelineError(f"{path}: {table}: row {number} is no row of Steadyhand's")
+            raise PipelineError(f"{path}: {table}: row {number} is not a row that Steadyhand wrote")
         for column in columns:
             if column not in row or not isinstance(row[column], str | None):
-                raise PipelineError(f"{path}: {table}: row {number} should have {column}, a text or null")
+                raise PipelineError(f'{path}: {table}: row {number} needs "{column}", text or null')

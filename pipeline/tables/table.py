@@ -16,13 +16,13 @@ import pyarrow.parquet as pq
 from pipeline.tables.catalogue import TABLES
 from pipeline.tables.columns import COUNT, FLOAT, TEXT
 
-pa.set_memory_pool(pa.system_memory_pool())  # small tables by the thousand: the usual pool keeps what they leave
+pa.set_memory_pool(pa.system_memory_pool())  # the default pool would keep the memory of thousands of small tables
 
 _NULLABLE = {TEXT: pd.StringDtype(), COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, FLOAT: np.dtype("float64")}  # as a frame holds them
 _SMALL = 512  # rows
-_PARTS = 256  # tables read before they are made one: each takes more than the few rows that are in it
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would take a cell that begins so for a command
+_PARTS = 256  # tables that are read before they are merged: each takes far more memory than its few rows
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins like this
 
 
 Row = dict[str, Any]
@@ -30,16 +30,16 @@ Row = dict[str, Any]
 
 
 def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
-    """Rows as the named table; a key it does not know is a programming error (KeyError)."""
+    """Rows as a table. Raises KeyError for a column that the table does not have, which is a programming error."""
     listed = list(rows)
     columns = _known_columns(name, listed)
     return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
 
 
 def of_rows(name: str, rows: Iterable[Row]) -> pa.Table:
-    """As `frame`, for Arrow, which takes a tenth of the time where rows are few; values must be of the columns' types.
+    """As `frame`, but an Arrow table, which takes a tenth of the time for few rows.
 
-    NaN is null.
+    Values must have the columns' types; NaN becomes null.
     """
     listed = list(rows)
     columns = _known_columns(name, listed)
@@ -62,9 +62,9 @@ def _known_columns(name: str, rows: Sequence[Row]) -> list[str]:
 
 
 def of_columns(name: str, length: int, columns: Mapping[str, Any]) -> pa.Table:
-    """The named table of so many rows by arrays (length,), and single values that hold for every row.
+    """An Arrow table of `length` rows from arrays (length,) and from single values, which hold for every row.
 
-    A column that is not there, and NaN, is null.
+    A column that is not given is null, and so is NaN.
     """
     arrays = []
     for column in TABLES[name].columns:
@@ -99,7 +99,7 @@ def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
 
 
 def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
-    """The table as Parquet, `<name>.parquet`; a small one plain, since unpacking it would take most of its reading."""
+    """Write `<name>.parquet`; a small table uncompressed, since unpacking would take most of the time to read it."""
     if isinstance(data, pd.DataFrame):
         data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name].schema, preserve_index=False)
     columns = TABLES[name].columns
@@ -120,7 +120,7 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
 
 
 def write_csv(name: str, data: pd.DataFrame, folder: Path) -> None:
-    """The table as `<name>.csv`; text that a spreadsheet would run as a formula gets an apostrophe in front."""
+    """Write `<name>.csv`; text that a spreadsheet would run as a formula gets an apostrophe in front."""
     table = as_table(name, data)
     for column in table.columns[[str(kind) == "string" for kind in table.dtypes]]:
         risky = table[column].str.startswith(_FORMULA).fillna(False).astype(bool)
@@ -129,24 +129,24 @@ def write_csv(name: str, data: pd.DataFrame, folder: Path) -> None:
 
 
 def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
-    """The table out of one or many folders; those without it count as empty."""
-    # Straight to the types of `as_table`; by way of objects it takes three times as long.
-    found: pd.DataFrame = read_arrow(name, folders).to_pandas(types_mapper=_NULLABLE.get)
-    return found
+    """Read a table from one or many folders; a folder without it counts as empty."""
+    # Straight to the types of `as_table`: by way of Python objects it takes three times as long.
+    frame: pd.DataFrame = read_arrow(name, folders).to_pandas(types_mapper=_NULLABLE.get)
+    return frame
 
 
 def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
-    """As `read`, as it is in the files."""
-    whole, parts = [], []
+    """As `read`, but an Arrow table."""
+    merged, parts = [], []
     for folder in [folders] if isinstance(folders, Path) else folders:
         path = folder / f"{name}.parquet"
         with suppress(FileNotFoundError):
-            content = pa.BufferReader(path.read_bytes())  # a file object of its own takes longer than a small table
+            content = pa.BufferReader(path.read_bytes())  # opening it as a file takes longer than reading a small table
             parts.append(pq.ParquetFile(content).read(use_threads=False))
         if len(parts) == _PARTS:
-            whole.append(pa.concat_tables(parts).combine_chunks())
+            merged.append(pa.concat_tables(parts).combine_chunks())
             parts = []
-    return pa.concat_tables([*whole, *parts]) if whole or parts else TABLES[name].schema.empty_table()
+    return pa.concat_tables([*merged, *parts]) if merged or parts else TABLES[name].schema.empty_table()
 
 
 Columns = Mapping[str, np.ndarray[Any, Any]]
@@ -154,14 +154,14 @@ Columns = Mapping[str, np.ndarray[Any, Any]]
 
 
 def of_stream(table: pa.Table, stream: str) -> Columns:
-    """The columns of one stream's rows as arrays (n,): times in ns, and figures, NaN where they are null."""
+    """The numbers in one stream's rows as arrays (n,), NaN where they are null; times are in ns."""
     rows = table.filter(pc.equal(table["stream"], stream))
     names = [column.name for column in table.schema if column.type != TEXT]
     return {name: rows[name].to_numpy() for name in names}
 
 
 def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Rows as plain objects for JSON: null for what does not apply, `details` and `factors` as they are stored."""
+    """Rows as plain objects for JSON: null for what does not apply; `details` and `factors` stay text."""
     for row in as_table(name, data).itertuples(index=False):
         yield {key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)}
 
@@ -175,7 +175,7 @@ def _plain(value: Any) -> Any:
 
 
 def participant_means(measures: pd.DataFrame, measure: str, conditions: Sequence[str]) -> pd.DataFrame:
-    """A row a participant, a column a condition in the given order: means over everything else, NaN if missing."""
+    """One row per participant and one column per condition, in the given order: means over all else, or NaN."""
     rows = measures[measures["measure"] == measure]
     wide = rows.pivot_table(index="participant", columns="condition", values="value", aggfunc="mean", sort=True)
     return wide.reindex(columns=list(conditions)).astype("float64")

@@ -1,4 +1,4 @@
-"""A document as one self-contained HTML file, whole without its script, and closed to the network."""
+"""A document as one self-contained HTML file, which is complete without its script and fetches nothing."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import jinja2
 
 from pipeline.report.document.model import CrossReference, Document, Link, Strong, numbered
 
-_DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would turn round the numbers that follow
+_DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would reverse the text and numbers that follow
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
-_UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may end there
+_UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may break there
 _HERE = Path(__file__).parent
 
 
@@ -22,7 +22,7 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the page; `figures` is the folder of the SVG files it shows."""
 
     def picture(name: str) -> str:
-        """An SVG as a data address: as an image of its own, its ids cannot clash with another's."""
+        """An SVG as a data URL. As an image of its own its ids cannot clash with those of another figure."""
         return "data:image/svg+xml;base64," + base64.b64encode((figures / name).read_bytes()).decode()
 
     values = {"document": document, "names": numbered(document), "picture": picture}
@@ -30,10 +30,10 @@ def render(document: Document, figures: Path, path: Path) -> None:
 
 
 def write_page(template: str, script: str, path: Path, origin: str, **values: Any) -> None:
-    """A page from a template, with the style and a script in it; controls among its text are shown as □.
+    """Write a page from a template, with style and script inside; control characters in its text are shown as □.
 
-    The page's own policy lets no other script or style run and nothing be fetched, whatever text it holds. `origin`
-    stands at the foot of each page that a browser prints.
+    The page's content security policy forbids any other script or style and every request, whatever text it holds.
+    `origin` stands at the foot of each page that a browser prints.
     """
     style, code = ((_HERE / name).read_text(encoding="utf-8") for name in ("style.css", script))
     style += f"@page {{ @bottom-left {{ content: {_quoted(origin)}; }} }}\n"
@@ -48,12 +48,12 @@ def write_page(template: str, script: str, path: Path, origin: str, **values: An
 
 
 def _quoted(text: str) -> str:
-    """A string as CSS takes it: whatever is neither a letter nor a space, by its number."""
+    """A string for CSS, in which everything but letters and spaces is escaped by its code."""
     return '"' + "".join(c if c.isalpha() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
 
 
 def _hashed(text: str) -> str:
-    """What a policy allows: exactly this text."""
+    """The entry of a policy that allows exactly this text."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 

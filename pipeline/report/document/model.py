@@ -1,4 +1,4 @@
-"""What a report is made of. Text is data: only the renderers know markup, and they escape everything."""
+"""The blocks that a report is made of. Text is data: only the renderers know markup, and they escape everything."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Strong:
-    """Words that carry the weight of a sentence."""
+    """Words in bold: those that matter most in a sentence."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Link:
-    """Words that lead to another file of the report, by a name the program gave it; on paper they are words alone."""
+    """Words that link to another file of the report, by a name the program gave it. In print they are plain words."""
 
     text: str
     href: str
@@ -24,7 +24,7 @@ class Link:
 
 @dataclass(frozen=True)
 class CrossReference:
-    """Words that lead to an anchor of the same document."""
+    """Words that link to an anchor in the same document."""
 
     text: str
     anchor: str
@@ -34,7 +34,7 @@ Text = tuple[str | Strong | Link | CrossReference, ...]
 
 
 def plain(text: Text) -> str:
-    """The words alone."""
+    """The words without their emphasis and links."""
     return "".join(part if isinstance(part, str) else part.text for part in text)
 
 
@@ -47,7 +47,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Notice:
-    """Something to be careful about, set apart."""
+    """Something to know or to be careful about, in a box."""
 
     title: str
     texts: tuple[Text, ...]
@@ -56,7 +56,7 @@ class Notice:
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A number people look for first, what it is, and its evidence."""
+    """A number that people look for first, what it is, and the evidence for it."""
 
     value: str
     label: str
@@ -65,21 +65,21 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class KeyFigures:
-    """A few of them side by side."""
+    """A few key figures side by side."""
 
     figures: tuple[KeyFigure, ...]
 
 
 @dataclass(frozen=True)
 class Column:
-    """A table's column; numbers stand to the right."""
+    """A table's column; numbers are aligned to the right."""
 
     title: str
     numeric: bool = True
 
 
 def columns(titles: Sequence[str], texts: int) -> tuple[Column, ...]:
-    """Columns of which the first `texts` hold text and the others numbers."""
+    """Columns with these titles, of which the first `texts` hold text and the others numbers."""
     return tuple(Column(title, index >= texts) for index, title in enumerate(titles))
 
 
@@ -87,7 +87,7 @@ def columns(titles: Sequence[str], texts: int) -> tuple[Column, ...]:
 class Table:
     """A caption that says what to see, columns, and rows of text; the first cell of a row is its heading.
 
-    `anchors`: an id for each row, unlike any other of the document, where words link to rows.
+    `anchors` has an id for each row of a table that words link to; no two in a document may be equal.
     """
 
     id: str
@@ -100,7 +100,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture by its file's name in the report's figures, what to see in it, and what it shows for who cannot."""
+    """A picture by its file name among the report's figures, with what to see in it and a text alternative."""
 
     id: str
     file: str
@@ -110,7 +110,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Pages:
-    """Further pages of the report; paper has none."""
+    """Links to further pages of the report; left out in print."""
 
     label: str
     links: tuple[Link, ...]
@@ -130,7 +130,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report. `origin` says where the data come from; every page carries it. `back` leads to the page above."""
+    """A whole report. `origin` says on every page where the data come from; `back` links to the page it belongs to."""
 
     title: str
     subtitle: str

@@ -1,4 +1,4 @@
-"""A document as a tagged PDF (PDF/UA-1, PDF/A-2a), set by typst; identical for identical input."""
+"""A document as a tagged PDF (PDF/UA-1, PDF/A-2a), typeset by typst; equal documents give equal bytes."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from pipeline.report.document.model import (
 from pipeline.report.glyphs import font_folder, showable
 
 _HERE = Path(__file__).parent
-_UNBROKEN = 24  # characters: a longer word in a table may be broken behind punctuation
-_HEAD = 70  # characters of the title at the head of a page, beside the section's
+_UNBROKEN = 24  # characters: a longer word in a table may break after punctuation
+_HEAD = 70  # characters of the title that fit at the head of a page beside the section's
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
 
@@ -32,7 +32,7 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
     import typst
 
-    content = _over(_content(document), lambda text: text.replace("\u2009", "\u202f"))  # no line ends within a number
+    content = _over(_content(document), lambda text: text.replace("\u2009", "\u202f"))  # no line breaks within a number
     shown = _over(content, showable)
     shown |= {"lacking": shown != content, "unbroken": _UNBROKEN}
     compiler = typst.Compiler(
@@ -48,7 +48,7 @@ def render(document: Document, figures: Path, path: Path) -> None:
 
 
 def _over(value: Any, change: Callable[[str], str]) -> Any:
-    """Plain data with every text changed."""
+    """The same data with every text changed."""
     if isinstance(value, str):
         return change(value)
     if isinstance(value, list):
@@ -121,7 +121,7 @@ def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[
 
 
 def _shares(table: Table) -> list[float]:
-    """How wide each column wants to be, from its longest cells: text may wrap, numbers and words may not."""
+    """Relative widths of the columns, from their longest cells: text may wrap, but not within numbers or words."""
     wanted = []
     for index, column in enumerate(table.columns):
         texts = [row[index] for row in table.rows]

@@ -1,4 +1,4 @@
-"""The sessions' traces on a page of their own: the one page that needs a script, closed to the network."""
+"""The sessions' traces on a page of their own: the one page that needs a script. It fetches nothing."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pipeline.report.document.html import write_page
 from pipeline.report.document.model import Link
 from pipeline.statistics.arrays import FloatArray
 
-BUDGET_BYTES = 4_500_000  # of all sessions' data, as text; a page of less than 5 MB still goes by mail
+BUDGET_BYTES = 4_500_000  # for all sessions' data as text: a page of less than 5 MB can be sent by mail
 _TENTHS = 10
 _STEPS_S = tuple(
     1e-3 * size * 10**power for power in range(8) for size in (1, 1.5, 2, 3, 5, 7)
-)  # how far apart readings are kept, at least
+)  # steps of time, of each of which the first reading is kept
 _SCRIPT_ENDS = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
 
 Kind = Literal["tracker", "estimator", "display", "reference"]
@@ -49,7 +49,7 @@ class Traces:
 
 
 def render(title: str, origin: str, sessions: Iterable[Traces], count: int, path: Path) -> None:
-    """Write the page of `count` sessions, each in as fine steps of time as its share of the page allows."""
+    """Write the page of `count` sessions, each in steps of time as fine as its share of the page allows."""
     packed = [_fitting(traces, BUDGET_BYTES // max(count, 1)) for traces in sessions]
     data = json.dumps(packed, ensure_ascii=False, separators=(",", ":"))
     for character, escaped in _SCRIPT_ENDS.items():
@@ -59,11 +59,11 @@ def render(title: str, origin: str, sessions: Iterable[Traces], count: int, path
 
 
 def _fitting(traces: Traces, budget: int) -> dict[str, Any]:
-    """A session packed, thinned out until it fits; the coarsest step is taken where none does."""
+    """A session packed, and thinned until it fits; if none fits, the coarsest step is taken."""
     packed = _packed(traces, 0.0)
     if len(packed["data"]) <= budget:
         return packed
-    finer = _mean_interval_s(traces) * len(packed["data"]) / budget / 2  # what would not fit, or hardly
+    finer = _mean_interval_s(traces) * len(packed["data"]) / budget / 2  # finer steps would not fit, or barely
     for step_s in [step for step in _STEPS_S if step >= finer] or _STEPS_S[-1:]:
         packed = _packed(traces, step_s)
         if len(packed["data"]) <= budget:
@@ -72,16 +72,16 @@ def _fitting(traces: Traces, budget: int) -> dict[str, Any]:
 
 
 def _mean_interval_s(traces: Traces) -> float:
-    """Of the series with most readings."""
+    """Mean time between the readings of the series with most of them."""
     densest = max(traces.series, key=lambda series: len(series.time_s))
     return float(np.ptp(densest.time_s)) / len(densest.time_s)
 
 
 def _packed(traces: Traces, step_s: float) -> dict[str, Any]:
-    """A session as JSON takes it.
+    """A session as an object for JSON.
 
-    `data` is base64 of zlib of, for each series, its times (0.1 ms) and then each axis (0.1 mm): differences as int32,
-    zigzag, the lowest bytes of all first.
+    `data` is base64 of zlib of the series one after the other: first its times in 0.1 ms, then each axis in 0.1 mm.
+    Each is stored as differences in zigzag int32, the lowest bytes of all values first. traces.js unpacks it.
     """
     listed, parts, left_out = [], [], 0
     for series in traces.series:
@@ -103,14 +103,14 @@ def _packed(traces: Traces, step_s: float) -> dict[str, Any]:
 
 
 def _storable(series: Series) -> npt.NDArray[np.bool_]:
-    """Readings that tenths in an int32 can hold."""
+    """Which readings fit into an int32 as tenths."""
     largest = (2**31 - 1) / _TENTHS - 1
     inside = (np.abs(series.time_s * 1e3) < largest) & (np.abs(series.value_mm) < largest).all(axis=1)
     return np.asarray(inside, dtype=np.bool_)
 
 
 def _apart(time_s: FloatArray, step_s: float) -> npt.NDArray[np.bool_]:
-    """The first reading of each step."""
+    """Which readings are the first of their step of time."""
     if step_s == 0:
         return np.ones(len(time_s), dtype=np.bool_)
     steps = np.floor(time_s / step_s)
@@ -118,9 +118,9 @@ def _apart(time_s: FloatArray, step_s: float) -> npt.NDArray[np.bool_]:
 
 
 def _bytes(values: FloatArray) -> bytes:
-    """Tenths as zigzag differences in planes of bytes: what hardly changes is nearly all zeros, and packs well."""
+    """Tenths as zigzag differences in planes of bytes: slow changes are nearly all zeros, which compress well."""
     tenths = np.rint(values * _TENTHS).astype(np.int32)
-    with np.errstate(over="ignore"):  # differences wrap round, and back when they are summed
+    with np.errstate(over="ignore"):  # differences wrap around, and back again when they are summed
         change = np.diff(tenths, prepend=np.int32(0))
     zigzag = ((change.astype(np.int32) << 1) ^ (change.astype(np.int32) >> 31)).astype("<u4")
     return zigzag.view(np.uint8).reshape(-1, 4).T.tobytes()

@@ -1,4 +1,4 @@
-"""How well estimators follow the hand: error, lag, and what one costs the other."""
+"""How well estimators follow the hand: error and lag, side by side and against each other."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ from pipeline.words import counted, listing, number, seconds
 
 
 def _errors_words(accuracy: pd.DataFrame) -> Words:
-    """Which estimator errs least and most, and which is nearest to no lag."""
+    """Which estimators have the smallest and the largest error, and which the smallest lag."""
     n = counted(accuracy["session"].nunique(), "session")
     rmse = accuracy.groupby("estimator", sort=False)["rmse_mm"].mean().dropna().sort_values(kind="stable")
     lag = accuracy.groupby("estimator", sort=False)["lag_s"].mean().dropna()
-    told = ""
+    summary = ""
     if len(rmse):
-        told = f"Least RMSE: {rmse.index[0]}, {number(rmse.iloc[0])} mm"
-        told += f"; most: {rmse.index[-1]}, {number(rmse.iloc[-1])} mm." if len(rmse) > 1 else "."
+        summary = f"Smallest RMSE: {rmse.index[0]}, {number(rmse.iloc[0])} mm"
+        summary += f"; largest: {rmse.index[-1]}, {number(rmse.iloc[-1])} mm." if len(rmse) > 1 else "."
     if len(lag):
         nearest = int(np.argmin(np.abs(lag.to_numpy(np.float64))))
-        told += f" Least lag: {lag.index[nearest]}, {seconds(float(lag.iloc[nearest]))} ms."
+        summary += f" Smallest lag: {lag.index[nearest]}, {seconds(float(lag.iloc[nearest]))} ms."
     return Words(
         f"Error (left) and lag (right) of each estimator over {n}: small marks are sessions, large ones their mean with"
-        f" its 95 % interval. {told}",
-        f"Dot plot of RMSE and lag by estimator over {n}. {told}",
+        f" its 95 % interval. {summary}",
+        f"Dot plot of RMSE and lag by estimator over {n}. {summary}",
     )
 
 
 @drawing(_errors_words)
 @styled
 def errors(accuracy: pd.DataFrame) -> Figure:
-    """RMSE and lag of every estimator: a mark a session, the mean over sessions and its 95 % t interval."""
+    """RMSE and lag of every estimator: one mark per session, and the mean over sessions with its 95 % t interval."""
     names = list(dict.fromkeys(accuracy["estimator"]))
     figure, axes = panels(1, 2, 1.1 + 0.36 * len(names), sharey=True)
     many = len(accuracy) > MARKS_MAX
@@ -73,25 +73,25 @@ def errors(accuracy: pd.DataFrame) -> Figure:
 
 
 def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
-    """Which estimators no other beats in both."""
+    """Which estimators no other beats in both error and lag."""
     known = accuracy[accuracy["lag_s"].notna() & accuracy["rmse_mm"].notna()]
     means = known.groupby("estimator", sort=False)[["rmse_mm", "lag_s"]].mean()
     cost = means.assign(lag_s=means["lag_s"].abs()).to_numpy(np.float64)
-    beaten = [bool(np.any(np.all(cost <= one, axis=1) & np.any(cost < one, axis=1))) for one in cost]
+    beaten = [bool(np.any(np.all(cost <= own, axis=1) & np.any(cost < own, axis=1))) for own in cost]
     best = [str(name) for name, worse in zip(means.index, beaten, strict=True) if not worse]
-    told = f"No other has both less error and less lag than {listing(best)}." if best else ""
+    summary = f"No other estimator has both less error and less lag than {listing(best)}." if best else ""
     n = counted(known["session"].nunique(), "session")
     return Words(
-        f"What less lag costs in error: means over {n} with 95 % intervals, small marks are sessions. To the left and"
-        f" near zero is better. {told}",
-        f"Scatter plot of lag against RMSE by estimator, {n}. {told}",
+        f"Lag against error: means over {n} with 95 % intervals; small marks are sessions. Better is further left and"
+        f" closer to zero. {summary}",
+        f"Scatter plot of lag against RMSE by estimator, {n}. {summary}",
     )
 
 
 @drawing(_lag_and_error_words)
 @styled
 def lag_and_error(accuracy: pd.DataFrame) -> Figure:
-    """Lag against RMSE, a mark an estimator: means over sessions with 95 % t intervals, small marks the sessions."""
+    """Lag against RMSE, one mark per estimator: means over sessions with 95 % t intervals; small marks are sessions."""
     figure, (axes,) = panels(height=3.4)
     for index, (estimator, rows) in enumerate(accuracy.groupby("estimator", sort=False)):
         known = rows[rows["lag_s"].notna() & rows["rmse_mm"].notna()]

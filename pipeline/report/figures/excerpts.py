@@ -32,27 +32,28 @@ _SHADES = 6  # the seventh colour is the reference's
 
 
 def _streams_words(excerpts: pd.DataFrame) -> Words:
-    """How far the frames are from the reference when they arrive, and how many there are of each."""
+    """How many frames and accelerations there are, and how far a frame is off the reference when it arrives."""
     counts = excerpts["kind"].value_counts()
     felt, frames = int(counts.get("acceleration", 0)), excerpts[excerpts["kind"] == "tracker"]
-    told = f"{counted(len(frames), 'frame')} of the tracker"
-    told += f" against {counted(felt, 'acceleration')}" if felt else ""
+    summary = f"{counted(len(frames), 'frame')} of the tracker"
+    summary += f" against {counted(felt, 'acceleration')}" if felt else ""
     reference = excerpts[excerpts["kind"] == "reference"]
     if len(reference) > 1 and len(frames):
         at = np.interp(frames["time_s"], reference["time_s"], reference["value"], left=np.nan, right=np.nan)
         error = finite(frames["value"].to_numpy(np.float64) - at)
         if len(error):
-            told += f"; on arrival a frame is {number(float(np.sqrt(np.mean(error**2))), 1)} mm (RMS) off the reference"
+            rms = number(float(np.sqrt(np.mean(error**2))), 1)
+            summary += f"; on arrival a frame is {rms} mm (RMS) off the reference"
     return Words(
-        f"What the sensors delivered ({_span(excerpts)}): {told}.",
-        f"Tracker positions over time{', accelerations below' if felt else ''}: {told}.",
+        f"What the sensors delivered ({_span(excerpts)}): {summary}.",
+        f"Tracker positions over time{', accelerations below' if felt else ''}: {summary}.",
     )
 
 
 @drawing(_streams_words)
 @styled
 def streams(excerpts: pd.DataFrame) -> Figure:
-    """The tracker's frames as they arrive with the reference, and the accelerations below (paper, Fig. 6).
+    """The tracker's frames as they arrive, with the reference, and the accelerations below (paper, Fig. 6).
 
     `excerpts` has the columns of that table, of one session.
     """
@@ -77,7 +78,7 @@ def streams(excerpts: pd.DataFrame) -> Figure:
 
 
 def _estimates_words(excerpts: pd.DataFrame) -> Words:
-    """Each estimator's error in the stretch and how often it is within the stated band."""
+    """Each estimator's error in this stretch, and how often it lies within the stated band."""
     names = list(dict.fromkeys(excerpts.loc[excerpts["kind"] == "estimate", "name"]))
     parts = []
     for name in names:
@@ -87,18 +88,20 @@ def _estimates_words(excerpts: pd.DataFrame) -> Words:
             rms = float(np.sqrt(np.mean(error[known] ** 2)))
             inside = float(np.mean(np.abs(error[known]) <= 2 * sd[known]))
             parts.append((rms, f"{name} {number(rms, 1)} mm, {percent(inside, 0)} within ± 2 SD"))
-    told = f" Error (RMS) here, least first: {listed(text for _, text in sorted(parts))}." if parts else ""
+    errors = (
+        f" Error (RMS) in this stretch, smallest first: {listed(text for _, text in sorted(parts))}." if parts else ""
+    )
     return Words(
-        f"What each estimator makes of them ({_span(excerpts)}): its mean and two stated SDs"
-        f"{', and beside it its error in the band it states' if parts else ''}.{told}",
-        f"One panel an estimator ({listed(names, ', ')}) with mean, band and tracker frames.{told}",
+        f"What each estimator makes of these readings ({_span(excerpts)}): its mean with a band of two stated SDs"
+        f"{', and beside it its error and the same band' if parts else ''}.{errors}",
+        f"One panel per estimator ({listed(names, ', ')}) with mean, band and tracker frames.{errors}",
     )
 
 
 @drawing(_estimates_words)
 @styled
 def estimates(excerpts: pd.DataFrame) -> Figure:
-    """Each estimator's mean and two SDs (paper, Figs. 7 and 8), and with a reference its error beside it.
+    """Each estimator's mean and two SDs (paper, Figs. 7 and 8), and beside it its error if there is a reference.
 
     `excerpts` has the columns of that table, of one session.
     """
@@ -127,7 +130,7 @@ def _span(excerpts: pd.DataFrame) -> str:
 
 
 def _errors_range(excerpts: pd.DataFrame, names: Sequence[str]) -> tuple[float, float]:
-    """Room for every error and the usual band; the wide one of an estimator that has just begun may be cut."""
+    """Limits with room for all errors and the usual band; the wide band of an estimator that has just begun is cut."""
     reach = 1.0
     for one in names:
         _, error, sd = errors_in(excerpts, one)
@@ -163,7 +166,7 @@ def _error(axes: Axes, excerpts: pd.DataFrame, estimator: str, shade: str) -> No
     axes.plot(time, error, color=shade)
     known = finite(error)
     rmse = float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
-    axes.set_title(f"error: RMS {rmse:.1f} mm here" if len(known) else "error: not known")
+    axes.set_title(f"error: RMS {rmse:.1f} mm in this stretch" if len(known) else "error: unknown")
     axes.set_ylabel("error (mm)")
     grouped(axes)
 

@@ -1,4 +1,4 @@
-"""Tables of an exploration to figures: heat maps over latency and noise, a panel a tracker's rate and estimator."""
+"""Heat maps of an exploration over latency and noise: one panel per rate of the tracker and estimator."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _INK = (0.2126, 0.7152, 0.0722)  # weights of red, green and blue in a colour's 
 
 @dataclass(frozen=True)
 class Surface:
-    """A column of the table, what it is with its unit, and how its cells are written."""
+    """A column of the table, its label with the unit, and how its cells are written."""
 
     column: str
     label: str
@@ -47,7 +47,7 @@ _OUTLINED = "The outlined cell is the tracker closest to the study's own."
 
 
 def _outcome_words(table: pd.DataFrame, surface: Surface, own: Tracker) -> Words:
-    caption = f"{surface.label} over the tracker's latency and noise, a panel a rate and estimator. {_OUTLINED}"
+    caption = f"{surface.label} over the tracker's latency and noise, one panel per rate and estimator. {_OUTLINED}"
     return Words(caption, _alt(surface))
 
 
@@ -60,8 +60,8 @@ def outcome(table: pd.DataFrame, surface: Surface, own: Tracker) -> Figure:
 def _participants_words(differences: pd.DataFrame, own: Tracker) -> Words:
     return Words(
         f"Participants needed to show a difference in {NAMES[differences['measure'].iloc[0]]}; in brackets where the"
-        f" first of the two is the better one. {_OUTLINED} Grey: more than {MOST}, or no difference. The table says how"
-        " rough they are.",
+        f" first of the two is the better one. {_OUTLINED} Grey: more than {MOST}, or no difference. The table has the"
+        " range of each number.",
         _alt(PARTICIPANTS),
     )
 
@@ -82,9 +82,9 @@ def _alt(surface: Surface) -> str:
 
 
 def _surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -> Figure:
-    """A row of panels for each value of the text column `panels`, a panel in it for each rate; a frame marks `own`.
+    """One row of panels for each value of the text column `panels`, one panel for each rate; a frame marks `own`.
 
-    All share a scale; a cell without a value is grey, and one whose row is true in `bracketed` stands in brackets.
+    All share a scale. A cell without a value is grey; one whose row is true in `bracketed` is written in brackets.
     """
     names, rates = list(dict.fromkeys(table[panels])), sorted(table["rate_hz"].unique())
     figure = Figure(figsize=(_WIDTH, 0.75 + 1.75 * len(names)))
@@ -113,7 +113,7 @@ def _short(name: str) -> str:
 
 
 def _scale(values: FloatArray, surface: Surface) -> matplotlib.colors.Normalize:
-    """From the least to the largest value, a little apart where they are one."""
+    """A scale from the smallest to the largest value, widened a little if they are equal."""
     known = values[np.isfinite(values) & ((values > 0) | (not surface.logarithmic))]
     low, high = (float(known.min()), float(known.max())) if len(known) else (1.0, 2.0)
     if surface.logarithmic:
@@ -124,7 +124,7 @@ def _scale(values: FloatArray, surface: Surface) -> matplotlib.colors.Normalize:
 def _panel(
     axes: Axes, rows: pd.DataFrame, surface: Surface, scale: matplotlib.colors.Normalize, own: Tracker | None
 ) -> None:
-    """A cell a tracker, latency to the right and noise upwards, with its value."""
+    """Draw one cell per tracker with its value: latency to the right, noise upwards."""
     latencies, noises = (sorted(map(float, rows[name].unique())) for name in ("latency_s", "noise_sd_mm"))
     values, bracketed = np.full((len(noises), len(latencies)), np.nan), np.zeros((len(noises), len(latencies)), bool)
     for row in rows.to_dict("records"):
@@ -163,5 +163,5 @@ def _cells(
 
 
 def _ink(colour: tuple[float, float, float, float]) -> str:
-    """Black or white, whichever is read more easily on a colour."""
+    """Black or white, whichever is easier to read on a colour."""
     return "black" if float(np.dot(_INK, colour[:3])) > 0.42 else "white"

@@ -35,15 +35,15 @@ _VERTICES = 1500  # of a path; a line of more looks the same
 def _path_words(
     tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
 ) -> Words:
-    """What each line spans, and how many targets and selections there are."""
+    """How large an area each line covers, and how many selections there are."""
     sessions = [*tracks["session"].iloc[:1], *positions["session"].iloc[:1]]
     where = f" in session {sessions[0]}" if sessions else ""
     spans = listed((f"{line} {_size_words(way(tracks, positions, line, plane))}" for line in lines), ", ")
-    told = f"Extent of each line: {spans}; {counted(int((events['type'] == 'selection').sum()), 'selection')}."
+    summary = f"Extent of each line: {spans}; {counted(int((events['type'] == 'selection').sum()), 'selection')}."
     return Words(
-        f"The hand's way{where}, {plane[0]} against {plane[1]}; it begins at the arrow. {told} Look where lines leave"
-        " each other and how much each trembles.",
-        f"Lines of the hand's path in the plane{where}. {told}",
+        f"The hand's path{where} in {plane[0]} and {plane[1]}; it starts at the arrow. {summary} Look where the lines"
+        " part, and how much each trembles.",
+        f"Lines of the hand's path in the plane{where}. {summary}",
     )
 
 
@@ -52,11 +52,11 @@ def _path_words(
 def path(
     tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
 ) -> Figure:
-    """One session's way past its targets: a line for each stream of `positions` or estimator of `tracks` in `lines`."""
-    found = [(line, way(tracks, positions, line, plane)) for line in lines]
-    extent = _extent([*(points for _, points in found), _targets(events, plane)])
+    """One session's path past its targets: a line for each stream or estimator in `lines`."""
+    drawn = [(line, way(tracks, positions, line, plane)) for line in lines]
+    extent = _extent([*(points for _, points in drawn), _targets(events, plane)])
     figure, (axes,) = panels(height=0.9 + 6.0 * float(np.clip(extent[1] / extent[0], 0.25, 0.8)))
-    for index, (line, points) in enumerate(found):
+    for index, (line, points) in enumerate(drawn):
         if len(points):
             begin = points[np.isfinite(points).all(axis=1)][:1]
             look: dict[str, Any] = {"linewidth": 1.1, "alpha": 0.85, "color": colour(index)}
@@ -76,24 +76,25 @@ def _paths_words(
     shown: Mapping[str, str],
     plane: Plane = XY,
 ) -> Words:
-    """How many ways there are of each condition, and which reaches furthest."""
-    told = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
+    """How many sessions there are of each condition, and which covers the largest area."""
+    whose = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
     counts, furthest = [], ("", 0.0, "")
     for condition, line in shown.items():
-        mine = list(told.loc[told["condition"] == condition, "session"])
+        mine = list(whose.loc[whose["condition"] == condition, "session"])
         if mine:
             counts.append(f"{condition} ({line}), n = {len(mine)}")
-        for one in mine:
-            points = way(tracks[tracks["session"] == one], positions[positions["session"] == one], line, plane)
+        for session in mine:
+            own = (rows[rows["session"] == session] for rows in (tracks, positions))
+            points = way(*own, line, plane)
             reach = float(np.hypot(*_span_of(points)))
             if reach > furthest[1]:
-                furthest = (str(one), reach, _size_words(points))
+                furthest = (str(session), reach, _size_words(points))
     summary = f"{listed(counts)}."
     summary += f" The widest is session {furthest[0]}, {furthest[2]}." if furthest[0] else ""
-    people = counted(told["participant"].nunique(), "participant")
+    people = counted(whose["participant"].nunique(), "participant")
     return Words(
-        f"The way of each session in the plane, a panel a participant ({people}): {summary} Look for ways"
-        " that leave the others.",
+        f"The hand's path in each session, one panel per participant ({people}): {summary} Look for paths unlike the"
+        " others.",
         f"Paths of {people} in the plane: {summary}",
     )
 
@@ -108,24 +109,24 @@ def paths(
     shown: Mapping[str, str],
     plane: Plane = XY,
 ) -> Figure:
-    """Every participant's ways past the targets, a small panel a participant, a line a session.
+    """Everybody's paths past the targets: one small panel per participant, one line per session.
 
-    `sessions` says whose each is (participant, condition, session: any table that has them); `shown` which stream or
-    estimator is drawn of each condition, in the study's order.
+    `sessions` is any table with the columns participant, condition and session; `shown` names the stream or estimator
+    that is drawn for each condition, in the study's order.
     """
-    told = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
-    people = sorted(set(told["participant"]))
-    seen = [tracks, positions, events]
-    extent = _extent([rows[[f"{axis}_mm" for axis in plane]].to_numpy(np.float64) for rows in seen])
+    whose = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
+    people = sorted(set(whose["participant"]))
+    columns = [f"{axis}_mm" for axis in plane]
+    extent = _extent([rows[columns].to_numpy(np.float64) for rows in (tracks, positions, events)])
     row_height = 0.35 + 1.5 * float(np.clip(extent[1] / extent[0], 0.3, 1.2))
     figure, every, across = multiples(len(people), row_height)
     for index, (axes, person) in enumerate(zip(every, people, strict=True)):
-        mine = told[told["participant"] == person]
+        mine = whose[whose["participant"] == person]
         zorder = as_pixels(axes, len(tracks) + len(positions))
         for place, (condition, line) in enumerate(shown.items()):
             for session in mine.loc[mine["condition"] == condition, "session"]:
-                one, found = tracks[tracks["session"] == session], positions[positions["session"] == session]
-                points = way(one, found, line, plane)
+                own = (rows[rows["session"] == session] for rows in (tracks, positions))
+                points = way(*own, line, plane)
                 axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(place), zorder=zorder)
         _marked(axes, events[events["session"].isin(mine["session"])], plane, small=True)
         axes.set_aspect("equal", adjustable="box")
@@ -163,13 +164,12 @@ def way(tracks: pd.DataFrame, positions: pd.DataFrame, line: str, plane: Plane) 
 
 def _targets(events: pd.DataFrame, plane: Plane) -> FloatArray:
     """Where targets were (n, 2), each place once."""
-    places = events[[f"target_{axis}_mm" for axis in plane]].dropna().drop_duplicates()
-    found: FloatArray = places.to_numpy(np.float64)
-    return found
+    places: FloatArray = events[[f"target_{axis}_mm" for axis in plane]].dropna().drop_duplicates().to_numpy(np.float64)
+    return places
 
 
 def _marked(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False) -> None:
-    """Targets and selections."""
+    """Draw targets and selections."""
     targets = _targets(events, plane)
     chosen = events.loc[events["type"] == "selection", [f"{axis}_mm" for axis in plane]].dropna().to_numpy(np.float64)
     size = 9 if small else 60
@@ -202,7 +202,7 @@ def _marked(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False)
 
 
 def _extent(parts: Sequence[FloatArray]) -> tuple[float, float]:
-    """How wide and how high everything is, in mm; never nothing."""
+    """Width and height of all points together, in mm; at least 1."""
     every = np.concatenate([part[np.isfinite(part).all(axis=1)] for part in parts])
     if not len(every):
         return 1.0, 1.0

@@ -1,4 +1,11 @@
-"""Where the labels of a scatter plot's marks go, so that no two touch."""
+"""Where the labels of a scatter plot's marks go, so that no two touch.
+
+Theory of operation. Marks that lie close together share one label, which lists their numbers. Labels are placed one
+after the other, those of the largest groups first, since a long text fits in the fewest places. A label tries the eight
+places around its mark in a fixed order of preference; it must not touch a label that is already placed, and keeps
+away from other marks if it can. If no place is free, its group is merged with the nearest other group and all labels
+are placed anew, so that the search ends after at most as many rounds as there are groups.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +18,7 @@ import numpy.typing as npt
 
 from pipeline.statistics.arrays import FloatArray
 
-# Which way a label lies from its mark, the liked places first.
+# In which direction a label lies from its mark, the preferred ones first.
 _SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 
 
@@ -24,7 +31,7 @@ class Label:
     box: FloatArray
 
 
-def placed(
+def place_labels(
     marks: FloatArray,
     numbers: Sequence[int],
     size: Callable[[str], tuple[float, float]],
@@ -32,11 +39,11 @@ def placed(
     apart: float,
     radius: float,
 ) -> list[Label]:
-    """Labels with the numbers of the marks (n, 2) beside them, inside the frame: left, bottom, right, top (4,).
+    """Place the numbers of marks (n, 2) beside them, inside the frame: left, bottom, right, top (4,).
 
-    Marks closer than `apart` share a label, and so do those between which there is no room for two. `size` gives the
-    width and height of a text, `radius` is a mark's; all are in one unit. A label keeps away from others' marks where
-    it can, from other labels always, and leaves the frame only where it is the last.
+    Marks closer than `apart` share a label, and so do those without room for two labels. `size` gives the width and
+    height of a text, `radius` is that of a mark; all are in the same unit. The last label that is left may leave the
+    frame.
     """
     groups = _close(marks, apart)
     labels: list[Label] = []
@@ -51,7 +58,7 @@ def placed(
             continue
         others = np.delete(marks, group, axis=0)
         clear = [free & ~_touching(places, _around(others, reach)) for reach in (2 * radius, radius)]
-        best = next((one for one in clear if one.any()), free)
+        best = next((places_left for places_left in clear if places_left.any()), free)
         labels.append(Label(tuple(group), text, places[int(np.argmax(best))]))
     return labels
 
@@ -61,13 +68,13 @@ def spans(numbers: Sequence[int]) -> str:
     ordered = sorted(numbers)
     parts: list[str] = []
     for _, run in groupby(enumerate(ordered), lambda pair: pair[1] - pair[0]):
-        one = [str(number) for _, number in run]
-        parts += [f"{one[0]}–{one[-1]}"] if len(one) > 2 else one
+        texts = [str(number) for _, number in run]
+        parts += [f"{texts[0]}–{texts[-1]}"] if len(texts) > 2 else texts
     return ", ".join(parts)
 
 
 def _close(marks: FloatArray, apart: float) -> list[list[int]]:
-    """Marks with the first mark that is so close."""
+    """Groups of marks: each mark joins the first group whose first mark is closer than `apart`."""
     groups: list[list[int]] = []
     for index, mark in enumerate(marks):
         near = (group for group in groups if np.hypot(*(marks[group[0]] - mark)) < apart)
@@ -80,12 +87,12 @@ def _close(marks: FloatArray, apart: float) -> list[list[int]]:
 
 
 def _largest_first(groups: Sequence[list[int]]) -> list[list[int]]:
-    """Long labels have the fewest places to go to."""
+    """Sort groups by size, since long labels have the fewest places to go to."""
     return sorted(groups, key=len, reverse=True)
 
 
 def _joined(groups: Sequence[list[int]], which: int, marks: FloatArray) -> list[list[int]]:
-    """One group fewer: that one goes into the nearest other."""
+    """Merge one group into the nearest other."""
     first = marks[[group[0] for group in groups]]
     distance = np.hypot(*(first - first[which]).T)
     distance[which] = np.inf

@@ -56,14 +56,14 @@ def _task_layout_words(task: Task) -> Words:
     size = [high - low for low, high in (task.canvas_x_mm, task.canvas_y_mm)]
     places = targets_of(task)
     diameters = sorted({diameter for _, _, diameter in places})
-    told = f"a canvas of {size[0]:g} × {size[1]:g} mm with {counted(len(places), 'target')}"
-    told += f" of {listing([f'{one:g}' for one in diameters])} mm" if diameters else ""
+    summary = f"a canvas of {size[0]:g} × {size[1]:g} mm with {counted(len(places), 'target')}"
+    summary += f" of {listing([f'{diameter:g}' for diameter in diameters])} mm" if diameters else ""
     if task.window_mm is not None:
         share = task.window_mm[0] * task.window_mm[1] / (size[0] * size[1])
-        told += (
+        summary += (
             f"; the window of {task.window_mm[0]:g} × {task.window_mm[1]:g} mm shows {percent(share, 1)} of it at once"
         )
-    return Words(f"The task: {told}.", f"Layout of {told}.")
+    return Words(f"The task: {summary}.", f"Layout of {summary}.")
 
 
 @drawing(_task_layout_words)
@@ -94,17 +94,17 @@ def task_layout(task: Task) -> Figure:
 
 def targets_of(task: Task) -> list[tuple[float, float, float]]:
     """x, y and diameter in mm of every target, each once."""
-    found = [(x, y, task.target_diameter_mm) for x, y in task.targets_mm]
+    places = [(x, y, task.target_diameter_mm) for x, y in task.targets_mm]
     for ring in task.rings:
         angles = 2 * np.pi * np.arange(ring.targets) / ring.targets
         x = ring.centre_mm[0] + ring.diameter_mm / 2 * np.cos(angles)
         y = ring.centre_mm[1] + ring.diameter_mm / 2 * np.sin(angles)
-        found += [(float(a), float(b), ring.target_diameter_mm) for a, b in zip(x, y, strict=True)]
-    return found
+        places += [(float(a), float(b), ring.target_diameter_mm) for a, b in zip(x, y, strict=True)]
+    return places
 
 
 def _window(axes: Axes, centre: tuple[float, float], size: tuple[float, float]) -> None:
-    """What the display shows at once, about a place."""
+    """What the display shows at once, centred on a place."""
     corner = (centre[0] - size[0] / 2, centre[1] - size[1] / 2)
     look: dict[str, Any] = {"facecolor": COLOURS[1], "alpha": 0.25, "edgecolor": COLOURS[1], "linewidth": 1.2}
     label = f"window, {size[0]:g} × {size[1]:g} mm, at target 1"

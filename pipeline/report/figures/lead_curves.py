@@ -20,12 +20,12 @@ def _lead_words(lead_curves: pd.DataFrame) -> Words:
     for name, rows in lead_curves.groupby("estimator", sort=False):
         peak = peak_s(rows)
         parts.append(f"{name} has no peak within half a second" if peak is None else f"{name} {seconds(peak)} ms")
-    told = f"Peaks: {listed(parts)}."
+    peaks = f"Peaks: {listed(parts)}."
     where = lead_curves["session"].iloc[0]
     return Words(
         f"How far each estimator is ahead of the tracker as it arrived, by the paper's method (session {where})."
-        f" {told} Flat tops make a peak fragile.",
-        f"Cross-correlation with the tracker against lead. {told}",
+        f" {peaks} Where the top is flat, the place of its peak is uncertain.",
+        f"Cross-correlation with the tracker against lead. {peaks}",
     )
 
 
@@ -56,7 +56,7 @@ def lead(lead_curves: pd.DataFrame) -> Figure:
 
 
 def peak_s(rows: pd.DataFrame) -> float | None:
-    """Where one estimator's curve is highest, in s; None at the edge of what was looked at, or where there is none."""
+    """The lead in s at which one estimator's curve is highest; None if it has no peak inside the range."""
     correlation = rows["correlation_mm2"].to_numpy(np.float64)
     if not len(correlation):
         return None

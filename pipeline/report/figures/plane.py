@@ -11,7 +11,7 @@ XY: Plane = ("x", "y")
 
 
 def square(axes: Axes, plane: Plane = XY, unit: str = "mm") -> None:
-    """A millimetre is as long in both directions."""
+    """Make a millimetre as long in both directions, and name the axes."""
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel(f"{plane[0]} ({unit})")
     axes.set_ylabel(f"{plane[1]} ({unit})")

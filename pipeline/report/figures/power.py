@@ -1,4 +1,4 @@
-"""How many participants: power against their number."""
+"""Power against the number of participants."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pipeline.statistics.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Labels:
-    """What stands over a figure and along its value axis."""
+    """The title of a figure, and the label of its value axis."""
 
     title: str
     value: str
@@ -26,9 +26,10 @@ class Labels:
 
 @styled
 def power(table: pd.DataFrame, series: Mapping[str, str], target: float, needed: int | None, labels: Labels) -> Figure:
-    """Power against the number of participants: the columns of `table` that `series` names, the closed form as a line.
+    """Power against the number of participants, for the columns of `table` that `series` labels.
 
-    Simulated columns stand with their 95 % intervals, `<column>_low` and `<column>_high`.
+    A column with an interval, `<column>_low` and `<column>_high`, was simulated and is drawn as marks with these; any
+    other is a closed form and drawn as a line.
     """
     figure, (axes,) = panels(height=3.8)
     n = table["participants"].to_numpy(np.float64)
@@ -53,7 +54,7 @@ def power(table: pd.DataFrame, series: Mapping[str, str], target: float, needed:
 
 
 def _with_intervals(axes: Axes, n: FloatArray, table: pd.DataFrame, column: str, look: tuple[str, str, str]) -> None:
-    """Simulated values with their intervals, joined by a thin line."""
+    """Draw simulated values with their intervals, joined by a thin line."""
     shade, mark, label = look
     values, low, high = (table[f"{column}{end}"].to_numpy(np.float64) for end in ("", "_low", "_high"))
     axes.errorbar(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -30,12 +30,12 @@ from pipeline.report.figures.wording import complete_counts, listed, mean_with_i
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words import MINUS, counted, measure_label, number, short_label, unit_of
 
-_CLOUD = 0.3  # of the way to the next condition
-_BOX = 0.07
+_CLOUD = 0.3  # height of a density, where conditions are 1 apart
+_BOX = 0.07  # half the width of the line at the median
 
 
 def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
-    """The means, the differences, and how many participants go the same way."""
+    """The means, the differences, and how many participants have the same sign."""
     label, unit, complete = measure_label(measure), spaced(unit_of(measure)), wide.dropna()
     means = listed(
         f"{name} {mean_with_interval(finite(wide[name]))}{unit} (n = {wide[name].count()})" for name in wide.columns
@@ -43,21 +43,21 @@ def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
     between = met_one_each(wide)
     who = f"{counted(len(wide), 'participant')}, one condition each" if between else _complete_of(complete)
     head = f"{label} by condition, {who}. Means with 95 % intervals: {means}."
-    alt = f"{label}: a raincloud a condition. {means}."
+    alt = f"{label}: one raincloud per condition. {means}."
     if len(wide.columns) > 1 and len(complete) > 1:
-        told = _differences_words(complete, unit)
-        head += f" {told}"
-        alt += f" {told}"
-    reading = (
+        differences = _differences_words(complete, unit)
+        head += f" {differences}"
+        alt += f" {differences}"
+    legend_text = (
         " Small marks are participants"
-        + (", lines join the same one" if len(wide.columns) > 1 and not between else "")
-        + "; shapes are their density, thick bars the middle half; large marks are means with 95 % intervals."
+        + (", joined by lines" if len(wide.columns) > 1 and not between else "")
+        + "; shapes show their density, thick bars the middle half, large marks the means with 95 % intervals."
     )
-    return Words(head + reading, alt)
+    return Words(head + legend_text, alt)
 
 
 def met_one_each(wide: pd.DataFrame) -> bool:
-    """Has every participant a value in one condition only, of several? Then none is "incomplete"."""
+    """Does every participant have a value in only one of several conditions? Then nobody counts as incomplete."""
     return len(wide.columns) > 1 and int(wide.notna().sum(axis=1).max()) <= 1
 
 
@@ -79,10 +79,10 @@ def _differences_words(complete: pd.DataFrame, unit: str) -> str:
 @drawing(_paired_words)
 @styled
 def paired(wide: pd.DataFrame, measure: str) -> Figure:
-    """Raincloud of a measure: each participant in each condition, and beside it the differences to the first.
+    """Rainclouds of a measure, one per condition, and beside them the differences from the first condition.
 
-    `wide` has a row a participant and a column a condition, as `participant_means` gives it. For each condition the
-    participants, joined by lines where complete, their density, quartiles, and the mean with its 95 % t interval.
+    `wide` has one row per participant and one column per condition, as `participant_means` gives it. A raincloud shows
+    the participants, joined by lines if complete, their density and quartiles, and the mean with its 95 % t interval.
     """
     complete = wide.dropna()
     compared = len(wide.columns) > 1 and len(complete) > 1
@@ -102,17 +102,17 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
 
 
 def _scales_words(wide: Mapping[str, pd.DataFrame]) -> Words:
-    """How many scales lean which way, and which most."""
-    conditions = list(next(iter(wide.values())).columns)
-    head = f"Every scale by participant ({complete_counts(wide)}), drawn as the measures above."
-    alt = f"A raincloud a scale: {listed(short_label(name) for name in wide)}."
+    """How many participants there are, and in which scale the conditions differ most."""
+    conditions = next(iter(wide.values())).columns
+    head = f"All scales by participant ({complete_counts(wide)}), drawn like the measures above."
+    alt = f"One panel of rainclouds per scale: {listed(short_label(name) for name in wide)}."
     if len(conditions) > 1:
-        told = _furthest(wide, conditions)
-        return Words(f"{head} {told}", f"{alt} {told}")
+        furthest = _furthest(wide)
+        return Words(f"{head} {furthest}", f"{alt} {furthest}")
     return Words(head, alt)
 
 
-def _furthest(wide: Mapping[str, pd.DataFrame], conditions: Sequence[str]) -> str:
+def _furthest(wide: Mapping[str, pd.DataFrame]) -> str:
     """The scale whose means lie furthest apart."""
     spread: dict[str, tuple[float, pd.Series]] = {}
     for measure, table in wide.items():
@@ -121,7 +121,7 @@ def _furthest(wide: Mapping[str, pd.DataFrame], conditions: Sequence[str]) -> st
             spread[measure] = (float(means.max() - means.min()), means)
     if not spread:
         return "No scale has a participant with every condition."
-    measure, (apart, means) = max(spread.items(), key=lambda one: one[1][0])
+    measure, (apart, means) = max(spread.items(), key=lambda item: item[1][0])
     if apart == 0:
         return "The means are the same in every scale."
     return (
@@ -133,7 +133,7 @@ def _furthest(wide: Mapping[str, pd.DataFrame], conditions: Sequence[str]) -> st
 @drawing(_scales_words)
 @styled
 def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
-    """The same for every scale of a questionnaire, a small panel a scale, all of one height."""
+    """The same for every scale of a questionnaire: one small panel per scale, all with the same axis."""
     figure, every, across = multiples(len(wide), 1.9, a_row=3, sharex=False)
     for index, (axes, (measure, table)) in enumerate(zip(every, wide.items(), strict=True)):
         _rainclouds(axes, table, small=True)
@@ -145,14 +145,14 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
 
 
 def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
-    """A column a condition: participants at its place, density to the outer side, mean and quartiles between."""
+    """One raincloud per condition: participants in the middle, density outside, mean and quartiles between."""
     at = np.arange(len(wide.columns))
     complete = wide.dropna().to_numpy(np.float64)
     if len(at) > 1 and len(complete):
         faint: dict[str, Any] = {"alpha": 0.45, "linewidth": 0.7, "zorder": 1, "rasterized": complete.size > MARKS_MAX}
         axes.plot(at, complete.T, color=GREY, **faint)
     for index, condition in enumerate(wide.columns):
-        side = -1 if index == 0 and len(at) > 1 else 1  # lines leave the first to the right
+        side = -1 if index == 0 and len(at) > 1 else 1  # the lines from the first condition lead to the right
         _raincloud(axes, index, side, finite(wide[condition]), (colour(index), marker(index)))
     length = max(8, (24 if small else 40) // len(at))
     axes.set_xticks(at, [as_label(condition, length) for condition in wide.columns])
@@ -161,7 +161,7 @@ def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
 
 
 def _from_zero(axes: Axes, tables: Iterable[pd.DataFrame]) -> None:
-    """Values begin at zero where none is below it; asked for once all are drawn, for it ends the scaling."""
+    """Let the axis begin at zero unless a value is below. Call it last, since it ends matplotlib's own scaling."""
     if not any((finite(table) < 0).any() for table in tables):
         axes.set_ylim(bottom=0)
 
@@ -173,9 +173,9 @@ def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple
     shade = look[0]
     rasterized = len(values) > MARKS_MAX
     axes.scatter(np.full(len(values), at), values, s=13, color=shade, alpha=0.55, zorder=2, rasterized=rasterized)
-    found = _density(values)
-    if found is not None:
-        grid, height = found
+    density = _density(values)
+    if density is not None:
+        grid, height = density
         edge = at + side * 0.2
         axes.fill_betweenx(grid, edge, edge + side * _CLOUD * height, color=shade, alpha=0.25, linewidth=0)
     if len(values) > 3:
@@ -187,9 +187,9 @@ def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple
 
 
 def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArray] | None:
-    """Values from the least to the greatest and the density there, its peak 1; None where that says nothing.
+    """A grid from the smallest to the largest value, and the density there with its peak at 1; None for too few values.
 
-    Gaussian kernels of Scott's width (Scott 1992). Nothing is drawn beyond the data.
+    Gaussian kernels of Scott's width (Scott 1992). The grid ends at the data, so that nothing is drawn beyond them.
     """
     if len(np.unique(values)) < 4:
         return None
@@ -207,7 +207,7 @@ def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArr
 
 
 def _differences(axes: Axes, complete: pd.DataFrame) -> None:
-    """First condition less each other one: participants, density, mean and interval."""
+    """First condition minus each other one: participants, density, mean and interval."""
     first, *others = complete.columns
     axes.axhline(0, color=BLACK, linewidth=0.8)
     for index, other in enumerate(others):

@@ -1,4 +1,4 @@
-"""What figures of accuracy share: the axis of the error and the names of others."""
+"""The axis of the error and the name of the other one, which the figures of accuracy share."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 LAG_LABEL = "Lag behind the reference (ms)"
-_WIDE = 100.0  # from end to end: so far apart, only powers of ten have room for their numbers
+_WIDE = 100.0  # ratio of the axis' ends above which only powers of ten have room for their numbers
 
 
 def along_rmse(axes: Axes, rmse_mm: pd.Series) -> None:
-    """RMSE along x; by its logarithm where the largest is many times the least."""
+    """Put RMSE along x, on a logarithmic scale if the largest is more than 15 times the smallest."""
     if rmse_mm.max() > 15 * rmse_mm.min() > 0:
         axes.set_xscale("log")
         low, high = axes.get_xlim()

@@ -1,4 +1,4 @@
-"""Where selections fell about their targets."""
+"""Where selections landed relative to their targets."""
 
 from __future__ import annotations
 
@@ -46,17 +46,16 @@ def _selection_errors_words(
             parts.append(f"{condition}: none")
             continue
         x, y = offsets.mean(axis=0)
-        found = ellipse_95(offsets)
-        size = (
-            "" if found is None else f", ellipse {number(found.lengths[0], 1)} × {number(found.lengths[1], 1)} {unit}"
-        )
+        ellipse = ellipse_95(offsets)
+        lengths = () if ellipse is None else [number(length, 1) for length in ellipse.lengths]
+        size = f", ellipse {' × '.join(lengths)} {unit}" if lengths else ""
         people = counted(rows["participant"].nunique(), "participant")
         parts.append(f"{condition}: n = {len(offsets)}, {people}, mean ({number(x, 1)}, {number(y, 1)}) {unit}{size}")
-    told = f"{listed(parts)}."
+    summary = f"{listed(parts)}."
     return Words(
-        "Where selections fell about their target, which is at zero; the cross is the mean, and the ellipse would hold"
-        f" 95 % of further selections if they were normal and independent. {told}",
-        f"Scatter of selection errors in {plane[0]} and {plane[1]} by condition. {told}",
+        "Where selections landed relative to their target, which is at zero; the cross is the mean, and the ellipse"
+        f" would contain 95 % of further selections if they were normally distributed and independent. {summary}",
+        f"Scatter of selection errors in {plane[0]} and {plane[1]} by condition. {summary}",
     )
 
 
@@ -65,9 +64,9 @@ def _selection_errors_words(
 def selection_errors(
     selections: pd.DataFrame, conditions: Sequence[str], plane: Plane = XY, px_per_mm: float | None = None
 ) -> Figure:
-    """Where selections fell about their targets, a panel a condition, with the ellipse that holds 95 % of a normal.
+    """Where selections landed relative to their targets: one panel per condition, with mean and 95 % ellipse.
 
-    `selections` has the columns of that table; in pixels where `px_per_mm` is given.
+    `selections` has the columns of that table. The axes are in pixels if `px_per_mm` is given, else in mm.
     """
     scale, unit = (1.0, "mm") if px_per_mm is None else (px_per_mm, "px")
     across = min(len(conditions), 4)
@@ -100,26 +99,26 @@ def offsets_mm(selections: pd.DataFrame, plane: Plane) -> FloatArray:
 
 
 def _scatter(axes: Axes, offsets: FloatArray, look: tuple[str, str]) -> float:
-    """Selections, their mean and ellipse; how far from zero anything of it is."""
+    """Draw selections, their mean and ellipse; return how far from zero the outermost part is."""
     if not len(offsets):
         return 0.0
     shade, mark = look
-    many = len(offsets) > MARKS_MAX // 4  # there is a panel a condition
+    many = len(offsets) > MARKS_MAX // 4  # of several panels, one per condition
     axes.scatter(offsets[:, 0], offsets[:, 1], s=9, color=shade, marker=mark, alpha=0.4, linewidth=0, rasterized=many)
-    found = ellipse_95(offsets)
+    ellipse = ellipse_95(offsets)
     reach = float(np.abs(offsets).max())
-    if found is not None:
-        patch = Ellipse(found.centre, *found.lengths, angle=found.angle_deg)
+    if ellipse is not None:
+        patch = Ellipse(ellipse.centre, *ellipse.lengths, angle=ellipse.angle_deg)
         patch.set(facecolor="none", edgecolor=BLACK, linewidth=1.3, zorder=3)
         axes.add_patch(patch)
-        reach = max(reach, float(np.abs(found.centre).max() + max(found.lengths) / 2))
+        reach = max(reach, float(np.abs(ellipse.centre).max() + max(ellipse.lengths) / 2))
     axes.plot(*offsets.mean(axis=0), "+", color=BLACK, markersize=9, markeredgewidth=1.6, zorder=4)
     return reach
 
 
 @dataclass(frozen=True)
 class Ellipse95:
-    """Centre, the two whole axes, and the angle of the first from the plane's first axis."""
+    """Centre, lengths of the major and the minor axis, and the angle of the major one from the plane's first axis."""
 
     centre: tuple[float, float]
     lengths: tuple[float, float]
@@ -127,7 +126,7 @@ class Ellipse95:
 
 
 def ellipse_95(points: FloatArray) -> Ellipse95 | None:
-    """The ellipse that holds a further point of the same bivariate normal with 95 %; None of fewer than four points.
+    """The ellipse that contains a further point of the same bivariate normal with 95 %; None for less than four.
 
     T² of one new observation: its squared Mahalanobis distance is below 2 (n² − 1) / (n (n − 2)) · F(2, n − 2)
     (Johnson and Wichern, Applied Multivariate Statistical Analysis, 5.4). None where all points lie on one line.

@@ -13,25 +13,26 @@ from pipeline.words import MINUS, number, percent
 
 
 def _noise_words(residuals: pd.DataFrame, units: pd.Series) -> Words:
-    """Each sensor's SD, and how much of it is further out than a normal's."""
+    """Each sensor's SD, and the share of readings further out than a normal distribution has."""
     parts = []
     for stream, unit in units.items():
         values = finite(residuals.loc[residuals["stream"] == stream, "residual"])
         sd = float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
         outside = f", {percent(float(np.mean(np.abs(values) > 3 * sd)), 1)} beyond 3 SD" if sd > 0 else ""
         parts.append(f"{stream}: SD {number(sd, 1)} {unit}, n = {len(values)}{outside}")
-    told = listed(parts)
+    summary = listed(parts)
     return Words(
-        f"Readings in still stretches, slow drift taken off, with the Gaussian of the same SD ({told}; a normal has"
-        " 0.3 % beyond 3 SD). A hand is never quite still, so this is an upper bound of the sensor's own noise.",
-        f"Histograms with Gaussian curves. {told}.",
+        "Sensor readings while the hand is still, minus slow drift, and the normal distribution of the same SD"
+        f" ({summary}; a normal distribution has 0.3 % beyond 3 SD). A hand is never quite still, so this is an upper"
+        " bound on the sensor's own noise.",
+        f"Histograms with the curves of normal distributions. {summary}.",
     )
 
 
 @drawing(_noise_words)
 @styled
 def noise(residuals: pd.DataFrame, units: pd.Series) -> Figure:
-    """Histogram of each sensor's readings in still stretches with the Gaussian of the same SD.
+    """Histogram of each sensor's readings in still stretches, with the normal distribution of the same SD.
 
     `residuals` has the columns `stream` and `residual` of `noise_residuals`, `units` each stream's unit, by its name,
     in the order in which they are drawn.

@@ -1,4 +1,4 @@
-"""Is the standard deviation that an estimator states honest?"""
+"""Does the standard deviation that an estimator states fit its errors?"""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from pipeline.words import counted, percent
 
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.5}
 _BAND: dict[str, Any] = {"color": GREY, "linewidth": 0, "alpha": 0.35}
-LINES_MAX = 60  # sessions, each with a line of its own
+LINES_MAX = 60  # sessions with a line each; of more, a band is drawn
 
 
 def _calibration_words(table: pd.DataFrame) -> Words:
-    """How much is within 1.96 SD, where a normal has 95 %."""
+    """The share of errors within 1.96 SD, where a normal distribution has 95 %."""
     parts = []
     for name, rows in table.groupby("estimator", sort=False):
         k, share = shares(rows)
         at = int(np.argmin(np.abs(k - 1.96)))
         parts.append(f"{name} {percent(float(share[at]), 0)}")
-    told = f"Within {1.96} SD, where a normal has 95 %: {listed(parts, ', ')}."
+    summary = f"Within 1.96 SD, where a normal distribution has 95 %: {listed(parts, ', ')}."
     sessions = table["session"].nunique()
     n = counted(sessions, "session")
-    single = "band: nine of ten sessions" if sessions > LINES_MAX else "thin lines single sessions"
+    single = "band: nine of ten sessions" if sessions > LINES_MAX else "thin lines: single sessions"
     return Words(
-        f"Is the stated SD honest? The share of errors within k stated SDs over {n} (pooled; {single}), beside the"
-        f" normal's (dashed). Below it errors are larger than stated, above it smaller. {told}",
-        f"Share of errors within k stated SDs by estimator, {n}. {told}",
+        f"Does the stated SD fit the errors? The share of errors within k stated SDs over {n} (pooled; {single}), and"
+        " that of a normal distribution (dashed). Below the dashed line errors are larger than stated, above it"
+        f" smaller. {summary}",
+        f"Share of errors within k stated SDs by estimator, {n}. {summary}",
     )
 
 
 @drawing(_calibration_words)
 @styled
 def calibration(table: pd.DataFrame) -> Figure:
-    """Share of errors within k stated SDs, a small panel an estimator: all sessions together, each, and the normal's.
+    """Share of errors within k stated SDs, one small panel per estimator: pooled, by session, and of a normal.
 
     `table` has the columns of `calibration`: counts by session, so that shares are of all instants, not means of means.
     """
@@ -79,21 +80,21 @@ def calibration(table: pd.DataFrame) -> Figure:
 
 def _by_session(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
     """k (k,), and each session's share in percent (k, sessions)."""
-    whole = rows.pivot(index="percent_of_sd", columns="session", values=["within", "n"]).astype("float64")
-    return whole.index.to_numpy(np.float64) / 100, 100 * (whole["within"] / whole["n"]).to_numpy()
+    counts = rows.pivot(index="percent_of_sd", columns="session", values=["within", "n"]).astype("float64")
+    return counts.index.to_numpy(np.float64) / 100, 100 * (counts["within"] / counts["n"]).to_numpy()
 
 
 def nine_of_ten(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """k, and the 5 and 95 percentiles of the sessions' shares in percent."""
+    """k, and the 5th and 95th percentiles of the sessions' shares in percent."""
     k, share = _by_session(rows)
     low, high = np.nanpercentile(share, [5, 95], axis=1)
     return k, low, high
 
 
 def _one_line(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
-    """Each session's k and share in percent, NaN between sessions: one line draws faster than many."""
-    found, share = _by_session(rows)
-    k = np.broadcast_to(found[:, None], share.shape)
+    """k and share in percent of all sessions, NaN between them: one line is drawn faster than many."""
+    grid, share = _by_session(rows)
+    k = np.broadcast_to(grid[:, None], share.shape)
     parted = [np.vstack([part, np.full(part.shape[1], np.nan)]).T.ravel() for part in (k, share)]
     return parted[0], parted[1]
 

@@ -1,4 +1,4 @@
-"""The look that all figures share: colours that the colour-blind tell apart, names, intervals, and how to save one."""
+"""The look that all figures share: colours that colour-blind readers tell apart, labels, panels, means, and saving."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 BLACK = COLOURS[6]
 GREY = "#6b757d"
 PALE = "#e3e7ea"
-WIDTH = 7.2  # inches: a page's text
-MARKS_MAX = 2000  # more than these are pixels: an SVG of each would be slow to open
+WIDTH = 7.2  # inches: the width of a page's text
+MARKS_MAX = 2000  # more are drawn as a bitmap, since an SVG with each of them is slow to open
 _PANELS_A_ROW = 4
 _NAME_LENGTH = 32
 _TICKS = 8.5
@@ -50,18 +50,18 @@ _STYLE: dict[Any, Any] = {
     "text.parse_math": False,  # a name with two dollar signs is a name
     "svg.fonttype": "path",
     "svg.hashsalt": "steadyhand",
-    "savefig.dpi": 150,  # of what is kept as pixels
+    "savefig.dpi": 150,  # of bitmaps
 }
 
 
 def styled(function: Callable[Drawn, Figure]) -> Callable[Drawn, Figure]:
-    """A figure in the house's style wherever it is made, and whatever style is in force when it is shown."""
+    """Draw a figure in the report's style, whatever style a notebook has set."""
 
     @wraps(function)
     def drawn(*arguments: Drawn.args, **named: Drawn.kwargs) -> Figure:
         with mpl.rc_context(_STYLE):
             figure = function(*arguments, **named)
-            for axes in figure.axes:  # ticks are made when they are asked for, in the style of that moment
+            for axes in figure.axes:  # matplotlib makes tick labels when they are first asked for, in the style of then
                 axes.get_xticklabels()
                 axes.get_yticklabels()
         return figure
@@ -81,7 +81,7 @@ def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:
 
 
 def as_label(text: object, length: int = _NAME_LENGTH) -> str:
-    """A name as a figure can show it: with glyphs for all of it, and no longer than leaves room for the data."""
+    """A name as a label: characters that the font lacks are replaced, and a long name is cut to leave room for data."""
     shown = showable(str(text))
     if shown.startswith("_"):  # matplotlib leaves such names out of legends
         shown = THIN + shown
@@ -94,7 +94,7 @@ def colour(index: int) -> str:
 
 
 def marker(index: int) -> str:
-    """Its mark."""
+    """The marker of the condition or estimator at this place."""
     return MARKERS[index % len(MARKERS)]
 
 
@@ -107,9 +107,9 @@ def panels(rows: int = 1, columns: int = 1, height: float = 3.0, **options: Any)
 def multiples(
     count: int, row_height: float, a_row: int = _PANELS_A_ROW, **options: Any
 ) -> tuple[Figure, list[Axes], int]:
-    """A figure with as many small panels of one scale, those that are left over taken away, and how many are in a row.
+    """A figure of `count` small panels with shared scales, the panels, and how many stand in a row.
 
-    The axes of one scale are labelled at the left and below, also above a place that stays empty.
+    Axes are labelled at the left and at the bottom, also in a panel above a place that stays empty.
     """
     across = min(count, a_row)
     down = -(-count // across)
@@ -125,22 +125,22 @@ def multiples(
 
 
 def lowest(every: Sequence[Axes], across: int) -> list[Axes]:
-    """The panels with nothing below them."""
+    """The panels with none below them."""
     return list(every[-across:])
 
 
 def legend(figure: Figure, axes: Iterable[Axes], columns: int = 4, place: Place = "outside upper left") -> None:
-    """What marks and lines stand for, each once, outside the panels; nothing where none has a label."""
-    told: dict[str, Artist] = {}
+    """A legend outside the panels that explains each label once; none if nothing has a label."""
+    handles: dict[str, Artist] = {}
     for panel in axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            told.setdefault(label, handle)
-    if told:
-        figure.legend(list(told.values()), list(told), loc=place, ncols=columns)
+            handles.setdefault(label, handle)
+    if handles:
+        figure.legend(list(handles.values()), list(handles), loc=place, ncols=columns)
 
 
 def mean_and_interval(values: FloatArray) -> tuple[float, float]:
-    """Mean and half the width of its 95 % t interval; NaN where one value, or none, gives no such thing."""
+    """Mean and half the width of its 95 % t interval; NaN where there are too few values."""
     if len(values) == 0:
         return np.nan, np.nan
     if len(values) < 2:
@@ -152,14 +152,14 @@ def mean_and_interval(values: FloatArray) -> tuple[float, float]:
 
 
 def finite(values: Any) -> FloatArray:
-    """The numbers among them."""
+    """The finite values, as an array (n,)."""
     array = np.asarray(values, dtype=np.float64)
     kept: FloatArray = array[np.isfinite(array)]
     return kept
 
 
 def draw_mean(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], upright: bool = True) -> None:
-    """A mean with its 95 % interval at a place; `look` is its colour and mark."""
+    """Draw a mean with its 95 % interval at a place on the axis; `look` is colour and marker."""
     mean, half = mean_and_interval(values)
     shade, mark = look
     place = ([at], [mean]) if upright else ([mean], [at])
@@ -178,19 +178,19 @@ def draw_mean(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], 
 
 
 def arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """An interval as matplotlib takes it: how far to each side, nothing where there is none."""
+    """Intervals as matplotlib takes them: distances below and above the middle (2, n), 0 where there is no interval."""
     return np.nan_to_num(np.maximum(0, np.stack([middle - low, high - middle])))
 
 
 def grouped(axes: Axes) -> None:
-    """Thousands set apart on the value axis, and a true minus."""
+    """Group the thousands on the value axis, and write a true minus sign."""
     axes.yaxis.set_major_formatter(
         mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", THIN).replace("-", MINUS))
     )
 
 
 def as_pixels(axes: Axes, marks: int) -> float:
-    """The zorder for so many marks: where they are many, one at which a panel's marks are one picture."""
+    """The zorder for a panel with so many marks; if there are too many, they become one bitmap."""
     if marks <= MARKS_MAX:
         return 2.0
     axes.set_rasterization_zorder(0)
@@ -198,5 +198,5 @@ def as_pixels(axes: Axes, marks: int) -> float:
 
 
 def thinned(count: int, most: int) -> slice:
-    """Every so manieth of `count`, `most` at the most."""
+    """Slice that keeps at most `most` of `count` points, evenly spaced."""
     return slice(None, None, max(1, -(-count // most)))

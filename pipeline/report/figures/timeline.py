@@ -16,49 +16,49 @@ from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
 from pipeline.words import counted, number
 
-_GAP_TIMES = 5  # a silence this many times as long as usual is marked
+_GAP_TIMES = 5  # a silence is marked if it is so many times the usual interval
 _ROW = 0.17  # inches
-_SHADES = 20  # told apart
+_SHADES = 20  # shares are rounded to so many steps
 _PALE = 0.93
 _CROSS: dict[str, Any] = {"marker": "X", "color": COLOURS[5], "edgecolor": BLACK, "linewidths": 0.5, "s": 26}
 
 
 def _timeline_words(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.DataFrame) -> Words:
-    """How many silences there are, the longest of them, and how many sessions were set aside."""
-    sessions, found = stream_rates["session"].nunique(), silences(stream_rates)
-    told = f"{counted(sessions, 'session')}, {counted(len(found), 'stretch', 'stretches')} with a silence"
-    if len(found):
-        worst = found.iloc[int(np.argmax(found["gap_max_s"].to_numpy(np.float64)))]
-        told += f", the longest {number(float(worst['gap_max_s']), 2)} s ({worst['session']}, {worst['stream']})"
+    """How many silences there are, the longest one, and how many sessions were set aside."""
+    sessions, silent = stream_rates["session"].nunique(), silences(stream_rates)
+    summary = f"{counted(sessions, 'session')}, {counted(len(silent), 'stretch', 'stretches')} with a silence"
+    if len(silent):
+        worst = silent.iloc[int(np.argmax(silent["gap_max_s"].to_numpy(np.float64)))]
+        summary += f", the longest {number(float(worst['gap_max_s']), 2)} s ({worst['session']}, {worst['stream']})"
     aside = len(set_aside(exclusions))
-    told += f"; {counted(aside, 'session')} set aside." if aside else "; none set aside."
+    summary += f"; {counted(aside, 'session')} set aside." if aside else "; none set aside."
     return Words(
-        f"What arrived when, a row a stream of each session: {told} The paler a stretch, the fewer"
-        " messages arrived; a cross marks a silence of five usual steps or longer, 50 ms at least.",
-        f"Timeline of every session's streams. {told}",
+        f"What arrived when, one row per stream of each session: {summary} The paler a stretch, the fewer messages"
+        " arrived; a cross marks a silence of at least five usual intervals and 50 ms.",
+        f"Timeline of every session's streams. {summary}",
     )
 
 
 @drawing(_timeline_words)
 @styled
 def timeline(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.DataFrame) -> Figure:
-    """A row a stream of each session, shaded by how many of its usual messages arrived, silences and events marked.
+    """One row per stream of each session, shaded by how many of its usual messages arrived, with silences and events.
 
-    Tables are those of these names. Sessions that were set aside stand below, with a line through them.
+    The arguments are the tables of these names. Sessions that were set aside stand below, as dotted lines.
     """
     sessions = list(dict.fromkeys(stream_rates["session"]))
-    aside = [str(one) for one in set_aside(exclusions) if one not in sessions]
+    aside = [session for session in map(str, set_aside(exclusions)) if session not in sessions]
     rows = [(str(session), str(stream)) for session, stream in _rows(stream_rates)]
     height = 1.1 + _ROW * (len(rows) + 0.6 * len(sessions) + 1.4 * len(aside))
     figure, (axes,) = panels(height=height)
     at, place = {}, 0.0
     labels = []
     for session in sessions:
-        mine = [stream for one, stream in rows if one == session]
+        mine = [stream for whose, stream in rows if whose == session]
         for stream in mine:
             at[session, stream] = place
-            whose = f"{as_label(session, 22)}  " if stream == mine[0] else ""
-            labels.append((place, whose + as_label(stream, 12)))
+            heading = f"{as_label(session, 22)}  " if stream == mine[0] else ""
+            labels.append((place, heading + as_label(stream, 12)))
             place += 1
         _events(axes, stream_rates, events, session, (place - len(mine) - 0.5, place - 0.5))
         place += 0.6
@@ -90,7 +90,7 @@ def set_aside(exclusions: pd.DataFrame) -> list[str]:
 
 
 def _shares(stream_rates: pd.DataFrame) -> pd.DataFrame:
-    """With begin_s since the session's first message, and what share of the stream's usual number arrived."""
+    """`stream_rates` with begin_s since the session's first message, and which share of the usual messages arrived."""
     first = stream_rates.groupby("session")["time_ns"].transform("min")
     rate = stream_rates["messages"].astype("float64") / stream_rates["duration_s"]
     usual = rate.groupby([stream_rates["session"], stream_rates["stream"]]).transform("median")
@@ -102,19 +102,19 @@ def _shares(stream_rates: pd.DataFrame) -> pd.DataFrame:
 
 
 def silences(stream_rates: pd.DataFrame) -> pd.DataFrame:
-    """The stretches with a silence of five times the stream's usual step and of 50 ms at least."""
+    """The stretches with a silence of at least 50 ms and five times the usual interval of the stream."""
     shares = _shares(stream_rates)
     return shares[(shares["gap_max_s"] > _GAP_TIMES * shares["usual_s"]) & (shares["gap_max_s"] > 0.05)]
 
 
 def _cells(axes: Axes, shares: pd.DataFrame, at: dict[tuple[str, str], float]) -> None:
-    """A box for as long as about the same share arrives; the emptier the paler."""
+    """Draw a box for as long as about the same share arrives, paler the fewer arrive."""
     shade = (shares["share"] * _SHADES).round() / _SHADES
     row = pd.Series([at[str(a), str(b)] for a, b in zip(shares["session"], shares["stream"], strict=True)])
-    told = pd.DataFrame({"row": row.to_numpy(), "shade": shade.to_numpy(), "begin": shares["begin_s"].to_numpy()})
-    told["end"] = told["begin"] + shares["duration_s"].to_numpy()
-    run = (told[["row", "shade"]].diff() != 0).any(axis=1).cumsum()
-    boxes = told.groupby(run).agg({"row": "first", "shade": "first", "begin": "first", "end": "last"})
+    cells = pd.DataFrame({"row": row.to_numpy(), "shade": shade.to_numpy(), "begin": shares["begin_s"].to_numpy()})
+    cells["end"] = cells["begin"] + shares["duration_s"].to_numpy()
+    run = (cells[["row", "shade"]].diff() != 0).any(axis=1).cumsum()
+    boxes = cells.groupby(run).agg({"row": "first", "shade": "first", "begin": "first", "end": "last"})
     x: FloatArray = boxes[["begin", "end", "end", "begin"]].to_numpy(np.float64)
     y = boxes["row"].to_numpy(np.float64)[:, None] + np.array([-0.4, -0.4, 0.4, 0.4])
     full = np.array([0x00, 0x72, 0xB2]) / 255
@@ -125,17 +125,17 @@ def _cells(axes: Axes, shares: pd.DataFrame, at: dict[tuple[str, str], float]) -
 
 
 def _silences(axes: Axes, shares: pd.DataFrame, at: dict[tuple[str, str], float]) -> None:
-    found = silences(shares)
-    y = [at[str(a), str(b)] for a, b in zip(found["session"], found["stream"], strict=True)]
-    middle = found["begin_s"] + found["duration_s"] / 2
+    silent = silences(shares)
+    y = [at[str(a), str(b)] for a, b in zip(silent["session"], silent["stream"], strict=True)]
+    middle = silent["begin_s"] + silent["duration_s"] / 2
     look: dict[str, Any] = _CROSS | {"zorder": 3}
-    axes.scatter(middle, y, rasterized=len(found) > MARKS_MAX, **look)
+    axes.scatter(middle, y, rasterized=len(silent) > MARKS_MAX, **look)
 
 
 def _events(
     axes: Axes, stream_rates: pd.DataFrame, events: pd.DataFrame, session: str, rows: tuple[float, float]
 ) -> None:
-    """Trials' starts as lines over the session's rows, selections as marks above them."""
+    """Draw the starts of trials as lines across the session's rows, and selections as marks above them."""
     mine = events[events["session"] == session]
     first = stream_rates.loc[stream_rates["session"] == session, "time_ns"].min()
     time = (mine["time_ns"] - first).astype("float64") * S_PER_NS
@@ -146,7 +146,7 @@ def _events(
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """What shades and marks stand for."""
+    """Explain shades and marks."""
     axes.scatter([], [], marker="s", color=COLOURS[0], label="as many messages as usual")
     axes.scatter([], [], marker="s", color="#ededed", label="none")
     axes.scatter([], [], label="silence", **_CROSS)

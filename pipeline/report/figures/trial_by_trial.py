@@ -19,10 +19,10 @@ def _trials_words(table: pd.DataFrame, conditions: Sequence[str]) -> Words:
     """Whether errors shrink from the first half of the trials to the second."""
     recorded = table[(table["estimator"] == "recorded") & table["position_error_mm"].notna()]
     people = recorded["participant"].nunique()
-    head = f"Selection error trial by trial, a panel a participant (n = {counted(people, 'participant')}"
+    head = f"Selection error trial by trial, one panel per participant ({counted(people, 'participant')}"
     head += f", {counted(len(recorded), 'selection')})."
-    told = _halves(recorded, conditions)
-    return Words(f"{head} {told}".strip(), f"Selection error by trial, a panel a participant. {told}".strip())
+    halves = _halves(recorded, conditions)
+    return Words(f"{head} {halves}".strip(), f"Selection error by trial, one panel per participant. {halves}".strip())
 
 
 def _halves(recorded: pd.DataFrame, conditions: Sequence[str]) -> str:
@@ -40,7 +40,7 @@ def _halves(recorded: pd.DataFrame, conditions: Sequence[str]) -> str:
 @drawing(_trials_words)
 @styled
 def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
-    """Each participant's selection errors trial by trial, a small panel a participant, a line a condition.
+    """Selection errors trial by trial: one small panel per participant, one line per condition.
 
     `table` has the columns of `trials`; rows whose estimator is `recorded` are shown.
     """

@@ -1,4 +1,4 @@
-"""What less error costs: the variants of a replay, by rank."""
+"""The variants of a replay: lag and jitter against error."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ from pipeline.report.figures.rmse_axis import LAG_LABEL, along_rmse
 from pipeline.report.figures.style import BLACK, GREY, arms, as_label, colour, legend, marker, panels, styled
 from pipeline.words import counted
 
-_LABEL_APART = 10  # points (1/72 inch), as are these: closer marks have one label
+_LABEL_APART = 10  # points (1/72 inch), like the next two; closer marks share a label
 _LABEL_GAP = 4  # beside a label
 _MARK_RADIUS = 5.5  # with its ring
 
 
 def _trade_off_words(means: pd.DataFrame) -> Words:
-    """What the marks stand for, and of which study they are."""
+    """What the marks stand for, and which study they belong to."""
     study = means["study"].iloc[0]
     where = "all studies together" if pd.isna(study) else f"study “{study}”"
     return Words(
-        f"What less error costs, {where}: lag and jitter against RMSE, means over sessions with 95 % intervals; the"
-        " numbers are the ranks of the table, a ring marks an estimator's own settings. To the left and near zero"
-        " is better.",
+        f"Lag and jitter against RMSE, {where}: means over sessions with 95 % intervals. Numbers are the ranks of the"
+        " table, a ring marks the settings of study.yaml. Better is further left and closer to zero.",
         f"Scatter plot of lag and jitter against RMSE for {counted(len(means), 'variant')}, {where}.",
     )
 
@@ -36,12 +35,12 @@ def _trade_off_words(means: pd.DataFrame) -> Words:
 @drawing(_trade_off_words)
 @styled
 def trade_off(means: pd.DataFrame) -> Figure:
-    """Lag and jitter against RMSE, a mark a variant with its rank beside it; an estimator's own settings are ringed.
+    """Lag and jitter against RMSE, one mark per variant with its rank; a ring marks the study's own settings.
 
     `means` has the columns of `replay_means`; a panel without values is left out.
     """
     quantities = [("lag", "_s", 1000, LAG_LABEL), ("jitter", "_mm", 1, "Jitter at rest (mm)")]
-    known = [one for one in quantities if means[f"{one[0]}{one[1]}"].notna().any()]
+    known = [quantity for quantity in quantities if means[f"{quantity[0]}{quantity[1]}"].notna().any()]
     figure, axes = panels(1, max(len(known), 1), 3.6)
     for panel, (stem, unit, scale, label) in zip(axes, known, strict=False):
         for index, estimator in enumerate(sorted(set(means["estimator"]))):
@@ -68,14 +67,14 @@ def trade_off(means: pd.DataFrame) -> Figure:
         panel.margins(0.2, 0.1)  # room for labels
         along_rmse(panel, means["rmse_mm"])
     legend(figure, [axes[0]], 4)
-    figure.draw_without_rendering()  # only then is it known how far apart marks are
+    figure.draw_without_rendering()  # lays the figure out, so that it is known how far apart the marks are
     for panel, (stem, unit, scale, _) in zip(axes, known, strict=False):
         _ranks(figure, panel, means, scale * means[f"{stem}{unit}"])
     return figure
 
 
 def _ranks(figure: Figure, axes: Axes, means: pd.DataFrame, values: pd.Series) -> None:
-    """Each mark's rank beside it; marks without room for that share a label. The layout must be settled."""
+    """Write each mark's rank beside it; marks too close to each other share a label. Needs the figure laid out."""
     known = values.notna().to_numpy(bool)
     points = np.column_stack([means["rmse_mm"], values])[known]
     pixels = axes.transData.transform(points)
@@ -90,7 +89,9 @@ def _ranks(figure: Figure, axes: Axes, means: pd.DataFrame, values: pd.Series) -
 
     ranks = means["rank"].to_numpy()[known].tolist()
     frame = np.array(axes.bbox.extents)
-    for label in label_places.placed(pixels, ranks, cache(size), frame, _LABEL_APART * point, _MARK_RADIUS * point):
+    for label in label_places.place_labels(
+        pixels, ranks, cache(size), frame, _LABEL_APART * point, _MARK_RADIUS * point
+    ):
         mark = label.marks[0]
         offset = (label.box[:2] - pixels[mark]) / point
         axes.annotate(label.text, tuple(points[mark]), (offset[0] + _LABEL_GAP / 2, offset[1]), va="bottom", **look)

@@ -11,22 +11,24 @@ from pipeline.report.figures.style import mean_and_interval
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words import interval, number
 
-_NAMED = 8  # what a sentence can list
+_LISTED_MAX = 8  # a sentence with more parts is hard to read
 
 
 def mean_with_interval(values: FloatArray, digits: int = 2) -> str:
-    """A mean, and its 95 % interval where there is one."""
+    """`12.30 [10.10, 14.50]`: a mean, with its 95 % interval if there is one."""
     mean, half = mean_and_interval(values)
     return number(mean, digits) + ("" if np.isnan(half) else f" {interval(mean - half, mean + half, digits)}")
 
 
 def listed(parts: Iterable[str], joint: str = "; ") -> str:
+    """The first eight parts, and how many there are if there are more."""
     every = list(parts)
-    more = f"{joint}… ({len(every)} in all)" if len(every) > _NAMED else ""
-    return joint.join(every[:_NAMED]) + more
+    more = f"{joint}… ({len(every)} in all)" if len(every) > _LISTED_MAX else ""
+    return joint.join(every[:_LISTED_MAX]) + more
 
 
 def spaced(unit: str) -> str:
+    """A unit as it follows a number; nothing for a measure without one."""
     return f" {unit}" if unit else ""
 
 

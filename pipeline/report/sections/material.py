@@ -1,4 +1,4 @@
-"""What sections are made from, and what they share."""
+"""What sections are made from, and helpers that they share."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Material:
         return tables.read(name, [folders[place] for place in places])
 
     def used(self) -> list[int]:
-        """The places, in `sessions`, of those that are not excluded as a whole."""
+        """The places in `sessions` of those that are not excluded as a whole."""
         return [place for place, session in enumerate(self.sessions) if not self.study.exclusion_of(session)]
 
     def comparisons_of(self, measure: str) -> list[Row]:
@@ -76,11 +76,11 @@ class Material:
         return [row for row in self.rows("comparisons") if row["measure"] == measure]
 
     def measured(self) -> list[str]:
-        """Every measure with descriptives, in their order."""
+        """Every measure that has descriptives, in their order."""
         return list(dict.fromkeys(row["measure"] for row in self.rows("descriptives")))
 
     def participant_means(self, measure: str) -> pd.DataFrame:
-        """A row a participant, a column a condition."""
+        """One row per participant and one column per condition."""
         return tables.participant_means(self.measures, measure, self.study.conditions)
 
     def figure(
@@ -108,7 +108,7 @@ def draw_now(path: Path, drawing: Drawing[...], *arguments: Any) -> Figure:
 
 
 def safe_name(text: str) -> str:
-    """A name fit for a file, different for different texts: letters, digits and dashes."""
+    """A file name of letters, digits and dashes, different for different texts."""
     plain = "-".join("".join(c if c.isalnum() and c.isascii() else " " for c in text).split()).lower()
     if plain == text.replace("_", "-").replace("/", "-") and len(plain) <= _NAME_LENGTH:
         return plain
@@ -116,10 +116,10 @@ def safe_name(text: str) -> str:
 
 
 def first_of(shown: int, there: int, what: str) -> str:
-    """That a figure shows the first of many, or nothing where it shows all."""
+    """A sentence that a figure shows only the first of many; nothing if it shows all."""
     return f" The first {shown} of {there} {what}." if there > shown else ""
 
 
 def conditions_text(conditions: Sequence[str]) -> str:
-    """The conditions for a sentence, the baseline named."""
+    """The conditions in a sentence, with the baseline named."""
     return f"{listing(list(conditions))} ({conditions[0]} is the baseline)" if len(conditions) > 1 else conditions[0]

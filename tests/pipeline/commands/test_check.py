@@ -111,7 +111,7 @@ def test_the_same_test_twice_is_two_rows(folder: Folder, check: Check) -> None:
 
 @pytest.mark.parametrize(
     ("text", "told"),
-    [("{", "not valid JSON"), ("[1]", "should hold one object"), ("[" * 100_000, "not valid JSON")],
+    [("{", "not valid JSON"), ("[1]", "should hold one JSON object"), ("[" * 100_000, "not valid JSON")],
 )
 def test_expected_numbers_that_cannot_be_read(folder: Folder, check: Check, text: str, told: str) -> None:
     root = folder(SETTINGS, **{"measures.csv": MEASURES, "expected.json": text})

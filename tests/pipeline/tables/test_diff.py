@@ -204,7 +204,7 @@ def test_provenance_of_other_results_explains_nothing(study: Path, diff: Diff) -
     assert ran.code == 0
     assert "belongs to other results than results.json there; it is not used" in ran.err
     assert "alpha 0.05 0.1" in lines(ran.out)
-    for text, said in (("{", "not valid JSON"), ("[]", "should hold one object")):
+    for text, said in (("{", "not valid JSON"), ("[]", "should hold one JSON object")):
         (other / "provenance.json").write_text(text)
         assert said in diff(one, other).err
     (other / "provenance.json").write_text('{"settings": [1], "versions": 3, "studies": {"x": null}}')
@@ -258,20 +258,23 @@ def test_results_of_replays_are_compared_by_study_and_variant(folder: Folder, di
         ("{", "results.json: not valid JSON"),
         ("[" * 100_000, "not valid JSON"),
         ("\ud800".encode("utf-8", "surrogatepass"), "not valid JSON"),
-        ('{"schema_version": 1, "study": {"alpha": NaN}}', "NaN is no finite number"),
-        ('{"schema_version": 1, "study": {"alpha": 1e999}}', "1e999 is no finite number"),
+        ('{"schema_version": 1, "study": {"alpha": NaN}}', "NaN is not a finite number"),
+        ('{"schema_version": 1, "study": {"alpha": 1e999}}', "1e999 is not a finite number"),
         (f'{{"schema_version": 1, "study": {{"alpha": {"9" * 400}}}}}', "not valid JSON"),
-        ("[]", "should hold one object"),
-        ("{}", "is no results.json of Steadyhand: it has no schema_version"),
+        ("[]", "should hold one JSON object"),
+        ("{}", "is not a results.json of Steadyhand: it has no schema_version"),
         ('{"schema_version": 1}', "it has no study"),
         ('{"schema_version": 1, "study": 3}', "it has no study"),
-        ('{"schema_version": 2, "study": {}}', "has schema_version 2, and this Steadyhand reads 1; write the results"),
+        ('{"schema_version": 2, "study": {}}', "has schema_version 2, but this Steadyhand reads 1; write the results"),
         ('{"schema_version": 1, "study": {"participants": 3}}', "participants should be an object"),
         ('{"schema_version": 1, "study": {}, "comparisons": 3}', "comparisons should be a list"),
-        ('{"schema_version": 1, "study": {}, "descriptives": [3]}', "descriptives: row 1 is no row of Steadyhand's"),
+        (
+            '{"schema_version": 1, "study": {}, "descriptives": [3]}',
+            "descriptives: row 1 is not a row that Steadyhand wrote",
+        ),
         (
             '{"schema_version": 1, "study": {}, "descriptives": [{"measure": "m", "condition": 7}]}',
-            "descriptives: row 1 should have condition, a text or null",
+            'descriptives: row 1 needs "condition", text or null',
         ),
     ],
 )
@@ -353,7 +356,7 @@ def test_rows_are_matched_whatever_their_order(before: list[dict[str, Any]], now
 
     assert not found(before, sorted(before, key=repr, reverse=True))
     both = found(before, now)
-    assert len(before) - len(both.gone) == len(now) - len(both.came)
+    assert len(before) - len(both.removed) == len(now) - len(both.added)
     of = {row["measure"] for row in before}, {row["measure"] for row in now}
-    assert {row.key["measure"] for row in both.gone} >= of[0] - of[1]
-    assert {row.key["measure"] for row in both.came} >= of[1] - of[0]
+    assert {row.key["measure"] for row in both.removed} >= of[0] - of[1]
+    assert {row.key["measure"] for row in both.added} >= of[1] - of[0]

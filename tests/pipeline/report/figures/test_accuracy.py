@@ -36,7 +36,7 @@ def test_least_error_and_least_lag_are_named(tmp_path: Path) -> None:
     assert {"raw", "good", "quick", "RMSE against the reference (mm)", "Lag behind the reference (ms)"} <= set(shown)
     assert "Error (n = 2 sessions)" in shown
     said = figures.errors.words(FOUND).caption
-    assert "Least RMSE: good, 10.00 mm; most: raw, 32.00 mm. Least lag: quick, 0 ms." in said
+    assert "Smallest RMSE: good, 10.00 mm; largest: raw, 32.00 mm. Smallest lag: quick, 0 ms." in said
 
 
 def test_intervals_of_the_trade_off_are_over_sessions(tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_calibration_pools_instants_and_not_shares(tmp_path: Path) -> None:
     np.testing.assert_allclose(share, [0.09, 0.6])
     shown = texts(figures.calibration(table), tmp_path)
     assert {"gp (n = 2 sessions)", "raw (n = 1 session)", "normal", "k (stated SDs)", "Within k SD (%)"} <= set(shown)
-    assert "where a normal has 95 %: gp 60 %, raw 60 %" in figures.calibration.words(table).caption
+    assert "where a normal distribution has 95 %: gp 60 %, raw 60 %" in figures.calibration.words(table).caption
 
 
 def test_many_sessions_are_a_band_of_nine_in_ten(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.report.figures.label_places import Label, placed, spans
+from pipeline.report.figures.label_places import Label, place_labels, spans
 
 FRAME = np.array([0.0, 0.0, 220.0, 180.0])
 RADIUS = 5.0
@@ -20,7 +20,7 @@ def size(text: str) -> tuple[float, float]:
 
 
 def labels(*marks: tuple[float, float]) -> list[Label]:
-    return placed(np.array(marks), list(range(1, len(marks) + 1)), size, FRAME, 10, RADIUS)
+    return place_labels(np.array(marks), list(range(1, len(marks) + 1)), size, FRAME, 10, RADIUS)
 
 
 def numbers_in(text: str) -> list[int]:

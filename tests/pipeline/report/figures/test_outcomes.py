@@ -144,9 +144,12 @@ def test_scales_are_of_one_height_and_none_is_cut() -> None:
 
 def test_the_box_plot_says_where_medians_are_lowest() -> None:
     wide = {"q/a": TIMES, "q/b": TIMES[["fusion", "kinect"]].set_axis(["kinect", "fusion"], axis=1)}
-    assert "the lowest median is in 1 under kinect and 1 under fusion" in figures.workload.words(wide).caption
+    assert (
+        "The lowest median is under kinect in 1 and under fusion in 1 of 2 scales."
+        in figures.workload.words(wide).caption
+    )
     equal = {"q/a": TIMES.assign(fusion=TIMES["kinect"])}
-    assert "0 under kinect and 0 under fusion; others tie" in figures.workload.words(equal).caption
+    assert "under kinect in 0 and under fusion in 0 of 1 scale; the others tie" in figures.workload.words(equal).caption
 
 
 def trial_rows(people: int, trials: int) -> pd.DataFrame:

@@ -55,7 +55,14 @@ def test_estimates_stand_beside_their_errors(excerpts: pd.DataFrame, tmp_path: P
     figure = figures.estimates(excerpts)
     assert len(figure.axes) == 4
     shown = texts(figure, tmp_path)
-    assert {"late", "good", "error: RMS 10.0 mm here", "error: RMS 1.0 mm here", "x (mm)", "error (mm)"} <= set(shown)
+    assert {
+        "late",
+        "good",
+        "error: RMS 10.0 mm in this stretch",
+        "error: RMS 1.0 mm in this stretch",
+        "x (mm)",
+        "error (mm)",
+    } <= set(shown)
     said = figures.estimates.words(excerpts).caption
     assert "good 1.0 mm, 0 % within ± 2 SD; late 10.0 mm, 100 % within ± 2 SD" in said
 
@@ -65,7 +72,7 @@ def test_estimates_without_reference_or_overlap(excerpts: pd.DataFrame, tmp_path
     assert len(figures.estimates(alone).axes) == 2
     assert "RMS" not in figures.estimates.words(alone).caption
     elsewhere = excerpts.assign(time_s=excerpts["time_s"].where(excerpts["kind"] != "reference", 900.0))
-    assert "error: not known" in texts(figures.estimates(elsewhere), tmp_path)
+    assert "error: unknown" in texts(figures.estimates(elsewhere), tmp_path)
     assert "nan" not in figures.estimates.words(elsewhere).caption
 
 
