@@ -1,7 +1,5 @@
 """The recipes of CONTRIBUTING.md, walked in a copy of the packages: what they add works, and touches no other files."""
 
-
-
 from __future__ import annotations
 
 import json
