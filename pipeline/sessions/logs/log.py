@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pipeline.statistics.arrays import FloatArray
 
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 Content = Literal["position", "acceleration", "events", "anything"]
 
@@ -22,6 +23,21 @@ class Wanted:
 
     topic: str
     content: Content
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What messages say beside their values, for checks alone; arrays (n,), or empty where the format does not tell.
+
+    `frame` counts into the names of `frames`. Of an IMU: the length of the orientation as logged, NaN where the log
+    says that it is unknown, and whether a covariance of −1 says to disregard acceleration or angular velocity.
+    """
+
+    frames: tuple[str, ...] = ()
+    frame: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    orientation_length: FloatArray = field(default_factory=lambda: np.zeros(0))
+    force_disclaimed: BoolArray = field(default_factory=lambda: np.zeros(0, np.bool_))
+    gyroscope_disclaimed: BoolArray = field(default_factory=lambda: np.zeros(0, np.bool_))
 
 
 @dataclass(frozen=True)
@@ -40,6 +56,7 @@ class Readings:
     lost: int | None = 0
     notes: tuple[str, ...] = ()
     sampled: bool = False
+    claims: Claims = Claims()
 
     @property
     def read(self) -> int:

@@ -14,7 +14,8 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from pipeline.errors import SessionError
-from pipeline.sessions.logs.log import Content, IntArray, Readings
+from pipeline.sessions.logs.log import Claims, Content, IntArray, Readings
+from pipeline.sessions.logs.mcap.claims import claimed
 from pipeline.sessions.logs.mcap.container import Walk
 from pipeline.sessions.logs.mcap.events import EVENTS_LIMIT, event
 from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields
@@ -55,6 +56,7 @@ def decode(walk: Walk, topic: str, content: Content) -> Readings:
     whole = np.ones(len(messages), bool)
     whole[list(failures)] = False
     kept = np.flatnonzero(whole)
+    claims = claimed(walk, messages, kept, content) if content in SAMPLED else Claims()
     return Readings(
         stamp[kept],
         messages.log_time[kept].astype(np.int64),
@@ -63,6 +65,7 @@ def decode(walk: Walk, topic: str, content: Content) -> Readings:
         _lost(walk, topic, len(failures)),
         _notes(failures),
         content in SAMPLED,
+        claims,
     )
 
 

@@ -1,0 +1,186 @@
+"""Events against the task, the streams and the display."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.sessions.checks.finding import Finding, Status
+from pipeline.sessions.checks.recorded import Positions, Recorded
+from pipeline.statistics.arrays import FloatArray
+
+TARGETS, SPAN, SHOWN = "targets", "span of the events", "selections"
+
+_AT_LEAST_MM = 10.0
+_EDGE_S = 2.0
+_FAR = 20.0  # times the extent of the movement
+_SHIFTS_S = np.arange(-5.0, 5.001, 0.05)
+_OFF_MM, _OFF_RED_MM = 10.0, 50.0
+_SELECTIONS_MIN = 3
+_AS_LOW_MM = 0.5
+_EXPLAINS = 0.4  # of the distance that is left once a mistake is undone
+
+
+def targets(recorded: Recorded) -> Iterator[Finding]:
+    """The events' targets against those of the task; without a task, against where the hand ever was."""
+    if recorded.events is None:
+        return
+    there = recorded.events.target_mm[np.isfinite(recorded.events.target_mm[:, :2]).all(axis=1)]
+    if not len(there):
+        return
+    if recorded.targets_mm is not None and len(recorded.targets_mm):
+        yield from _against_task(there[:, :2], recorded.targets_mm, max(recorded.target_size_mm, _AT_LEAST_MM))
+    else:
+        yield from _against_reach(recorded, there)
+
+
+def _against_task(there: FloatArray, task: FloatArray, tolerance_mm: float) -> Iterator[Finding]:
+    off = _nearest_mm(there, task)
+    wrong = int(np.sum(off > tolerance_mm))
+    found, expected = f"{wrong} of {len(there)} where the task has none", "0"
+    if wrong == 0:
+        yield Finding(TARGETS, "green", found, expected)
+        return
+    tried = {
+        "they are in millimetres where metres are expected; log metres": there / 1e3,
+        "they are in centimetres where metres are expected; log metres": there / 1e2,
+        "x and y are exchanged; log them in the tracker's order": there[:, ::-1],
+        "y points the other way; log it in the tracker's frame": there * np.array([1.0, -1.0]),
+    }
+    left = {cause: float(np.mean(_nearest_mm(points, task) > tolerance_mm)) for cause, points in tried.items()}
+    cause = min(left, key=lambda one: left[one])
+    if left[cause] > 0.5 * wrong / len(there):
+        cause = "they are of another frame or task; correct task: in study.yaml or the events"
+    status: Status = "red" if wrong > len(there) / 2 else "amber"
+    example = ", ".join(f"{value:.0f}" for value in there[int(np.argmax(off))])
+    message = f"{wrong} of {len(there)} targets are where the task has none, such as ({example}) mm: {cause}"
+    yield Finding(TARGETS, status, found, expected, message)
+
+
+def _nearest_mm(points: FloatArray, task: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(points[:, None] - task[None], axis=2).min(axis=1))
+
+
+def _against_reach(recorded: Recorded, there: FloatArray) -> Iterator[Finding]:
+    hand = recorded.of_kind("reference") or recorded.of_kind("display") or recorded.tracker
+    if hand is None or len(hand.value_mm) < 10:
+        return
+    low, high = np.percentile(hand.value_mm[:, :2], [2, 98], axis=0)
+    extent = max(float(np.max(high - low)), 100.0)
+    off = np.linalg.norm(np.clip(there[:, :2], low, high) - there[:, :2], axis=1)
+    far = int(np.sum(off > _FAR * extent))
+    found, expected = f"{far} of {len(there)} far from any movement", "0"
+    if far == 0:
+        yield Finding(TARGETS, "green", found, expected)
+        return
+    message = (
+        f"{far} of {len(there)} targets are {np.median(off) / 1e3:.3g} m from where the hand ever was: they are probably "
+        "in millimetres where metres are expected; log metres"
+    )
+    yield Finding(TARGETS, "red" if far > len(there) / 2 else "amber", found, expected, message)
+
+
+def span(recorded: Recorded) -> Iterator[Finding]:
+    """Selections outside the time in which anything was measured: the events are of another clock."""
+    events = recorded.events
+    times = [one.times.arrival_s for one in (*recorded.positions, *recorded.imus) if len(one.times.arrival_s)]
+    if events is None or not times or not events.selects.any():
+        return
+    begin, end = min(float(one.min()) for one in times), max(float(one.max()) for one in times)
+    at = events.time_s[events.selects]
+    outside = (at < begin - _EDGE_S) | (at > end + _EDGE_S)
+    count = int(outside.sum())
+    found, expected = f"{count} of {len(at)} selections outside the streams", "0"
+    if count == 0:
+        yield Finding(SPAN, "green", found, expected)
+        return
+    by_s = float(np.median(at) - (begin + end) / 2)
+    by = f"{by_s / 3600:+.1f} h" if abs(by_s) > 1000 else f"{by_s:+.0f} s"
+    message = (
+        f"{count} of {len(at)} selections are outside the time in which the streams were recorded, by about {by}: the "
+        "events are of another clock or time zone; log them with the recorder's clock"
+    )
+    yield Finding(SPAN, "red", found, expected, message)
+
+
+def selections(recorded: Recorded) -> Iterator[Finding]:
+    """Where the events say a selection was against what was displayed then; the tracker where nothing was displayed.
+
+    A clock, a unit or an axis that differs shows at once, because the hand is somewhere else a moment later. A display
+    that is late by less than the hand takes to move 10 mm is not told.
+    """
+    events = recorded.events
+    shown = recorded.of_kind("display") or recorded.of_kind("reference") or recorded.tracker
+    if events is None or shown is None or len(shown.value_mm) < 10:
+        return
+    rows = events.selects & np.isfinite(events.selected_mm[:, :2]).all(axis=1)
+    time, at = events.time_s[rows], events.selected_mm[rows][:, :2]
+    known = _within(shown, time)
+    if known.sum() < _SELECTIONS_MIN:
+        return
+    time, at = time[known], at[known]
+    off = _apart(shown, time, at)
+    here = float(np.median(off))
+    found, expected = f"{here:.3g} mm from {shown.name}", "as displayed"
+    cause = _selection_cause(shown, time, at, here) if here > _limit(shown, time, at) else ""
+    if not cause:
+        yield Finding(SHOWN, "green", found, expected)
+        return
+    message = f'the recorded selections are {here:.3g} mm from "{shown.name}" at that instant: {cause}'
+    yield Finding(SHOWN, "red" if here > _OFF_RED_MM else "amber", found, expected, message)
+
+
+def _limit(shown: Positions, time: FloatArray, at: FloatArray) -> float:
+    """How far off is not yet a contradiction: 10 mm, or for a sensor four times its noise."""
+    if shown.kind == "display":
+        return _OFF_MM
+    return max(_OFF_MM, 4.0 * (shown.noise_sd_mm or 0.0) * np.sqrt(2.0))
+
+
+def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: float) -> str:
+    """The mistake that explains most of it, in words; "" where none does."""
+    shifts = np.array([float(np.mean(_apart(shown, time + shift, at))) for shift in _SHIFTS_S])
+    best = _middle_of_lowest(shifts)
+    tried = {
+        "they are in millimetres where metres are expected; log metres": at / 1e3,
+        "x and y are exchanged; log them in the tracker's order": at[:, ::-1],
+        "y points the other way; log it in the tracker's frame": at * np.array([1.0, -1.0]),
+    }
+    left = {cause: float(np.median(_apart(shown, time, points))) for cause, points in tried.items()}
+    likely = min(left, key=lambda one: left[one])
+    if left[likely] < min(_EXPLAINS * here, float(shifts[best])):
+        return likely
+    if shifts[best] < _EXPLAINS * here and abs(_SHIFTS_S[best]) >= 0.1:
+        by = _SHIFTS_S[best]
+        return (
+            f"they fit {abs(by):.1f} s {'earlier' if by < 0 else 'later'}, so the events' clock is "
+            f"{'late' if by < 0 else 'early'}; log events with the recorder's clock"
+        )
+    if here > _OFF_RED_MM and shown.kind == "display":
+        return "they are of another clock or frame; log what was displayed, with the recorder's clock"
+    return ""
+
+
+def _middle_of_lowest(cost: FloatArray) -> int:
+    """Where it is lowest; where it is as low for a while, as for a hand that rests, the middle of that."""
+    low = high = int(np.argmin(cost))
+    enough = cost[low] + _AS_LOW_MM
+    while low > 0 and cost[low - 1] <= enough:
+        low -= 1
+    while high < len(cost) - 1 and cost[high + 1] <= enough:
+        high += 1
+    return (low + high) // 2
+
+
+def _within(shown: Positions, time: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    stamps = shown.times.stamp_s
+    return (time >= stamps.min()) & (time <= stamps.max())
+
+
+def _apart(shown: Positions, time: FloatArray, at: FloatArray) -> FloatArray:
+    """Distances (n,) in mm between points and what was there at some times."""
+    stamps, first = np.unique(shown.times.stamp_s, return_index=True)
+    value = shown.value_mm[first]
+    there = np.column_stack([np.interp(time, stamps, value[:, axis]) for axis in (0, 1)])
+    return np.asarray(np.linalg.norm(there - at, axis=1))

@@ -1,0 +1,305 @@
+"""One movement seen twice: a tracker's positions against a phone's accelerations, so that either can be doubted.
+
+Theory of operation. In one frame the accelerations are the second derivative of the positions. Neither can be used as
+it is: a tracker's noise, derived twice, drowns the movement, and an accelerometer's offset, summed twice, runs away.
+Both are therefore brought into one band by the same zero-phase filter H, on one grid:
+
+    positions      p(f) · H(f)                 H: 0.3 to 4 Hz, where hands move and neither sensor is at its worst
+    accelerations  a(f) · H(f) / −(2πf)²       a position again, finite because H falls as f⁴ towards 0
+
+and p(t) ≈ A q(t − lag) with a 3 × 3 matrix A, the identity where all is well:
+
+- the lag is where |p|² is explained best by *any* A, so that a turned or mirrored frame does not move it;
+- A's size is the ratio of the units, the sign of its determinant a reflection, its rotation a turn of the frame
+  (the orthogonal Procrustes problem, by the singular values of the cross-products C = Σ p qᵀ).
+
+A direction in which nothing moves says nothing of the frame. Two to four times what C's diagonal comes to by
+chance (what A leaves of p, beside blocks of q it has nothing to do with) is added to it first: this decides where the
+data do not, and is nothing beside a movement that both saw.
+
+The errors of both sensors are correlated over time. Intervals come from resampling blocks of 2 s (a moving-block
+bootstrap), of which only cross-products are needed: everything after the filters is sums over blocks. What must hold:
+the same H for both, no phase in it, and no block that sees a gap. A periodic movement fits at several lags, and its
+interval then says so; a hand that rests tells nothing, and the interval is as wide as the search.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.statistics.arrays import FloatArray
+
+LAG_RANGE_S = 0.6
+_STEP_S = 0.04
+_LOW_HZ, _HIGH_HZ = 0.3, 4.0
+_BLOCK = 50  # grid steps: 2 s
+_MARGIN = 25  # grid steps over which the filter rings
+_BLOCKS_MIN = 4
+_GAP_S = 0.25
+_RESAMPLES = 200
+_RIDGE = 1e-3  # of the accelerations' power: an axis without movement takes no part in the fit
+_SHORTEST = 10  # readings
+_DEALT = 16  # ways of dealing blocks
+_LEFT_MIN = 0.02  # of an axis's variance, that is never taken for explained
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def width(self) -> float:
+        """From the lower to the upper end."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What two sensors say of one movement. `lag_s`: how much later the positions' stamps are than the phone's.
+
+    `explained` is the share of the positions' variance in the band that the accelerations account for, `position_mm`
+    and `acceleration_mm` its SD in either. `scale` is the positions' size over the accelerations', too
+    small where those are mostly noise, and `scale_most` what it would be if the positions were; `turn_deg` the angle
+    between the frames, about any axis, NaN where the heading is not known; `mirrored` the share of resamples in which a
+    reflection fits better than any turn. `axes` names what the phone calls the tracker's x, y, z, such as "+y -x +z".
+    """
+
+    explained: float
+    position_mm: float
+    acceleration_mm: float
+    seconds: float
+    lag_s: Interval
+    scale: Interval
+    scale_most: float
+    turn_deg: Interval
+    mirrored: float
+    axes: str
+
+
+def compare(
+    tracker_s: FloatArray,
+    position_mm: FloatArray,
+    imu_s: FloatArray,
+    acceleration_mm_s2: FloatArray,
+    heading_known: bool = True,
+) -> Compared | None:
+    """Positions (n, 3) and accelerations (m, 3), each by its own stamps; None if less than 10 s are common to both.
+
+    A constant in the accelerations, such as gravity, does not matter. Without `heading_known` the accelerations are
+    upright but turned about the third axis by an unknown angle.
+    """
+    tracker_s, position_mm = _rising(tracker_s, position_mm)
+    imu_s, acceleration_mm_s2 = _rising(imu_s, acceleration_mm_s2)
+    if min(len(tracker_s), len(imu_s)) < _SHORTEST:
+        return None
+    begin, end = max(tracker_s[0], imu_s[0]), min(tracker_s[-1], imu_s[-1])
+    grid = begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), 10_000_000)))
+    rows = _blocks(grid, tracker_s, imu_s)
+    if len(rows) < _BLOCKS_MIN:
+        return None
+    seen = _filtered(_averaged(grid, tracker_s, position_mm), 0)
+    felt = _filtered(_averaged(grid, imu_s, acceleration_mm_s2), 2)
+    return _Blocks.of(seen, felt, rows).compared(heading_known)
+
+
+def _rising(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    time, first = np.unique(time, return_index=True)
+    return time, value[first]
+
+
+def _averaged(grid: FloatArray, time: FloatArray, value: FloatArray) -> FloatArray:
+    """Values on the grid: the mean over a grid step, so that what is faster than the grid does not fold into the band.
+
+    Of the straight lines between readings, by differences of their running integral.
+    """
+    lasting = np.diff(time)[:, None]
+    area = np.vstack([np.zeros(value.shape[1]), np.cumsum(lasting * (value[1:] + value[:-1]) / 2, axis=0)])
+    edges = np.append(grid - _STEP_S / 2, grid[-1] + _STEP_S / 2)
+    at = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, len(time) - 2)
+    since = np.clip((edges - time[at])[:, None], 0.0, lasting[at])
+    slope = (value[at + 1] - value[at]) / lasting[at]
+    inside = area[at] + since * (value[at] + slope * since / 2)
+    width = np.diff(np.clip(edges, time[0], time[-1]))[:, None]
+    return np.diff(inside, axis=0) / np.maximum(width, _STEP_S / 4)
+
+
+def _filtered(value: FloatArray, order: int) -> FloatArray:
+    """Values (n, d) on the grid in the band, integrated `order` times."""
+    length = _even_length(len(value) + round(4 / _LOW_HZ / _STEP_S))
+    frequency = np.fft.rfftfreq(length, _STEP_S)
+    low, high = (frequency / _LOW_HZ) ** 4, (frequency / _HIGH_HZ) ** 4
+    shape = (low / (1 + low) / (1 + high)).astype(complex)
+    shape[1:] /= (2j * np.pi * frequency[1:]) ** order
+    padded = np.zeros((value.shape[1], length))
+    padded[:, : len(value)] = (value - _without(value, order)).T
+    return np.ascontiguousarray(np.fft.irfft(np.fft.rfft(padded) * shape, length)[:, : len(value)].T)
+
+
+def _without(value: FloatArray, order: int) -> FloatArray:
+    """What is taken off first: of accelerations the mean, of positions a line, so that neither end is a jump."""
+    if order:
+        return value.mean(axis=0)
+    edge = min(5, len(value))
+    first, last = value[:edge].mean(axis=0), value[-edge:].mean(axis=0)
+    found: FloatArray = first + (last - first) * np.linspace(0.0, 1.0, len(value))[:, None]
+    return found
+
+
+def _even_length(least: int) -> int:
+    """The next length whose only factors are 2, 3 and 5, for which the transform is quick."""
+    best = 1 << (least - 1).bit_length()
+    for odd in (3, 5, 9, 15):
+        power = odd << max(0, (-(-least // odd) - 1).bit_length())
+        if power >= least:
+            best = min(best, power)
+    return best
+
+
+def _blocks(grid: FloatArray, tracker_s: FloatArray, imu_s: FloatArray) -> npt.NDArray[np.int64]:
+    """The grid rows (blocks, 50) of each block that neither an end nor a gap comes near."""
+    reach = max(_MARGIN, round(LAG_RANGE_S / _STEP_S) + 1)
+    count = max(0, len(grid) - 2 * reach) // _BLOCK
+    if count == 0:
+        return np.zeros((0, _BLOCK), np.int64)
+    broken = np.zeros(len(grid))
+    for time in (tracker_s, imu_s):
+        at = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
+        broken += time[at] - time[at - 1] > _GAP_S
+    near = np.convolve(broken, np.ones(2 * _MARGIN + 1), "same") > 0.5
+    rows = reach + np.arange(count * _BLOCK).reshape(count, _BLOCK)
+    kept: npt.NDArray[np.int64] = rows[~near[rows].any(axis=1)]
+    return kept
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Cross-products of each block: `cross` (blocks, shifts, 3, 3) of p and q, `own` (blocks, 3, 3) of q, `power` (blocks, 3) of p.
+
+    `chance` (3,) is the size of the diagonal of Σ p qᵀ where p and q have nothing to do with each other.
+    """
+
+    cross: FloatArray
+    own: FloatArray
+    power: FloatArray
+    chance: FloatArray
+
+    @staticmethod
+    def of(seen: FloatArray, felt: FloatArray, rows: npt.NDArray[np.int64]) -> _Blocks:
+        """For every shift within the range."""
+        reach = round(LAG_RANGE_S / _STEP_S)
+        positions = seen[rows]
+        own = np.einsum("bti,btj->bij", felt[rows], felt[rows])
+        starts = rows[:, 0, None] - reach + np.arange(2 * reach + 1)[::-1]  # shift s looks s rows back
+        windows = np.lib.stride_tricks.sliding_window_view(felt, _BLOCK, axis=0)  # (rows, 3, block)
+        later = windows[starts].reshape(len(rows), -1, _BLOCK)
+        cross = (later @ positions).reshape(len(rows), 2 * reach + 1, 3, 3)
+        power = np.einsum("bti,bti->bi", positions, positions)
+        return _Blocks(cross.transpose(0, 1, 3, 2), own, power, _chance(positions, felt[rows]))
+
+    @cached_property
+    def shifts_s(self) -> FloatArray:
+        """The lag at each shift."""
+        reach = round(LAG_RANGE_S / _STEP_S)
+        return _STEP_S * np.arange(-reach, reach + 1)
+
+    def compared(self, heading_known: bool) -> Compared:
+        """Everything, with intervals by resampled blocks, the same draws each time."""
+        count = len(self.power)
+        draws = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), _RESAMPLES).astype(float)
+        weights = np.vstack([np.ones(count), draws])  # the first is the session as it is
+        cross, own = np.tensordot(weights, self.cross, 1), np.tensordot(weights, self.own, 1)
+        power = np.maximum(weights @ self.power, 1e-300)
+        by_axis = _explained(cross, own)
+        explained = by_axis.sum(axis=2) / power.sum(axis=1)[:, None]
+        lag = _peak(explained, self.shifts_s)
+        at = int(np.argmin(np.abs(self.shifts_s - lag[0])))
+        if not heading_known:
+            cross = cross @ _about_vertical(cross[0, at])
+        turn, mirror, size = _procrustes(cross[:, at], own, self.chance * np.sqrt(np.clip(1 - by_axis[0, at] / power[0], _LEFT_MIN, 1.0)))
+        samples = count * _BLOCK
+        return Compared(
+            float(explained[0].max()),
+            float(np.sqrt(self.power.sum() / samples)),
+            float(np.sqrt(np.trace(own[0]) / samples)),
+            samples * _STEP_S,
+            _interval(lag),
+            _interval(size),
+            float(np.percentile(power.sum(axis=1) / np.maximum(size * np.trace(own, axis1=1, axis2=2), 1e-300), 97.5)),
+            _interval(turn if heading_known else np.full_like(turn, np.nan)),
+            float(np.mean(mirror[1:])) if mirror[0] else 0.0,
+            _axes(cross[0, at]),
+        )
+
+
+def _chance(positions: FloatArray, moved: FloatArray) -> FloatArray:
+    """The root mean square of Σ pᵢ qᵢ (3,) with the blocks of one dealt to others of the other."""
+    apart = range(1, min(len(positions), _DEALT + 1))
+    sums = [np.einsum("bti,bti->i", positions, np.roll(moved, shift, axis=0)) for shift in apart]
+    found: FloatArray = np.sqrt(np.mean(np.square(sums), axis=0))
+    return found
+
+
+def _explained(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """The diagonal of C S⁻¹ Cᵀ (n, shifts, 3): what the best A of each shift accounts for, by the axis of p."""
+    ridge = _RIDGE * np.trace(own, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-300 * np.eye(3)
+    inverse = np.linalg.inv(own + ridge)
+    found: FloatArray = np.einsum("nsij,nsij->nsi", cross @ inverse[:, None], cross)
+    return found
+
+
+def _peak(explained: FloatArray, shifts_s: FloatArray) -> FloatArray:
+    """The shift (n,) that explains most, between the grid's by a parabola."""
+    at = np.argmax(explained, axis=1)
+    row, inner = np.arange(len(at)), np.clip(at, 1, explained.shape[1] - 2)
+    before, here, after = (explained[row, inner + step] for step in (-1, 0, 1))
+    bend = before - 2 * here + after
+    part = np.divide(before - after, 2 * bend, out=np.zeros_like(bend), where=bend < 0)
+    found: FloatArray = shifts_s[at] + np.where(at == inner, np.clip(part, -0.5, 0.5), 0.0) * _STEP_S
+    return found
+
+
+def _about_vertical(cross: FloatArray) -> FloatArray:
+    """The turn about the third axis (3, 3) that brings q's heading to p's: cross @ turn is as if it were known."""
+    angle = np.arctan2(cross[1, 0] - cross[0, 1], cross[0, 0] + cross[1, 1])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]).T
+
+
+def _procrustes(
+    cross: FloatArray, own: FloatArray, chance: FloatArray
+) -> tuple[FloatArray, npt.NDArray[np.bool_], FloatArray]:
+    """Angle in degrees, whether a reflection fits better, and size (n,) of the A nearest to each C (n, 3, 3)."""
+    left, _, right = np.linalg.svd(cross + 4 * np.diag(chance))
+    mirrored = np.linalg.det(left @ right) < 0
+    left, _, right = np.linalg.svd(cross + 2 * np.diag(chance))
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    rotation = left @ right
+    angle = np.degrees(np.arccos(np.clip((np.trace(rotation, axis1=1, axis2=2) - 1) / 2, -1.0, 1.0)))
+    own_power = np.maximum(np.trace(own, axis1=1, axis2=2), 1e-300)
+    size = np.sum(np.linalg.svd(cross, compute_uv=False), axis=1) / own_power
+    return angle, mirrored, size
+
+
+def _interval(found: FloatArray) -> Interval:
+    """The first, with the 2.5 and 97.5 percentile of the others."""
+    low, high = np.percentile(found[1:], [2.5, 97.5])
+    return Interval(float(found[0]), float(low), float(high))
+
+
+def _axes(cross: FloatArray) -> str:
+    """Which of the phone's axes each of the tracker's is nearest to, with its sign."""
+    strength = np.abs(cross) / max(float(np.abs(cross).max()), 1e-300)
+    orders = np.array([(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)])
+    order = orders[int(np.argmax([strength[np.arange(3), one].sum() for one in orders]))]
+    names = []
+    for row, column in enumerate(order):
+        names.append(f"{'-' if cross[row, column] < 0 else '+'}{'xyz'[column]}")
+    return " ".join(names)

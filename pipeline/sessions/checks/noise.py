@@ -1,0 +1,110 @@
+"""The sensors' noise, found in the readings themselves, against what study.yaml states.
+
+Theory. A hand is slow beside a sensor's rate: over four successive readings its path is nearly a parabola, which the
+third difference takes away, while white noise of SD s leaves one of √20 s. What is left of the movement only adds, so
+stretches in which the steps are far larger than that are left out, and of the others the quietest quarter is looked at:
+a brisk hand that never pauses is not judged. Noise that is correlated from reading to reading, such as a filtered
+tracker's, leaves less and is not seen. A quarter chosen for being quiet is quieter than white noise is: by a
+seventh for windows of 30 readings of three axes and a quarter for one axis, as simulated; this is made good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.sessions.checks.finding import Finding, Status
+from pipeline.sessions.checks.recorded import Recorded, Times
+from pipeline.statistics.arrays import FloatArray
+
+TRACKER_NOISE, IMU_NOISE = "tracker noise", "accelerometer noise"
+
+_SCALE = np.sqrt(20.0)  # of the third difference: 1 + 9 + 9 + 1
+_QUIET = 0.25
+_WINDOW = 30  # readings
+_QUIETEST = (0.76, 0.83, 0.86)  # what is found of white noise of SD 1, by the number of axes
+_LIKE_NOISE = 0.25  # of the steps: noise alone leaves 0.7 of them, a movement far less
+_EVEN = 0.5  # of a step: by how much four readings may be unevenly spaced
+_TRACKER = (1.5, 2.5)
+_IMU = (4.0, 10.0)
+
+
+def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
+    """The tracker's noise against `noise_sd_mm`: understated it makes every filter believe too much.
+
+    Only above it: a tracker that smooths has a slow error, which is as large and leaves no scatter.
+    """
+    for positions in recorded.positions:
+        if positions.noise_sd_mm is None:
+            continue
+        measured = noise_sd(positions.times, positions.value_mm)
+        if measured is None or measured == 0:
+            continue
+        ratio = measured / positions.noise_sd_mm
+        found, expected = f"{positions.name}: {measured:.2g} mm", f"{positions.noise_sd_mm:g} mm by study.yaml"
+        status: Status = "red" if ratio > _TRACKER[1] else "amber" if ratio > _TRACKER[0] else "green"
+        if status != "green":
+            message = (
+                f'the readings of "{positions.name}" scatter by {measured:.2g} mm and study.yaml states '
+                f"{positions.noise_sd_mm:g}: set noise_sd_mm: {measured:.2g}, else the fusion believes them too much"
+            )
+        else:
+            message = ""
+        yield Finding(TRACKER_NOISE, status, found, expected, message)
+
+
+def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
+    """The accelerometer's noise against `noise_sd_mm_s2`. Only above it: what is stated stands for tilt errors too."""
+    for imu in recorded.imus:
+        if imu.noise_sd_mm_s2 is None:
+            continue
+        measured = noise_sd(imu.times, imu.force_m_s2 * 1e3)
+        if measured is None:
+            continue
+        ratio = measured / imu.noise_sd_mm_s2
+        found, expected = f"{imu.name}: {measured:.2g} mm/s²", f"{imu.noise_sd_mm_s2:g} mm/s² by study.yaml"
+        status: Status = "red" if ratio > _IMU[1] else "amber" if ratio > _IMU[0] else "green"
+        message = ""
+        if status != "green":
+            message = (
+                f'the readings of "{imu.name}" scatter by {measured:.2g} mm/s² and study.yaml states '
+                f"{imu.noise_sd_mm_s2:g}: set noise_sd_mm_s2: {measured:.2g}, or look for vibration"
+            )
+        yield Finding(IMU_NOISE, status, found, expected, message)
+
+
+def noise_sd(times: Times, value: FloatArray) -> float | None:
+    """SD of the white noise per axis in the quietest quarter of the readings (n, d); None with fewer than 100.
+
+    Repeated readings are left out, and so are unevenly spaced ones.
+    """
+    stamp_s, first = np.unique(times.stamp_s, return_index=True)
+    value = value[first]
+    fresh = np.concatenate([[True], np.any(np.diff(value, axis=0) != 0, axis=1)])
+    stamp_s, value = stamp_s[fresh], value[fresh]
+    if len(stamp_s) < 100:
+        return None
+    steps = np.diff(stamp_s)
+    usual = float(np.median(steps))
+    even = np.abs(steps - usual) < _EVEN * usual
+    third = np.diff(value, 3, axis=0)
+    sound = even[:-2] & even[1:-1] & even[2:]
+    left = third[sound] / _SCALE
+    alive = np.any(left != 0, axis=0)  # an axis that is constant has no noise to be judged
+    count = len(left) // _WINDOW
+    if count < 3 or not alive.any():
+        return None
+    variance = _by_window(left[:, alive], count)
+    moved = _by_window((np.diff(value, axis=0)[1:-1][sound])[:, alive], count)
+    variance = variance[variance > _LIKE_NOISE**2 * moved]
+    if len(variance) < 3:
+        return None
+    quiet = np.sort(variance)[: max(2, round(_QUIET * len(variance)))]
+    return float(np.sqrt(np.mean(quiet))) / _QUIETEST[int(alive.sum()) - 1]
+
+
+def _by_window(values: FloatArray, count: int) -> FloatArray:
+    """The mean square (count,) of values (n, d) over each so many readings."""
+    found: FloatArray = np.mean(values[: count * _WINDOW].reshape(count, -1) ** 2, axis=1)
+    return found

@@ -1,0 +1,111 @@
+"""A log's readings as the checks look at them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
+from pipeline.sessions.logs.log import Log, Readings
+from pipeline.statistics.arrays import FloatArray
+from pipeline.study.settings import Study
+from pipeline.study.streams import AccelerationStream, DisplayStream, PositionStream, ReferenceStream, Stream
+from pipeline.tables.columns import S_PER_NS
+
+_MM_PER_M = 1000.0
+
+
+def of_log(log: Log, study: Study) -> Recorded:
+    """The streams that study.yaml names and the log has."""
+    there = {name: log.topics[one.topic] for name, one in study.streams.items() if one.topic in log.topics}
+    read = [readings for readings in there.values() if readings.read]
+    origin_ns = min((int(readings.arrival_ns.min()) for readings in read), default=0)
+    positions, imus = [], []
+    for name, readings in there.items():
+        stream = study.streams[name]
+        if not readings.read:
+            continue
+        if isinstance(stream, AccelerationStream):
+            imus.append(imu(name, readings, origin_ns, stream))
+        elif isinstance(stream, PositionStream | ReferenceStream | DisplayStream):
+            positions.append(of_positions(name, readings, origin_ns, stream))
+    happened = log.topics.get(study.events.topic) if study.events is not None else None
+    task = study.task
+    return Recorded(
+        tuple(positions),
+        tuple(imus),
+        None if happened is None or not happened.read else events(happened, origin_ns),
+        np.array(task.targets_mm) if task is not None and task.targets_mm else None,
+        task.target_diameter_mm if task is not None else 0.0,
+    )
+
+
+def times(readings: Readings, origin_ns: int, stream: Stream | None = None) -> Times:
+    """When they were stamped and arrived, and how late study.yaml says that the stamps are."""
+    late_s = stream.latency_s if stream is not None and stream.stamp == "arrival" else 0.0
+    return Times(readings.stamp_ns, readings.arrival_ns, origin_ns, late_s)
+
+
+def of_positions(
+    name: str, readings: Readings, origin_ns: int, stream: PositionStream | ReferenceStream | DisplayStream | None = None
+) -> Positions:
+    """A stream of positions, those that are not finite left out."""
+    whole = np.isfinite(readings.values).all(axis=1)
+    kept = _kept(readings, whole)
+    return Positions(
+        name,
+        "position" if stream is None else stream.kind,
+        times(kept, origin_ns, stream),
+        kept.values * _MM_PER_M,
+        stream.noise_sd_mm if isinstance(stream, PositionStream) else None,
+        _frames(readings, whole),
+    )
+
+
+def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStream | None = None) -> Imu:
+    """A stream of accelerations, those that are not finite left out."""
+    whole = np.isfinite(readings.values[:, :6]).all(axis=1)
+    kept, claims = _kept(readings, whole), readings.claims
+    count = kept.read
+
+    def of(column: FloatArray, otherwise: float) -> FloatArray:
+        return column[whole] if len(column) else np.full(count, otherwise)
+
+    return Imu(
+        name,
+        times(kept, origin_ns, stream),
+        kept.values[:, :3],
+        kept.values[:, 3:6],
+        kept.values[:, 6:10],
+        of(claims.orientation_length, np.nan),
+        of(claims.force_disclaimed.astype(float), 0.0) > 0,
+        of(claims.gyroscope_disclaimed.astype(float), 0.0) > 0,
+        None if stream is None else stream.gravity_mm_s2,
+        None if stream is None else stream.noise_sd_mm_s2,
+        _frames(readings, whole),
+    )
+
+
+def _kept(readings: Readings, whole: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Readings:
+    return Readings(readings.stamp_ns[whole], readings.arrival_ns[whole], readings.values[whole])
+
+
+def _frames(readings: Readings, whole: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Frames:
+    claims = readings.claims
+    return Frames(claims.frames, claims.frame[whole]) if len(claims.frame) else Frames()
+
+
+def events(readings: Readings, origin_ns: int) -> Events:
+    """Events by arrival."""
+    order = np.argsort(readings.arrival_ns, kind="stable")
+    listed = [readings.events[at] for at in order]
+
+    def column(name: str) -> FloatArray:
+        values = [one.get(name) for one in listed]
+        return np.array([value * _MM_PER_M if isinstance(value, float) else np.nan for value in values])
+
+    return Events(
+        (readings.arrival_ns[order] - origin_ns) * S_PER_NS,
+        np.array([one["type"] == "selection" for one in listed], bool),
+        np.column_stack([column(f"target_{axis}") for axis in "xyz"]),
+        np.column_stack([column(axis) for axis in "xyz"]),
+    )

@@ -1,0 +1,231 @@
+"""Orientation and gyroscope: whether they describe one turning, and whether a quaternion is one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.sessions.checks.finding import Finding, Status, graded
+from pipeline.sessions.checks.recorded import Imu, Recorded
+from pipeline.statistics.arrays import FloatArray
+
+TURNING, LENGTH, DISCLAIMED = "gyroscope", "orientation", "covariances"
+
+_SPAN_S = 0.1  # over which turns are compared: longer than a reading, shorter than a turn
+_TURNS_RAD_S = 0.05  # the root mean square of a phone that turns at all
+_AMBER, _RED = 1.15, 1.6  # recordings without a fault: 0.97 to 1.01; degrees per second: 57
+_ALIKE = 0.5  # correlation below which two turnings are not one
+_DEGREES = (25.0, 130.0)
+_STILL = 0.005  # of the other: less than any unit would make of it
+_UNIT = (0.98, 1.02)
+_SMOOTH_S = 0.5
+_STRAY_SHARE = 0.001
+
+
+def gyroscope(recorded: Recorded) -> Iterator[Finding]:
+    """The gyroscope against the turning of the orientation; against that of gravity where the log has none.
+
+    A phone that does not turn says nothing. Without an orientation only degrees per second are told from rad/s.
+    """
+    for imu in recorded.imus:
+        if len(imu.force_m_s2) < 20:
+            continue
+        if imu.oriented.sum() > len(imu.oriented) / 2:
+            yield from _against_orientation(imu)
+        else:
+            yield from _against_gravity(imu)
+
+
+def _against_orientation(imu: Imu) -> Iterator[Finding]:
+    turning = _turning(imu)
+    if turning is None:
+        return
+    rate, measured = turning
+    turns, reads = _rms(rate), _rms(measured)
+    expected = "0.87 to 1.15 times the turning of the orientation"
+    if max(turns, reads) < _TURNS_RAD_S:
+        return
+    if turns < _STILL * reads:
+        yield Finding(
+            TURNING,
+            "red",
+            f"{imu.name}: turns by {reads:.2g} rad/s, the orientation does not",
+            expected,
+            f'the gyroscope of "{imu.name}" turns and its orientation does not: the orientation is frozen or a '
+            "placeholder; log the real one, or say that it is unknown by orientation_covariance[0] = -1",
+        )
+        return
+    if reads < _STILL * turns:
+        yield Finding(
+            TURNING,
+            "amber",
+            f"{imu.name}: {reads:.2g} rad/s while the orientation turns by {turns:.2g}",
+            expected,
+            f'the orientation of "{imu.name}" turns and its gyroscope reads nothing: it is not logged; log it, '
+            "for it carries an orientation over gaps",
+        )
+        return
+    ratio = float(np.sum(rate * measured) / np.sum(rate**2))
+    alike = float(np.sum(rate * measured) / np.sqrt(np.sum(rate**2) * np.sum(measured**2)))
+    found = f"{imu.name}: {ratio:.3g} times, correlation {alike:.2f}"
+    status: Status = "red" if alike < _ALIKE else graded(max(ratio, 1 / max(ratio, 1e-9)), _AMBER, _RED)
+    yield Finding(TURNING, status, found, expected, "" if status == "green" else _turning_message(imu, ratio, alike))
+
+
+def _turning_message(imu: Imu, ratio: float, alike: float) -> str:
+    if alike >= _ALIKE and _DEGREES[0] < ratio < _DEGREES[1]:
+        return (
+            f'the gyroscope of "{imu.name}" reads {ratio:.0f} times what the orientation turns: it is in degrees per '
+            "second; multiply by π/180 when logging"
+        )
+    if alike < _ALIKE:
+        return (
+            f'gyroscope and orientation of "{imu.name}" do not describe one turning: the orientation is inverted (the '
+            "conjugate) or in another order (w first), or the gyroscope's axes are exchanged; log x, y, z, w from body "
+            "to tracker frame"
+        )
+    return (
+        f'the gyroscope of "{imu.name}" reads {ratio:.2g} times what the orientation turns: its unit or range is wrong, '
+        "or the orientation is smoothed; log rad/s"
+    )
+
+
+def _turning(imu: Imu) -> tuple[FloatArray, FloatArray] | None:
+    """Angular velocities (k, 3) in rad/s by the orientation and by the gyroscope, each over 0.1 s."""
+    rows = np.flatnonzero(imu.oriented)
+    order = rows[np.argsort(imu.times.stamp_s[rows], kind="stable")]
+    time = imu.times.stamp_s[order]
+    if time[-1] - time[0] < 2.0:
+        return None
+    starts = np.searchsorted(time, np.arange(time[0], time[-1], _SPAN_S))
+    starts = np.unique(starts[starts < len(time)])
+    first, last = starts[:-1], starts[1:]
+    span = time[last] - time[first]
+    whole = (span > _SPAN_S / 2) & (span < 2 * _SPAN_S)
+    before, after = (imu.orientation_xyzw[order[at[whole]]] for at in (first, last))
+    total = np.vstack([np.zeros(3), np.cumsum(imu.gyroscope_rad_s[order], axis=0)])
+    measured = (total[last] - total[first])[whole] / (last - first)[whole, None]
+    if whole.sum() < 10:
+        return None
+    return rotation_vector(before, after) / span[whole, None], measured
+
+
+def rotation_vector(before: FloatArray, after: FloatArray) -> FloatArray:
+    """The turn (n, 3) in rad, in the body's frame, between quaternions (n, 4) of about unit length."""
+    vector = before[:, 3:] * after[:, :3] - after[:, 3:] * before[:, :3] - np.cross(before[:, :3], after[:, :3])
+    scalar = np.sum(before * after, axis=1)
+    vector, scalar = vector * np.where(scalar < 0, -1.0, 1.0)[:, None], np.abs(scalar)
+    length = np.linalg.norm(vector, axis=1)
+    angle = 2 * np.arctan2(length, scalar)
+    found: FloatArray = vector * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 2.0)[:, None]
+    return found
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
+
+
+def _against_gravity(imu: Imu) -> Iterator[Finding]:
+    """In the phone's frame the vertical u turns by du/dt = u × ω; smoothed, the force points along u."""
+    ratio = _gravity_ratio(imu)
+    if ratio is None:
+        return
+    slope, alike = ratio
+    found, expected = f"{imu.name}: {slope:.2g} times the turning of gravity", "0.1 to 3 times"
+    if alike < 0.3 or slope < 10:
+        yield Finding(TURNING, "green", found, expected)
+        return
+    yield Finding(
+        TURNING,
+        "red",
+        found,
+        expected,
+        f'the gyroscope of "{imu.name}" reads {slope:.0f} times what gravity turns: it is in degrees per second; '
+        "multiply by π/180 when logging",
+    )
+
+
+def _gravity_ratio(imu: Imu) -> tuple[float, float] | None:
+    """How much faster the gyroscope turns than the vertical, and their correlation; None where neither turns."""
+    time, first = np.unique(imu.times.stamp_s, return_index=True)
+    if len(time) < 50 or time[-1] - time[0] < 5.0:
+        return None
+    step = float(np.median(np.diff(time)))
+    width = max(1, round(_SMOOTH_S / step))
+    force, rate = imu.force_m_s2[first], imu.gyroscope_rad_s[first]
+    smooth = _running_mean(force, width)
+    vertical = smooth / np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-9)
+    middle = slice(width // 2, width // 2 + len(vertical))
+    turn = np.cross(vertical, rate[middle])
+    moved = (vertical[width:] - vertical[:-width]) / (time[middle][width:] - time[middle][:-width])[:, None]
+    turned = _running_mean(turn, width)[: len(moved)]
+    if len(moved) < 20 or _rms(moved) < _TURNS_RAD_S:
+        return None
+    product, own, other = np.sum(moved * turned), np.sum(moved**2), np.sum(turned**2)
+    if other == 0:
+        return None
+    alike = float(product / np.sqrt(own * other))
+    return float(np.sqrt(other / own)), alike
+
+
+def _running_mean(values: FloatArray, width: int) -> FloatArray:
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    found: FloatArray = (total[width:] - total[:-width]) / width
+    return found
+
+
+def length(recorded: Recorded) -> Iterator[Finding]:
+    """The length of the quaternions, as logged: 1 for a rotation, 0 for one that nobody filled in."""
+    for imu in recorded.imus:
+        given = imu.orientation_length[np.isfinite(imu.orientation_length)]
+        if not len(given):
+            continue
+        wrong = given[(given < _UNIT[0]) | (given > _UNIT[1])]
+        expected = "1"
+        if len(wrong) <= _STRAY_SHARE * len(given):
+            yield Finding(LENGTH, "green", f"{imu.name}: {np.median(given):.3g}", expected)
+            continue
+        share = len(wrong) / len(given)
+        zero = bool(np.median(wrong) == 0)
+        cause = (
+            "nobody filled it in; say that it is unknown by orientation_covariance[0] = -1, or log it"
+            if zero
+            else "it is no rotation; log a unit quaternion x, y, z, w"
+        )
+        yield Finding(
+            LENGTH,
+            "amber" if zero else "red",
+            f"{imu.name}: {np.median(wrong):.3g} in {share:.0%} of the messages",
+            expected,
+            f'the orientation of "{imu.name}" is {"all zeros" if zero else f"{np.median(wrong):.3g} long"} in '
+            f"{len(wrong)} messages: {cause}",
+        )
+
+
+def covariances(recorded: Recorded) -> Iterator[Finding]:
+    """A covariance of −1 tells the reader to disregard the values (sensor_msgs/Imu); here they are used all the same.
+
+    Some drivers set it beside good values, so values that live are amber and only zeros are red.
+    """
+    for imu in recorded.imus:
+        for what, disclaimed, values in (
+            ("linear_acceleration", imu.force_disclaimed, imu.force_m_s2),
+            ("angular_velocity", imu.gyroscope_disclaimed, imu.gyroscope_rad_s),
+        ):
+            if not disclaimed.any():
+                continue
+            empty = bool(np.all(values[disclaimed] == 0))
+            cause = (
+                "the values are all zero: this topic does not carry them (gyroscope and accelerometer may be on two "
+                "topics); join them into one message when logging"
+                if empty
+                else "the values do vary, and they are used; correct the covariance in the driver if they are good"
+            )
+            yield Finding(
+                DISCLAIMED,
+                "red" if empty else "amber",
+                f"{imu.name}: {what}_covariance[0] is -1 in {int(disclaimed.sum())} messages",
+                "not -1",
+                f'"{imu.name}" says by {what}_covariance[0] = -1 that its {what} is to be disregarded; {cause}',
+            )

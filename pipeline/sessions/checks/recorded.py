@@ -1,0 +1,159 @@
+"""What the checks look at: one session's readings as its log has them, beside what study.yaml says of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.sessions.checks.motion import Compared, compare
+from pipeline.sessions.checks.tilt import levelled
+from pipeline.sessions.logs.log import IntArray
+from pipeline.statistics.arrays import FloatArray
+from pipeline.tables.columns import S_PER_NS
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Times:
+    """When each message was stamped and when it arrived, (n,) in ns, in the order of the file.
+
+    `late_s` is how much later than the measurement study.yaml says that a stamp is: 0 for `stamp: measurement`.
+    """
+
+    stamp_ns: IntArray
+    arrival_ns: IntArray
+    origin_ns: int
+    late_s: float = 0.0
+
+    @cached_property
+    def stamp_s(self) -> FloatArray:
+        """The stamps in s since the session's origin."""
+        found: FloatArray = (self.stamp_ns - self.origin_ns) * S_PER_NS
+        return found
+
+    @cached_property
+    def arrival_s(self) -> FloatArray:
+        """The arrivals in s since the session's origin."""
+        found: FloatArray = (self.arrival_ns - self.origin_ns) * S_PER_NS
+        return found
+
+    @cached_property
+    def steps_s(self) -> FloatArray:
+        """The steps between sorted stamps, those of length zero too."""
+        found: FloatArray = np.diff(np.sort(self.stamp_ns)) * S_PER_NS
+        return found
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Which coordinate frame each message names: `number` (n,) counts into `names`; empty where that is not known."""
+
+    names: tuple[str, ...] = ()
+    number: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Positions (n, 3) in mm. `noise_sd_mm` as study.yaml states it, None where it does not."""
+
+    name: str
+    kind: Literal["position", "reference", "display"]
+    times: Times
+    value_mm: FloatArray
+    noise_sd_mm: float | None = None
+    frames: Frames = Frames()
+
+
+@dataclass(frozen=True)
+class Imu:
+    """Specific force (n, 3) in m/s², angular velocity (n, 3) in rad/s, orientation (n, 4) or NaN where unknown.
+
+    `orientation_length` (n,) is the quaternion's own, NaN where the log says it is unknown; `force_disclaimed` and
+    `gyroscope_disclaimed` (n,) say where a covariance of −1 tells the reader to disregard the values.
+    """
+
+    name: str
+    times: Times
+    force_m_s2: FloatArray
+    gyroscope_rad_s: FloatArray
+    orientation_xyzw: FloatArray
+    orientation_length: FloatArray
+    force_disclaimed: BoolArray
+    gyroscope_disclaimed: BoolArray
+    gravity_mm_s2: tuple[float, float, float] | None = None
+    noise_sd_mm_s2: float | None = None
+    frames: Frames = Frames()
+
+    @cached_property
+    def oriented(self) -> BoolArray:
+        """Where the orientation is known (n,)."""
+        found: BoolArray = np.isfinite(self.orientation_xyzw).all(axis=1)
+        return found
+
+    @cached_property
+    def upright_m_s2(self) -> FloatArray:
+        """The specific force where the orientation is known (k, 3), turned by it into the tracker's frame."""
+        return turned(self.orientation_xyzw[self.oriented], self.force_m_s2[self.oriented])
+
+
+@dataclass(frozen=True)
+class Events:
+    """Events by arrival (n,), in mm (n, 3), NaN where they do not apply; `selects` (n,) marks the selections."""
+
+    time_s: FloatArray
+    selects: BoolArray
+    target_mm: FloatArray
+    selected_mm: FloatArray
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One session. `targets_mm` (k, 2) are those of study.yaml's task, None where it names none."""
+
+    positions: tuple[Positions, ...] = ()
+    imus: tuple[Imu, ...] = ()
+    events: Events | None = None
+    targets_mm: FloatArray | None = None
+    target_size_mm: float = 0.0
+
+    def of_kind(self, kind: str) -> Positions | None:
+        """The first stream of positions of a kind."""
+        return next((one for one in self.positions if one.kind == kind), None)
+
+    @property
+    def tracker(self) -> Positions | None:
+        """The first tracker."""
+        return self.of_kind("position")
+
+    @property
+    def imu(self) -> Imu | None:
+        """The first phone."""
+        return self.imus[0] if self.imus else None
+
+    @cached_property
+    def motion(self) -> Compared | None:
+        """The tracker's movement beside the phone's; None where one of them is not there, or too short."""
+        tracker, imu = self.tracker, self.imu
+        if tracker is None or imu is None or len(imu.force_m_s2) < 2:
+            return None
+        known = imu.oriented
+        if known.sum() >= len(known) / 2:
+            value, heading_known = imu.upright_m_s2, True
+            time_s = imu.times.stamp_s[known]
+        else:
+            time_s, value = levelled(imu.times.stamp_s, imu.force_m_s2, imu.gyroscope_rad_s, imu.gravity_mm_s2)
+            heading_known = False
+        return compare(tracker.times.stamp_s, tracker.value_mm, time_s, value * 1000.0, heading_known)
+
+
+def turned(orientation_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Vectors (n, 3) turned by quaternions (n, 4) of about unit length."""
+    axis, scalar = orientation_xyzw[:, :3], orientation_xyzw[:, 3:]
+    twice = 2 * np.cross(axis, vectors)
+    found: FloatArray = vectors + scalar * twice + np.cross(axis, twice)
+    return found

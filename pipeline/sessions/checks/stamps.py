@@ -1,0 +1,207 @@
+"""Stamps: repeated, rounded, bunched, of another unit, or by a clock that was set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.sessions.checks.finding import Finding, graded
+from pipeline.sessions.checks.recorded import Recorded, Times
+from pipeline.sessions.logs.log import IntArray
+from pipeline.statistics.arrays import FloatArray
+
+DOUBLED, ROUNDED, RATE, BURSTS, REGULAR, STEPS = (
+    "identical stamps",
+    "rounded stamps",
+    "rate",
+    "bursts",
+    "regular stamps",
+    "clock",
+)
+
+_DOUBLED_AMBER, _DOUBLED_RED = 0.01, 0.5
+_FASTEST_HZ = 5_000.0  # no tracker or phone measures so often; stamps of ms or µs in a field of ns look like 1e6 Hz
+_SLOWEST_HZ = 1.0
+_ROUNDINGS_S = (1.0, 0.1, 0.01)
+_BUNCHED = 0.3  # of the mean step: the median of stamps that come in bursts is far below it
+_IRREGULAR = 0.5  # SD of the usual steps over their median; recordings without a fault: up to 0.1
+_STEP_S = 0.05  # of a clock
+_AROUND = 15  # messages to each side of a step
+
+
+def _streams(recorded: Recorded) -> Iterator[tuple[str, Times]]:
+    for one in (*recorded.positions, *recorded.imus):
+        if len(one.times.stamp_ns) >= 10:
+            yield one.name, one.times
+
+
+def doubled(recorded: Recorded) -> Iterator[Finding]:
+    """Messages that share a stamp: sent twice, or stamped more coarsely than they are measured."""
+    for name, times in _streams(recorded):
+        steps = times.steps_s
+        count = int(np.sum(steps == 0))
+        found, expected = f"{name}: {count}", "0"
+        status = graded(count / len(steps), _DOUBLED_AMBER, _DOUBLED_RED)
+        message = ""
+        if status != "green":
+            message = (
+                f'{count} messages of "{name}" have the stamp of another ({count / len(steps):.0%}): they are sent '
+                "twice, two nodes publish on the topic, or the stamps are coarser than the rate; log each measurement "
+                "once, with its own stamp"
+            )
+        yield Finding(DOUBLED, status, found, expected, message)
+
+
+def rounded(recorded: Recorded) -> Iterator[Finding]:
+    """Stamps that are all multiples of a second, a tenth or a hundredth, with several messages to each."""
+    for name, times in _streams(recorded):
+        since = times.stamp_ns
+        for unit_s in _ROUNDINGS_S:
+            unit_ns = round(unit_s * 1e9)
+            if np.all((since - since[0]) % unit_ns == 0) and float(np.mean(times.steps_s == 0)) > _DOUBLED_AMBER:
+                message = (
+                    f'every stamp of "{name}" is a multiple of {unit_s:g} s: its nanoseconds are lost; log sec and '
+                    "nanosec, or set stamp: arrival"
+                )
+                yield Finding(ROUNDED, "red", f"{name}: to {unit_s:g} s", "nanoseconds", message)
+                break
+
+
+def rate(recorded: Recorded) -> Iterator[Finding]:
+    """How often a stream measures by its own stamps; beyond 5 kHz and below 1 Hz they are of another unit."""
+    for name, times in _streams(recorded):
+        steps = times.steps_s[times.steps_s > 0]
+        if not len(steps):
+            yield Finding(
+                RATE,
+                "red",
+                f"{name}: one stamp for all messages",
+                "1 to 5000 Hz",
+                f'all messages of "{name}" have the same stamp: the sender does not stamp; stamp each measurement, or '
+                "set stamp: arrival",
+            )
+            continue
+        hz = 1.0 / float(np.median(steps))
+        found, expected = f"{name}: {hz:.4g} Hz", "1 to 5000 Hz"
+        if _SLOWEST_HZ <= hz <= _FASTEST_HZ:
+            yield Finding(RATE, "green", found, expected)
+        elif hz > _FASTEST_HZ:
+            unit = "microseconds" if hz < 1e6 else "milliseconds"
+            message = (
+                f'by its stamps "{name}" measures {hz:.3g} times a second, which no sensor does: {unit} or another unit '
+                "stand where nanoseconds are expected; multiply the stamps when logging"
+            )
+            yield Finding(RATE, "red", found, expected, message)
+        else:
+            message = (
+                f'by its stamps "{name}" measures every {1 / hz:.3g} s: its stamps are of another unit, or most messages '
+                "are missing; check the recorder"
+            )
+            yield Finding(RATE, "amber", found, expected, message)
+
+
+def bursts(recorded: Recorded) -> Iterator[Finding]:
+    """Stamps that bunch: many in no time, then a pause; a packet's readings were stamped as it arrived."""
+    for name, times in _streams(recorded):
+        steps = times.steps_s
+        mean = float(np.mean(steps[steps <= np.percentile(steps, 99.5)]))
+        median = float(np.median(steps))
+        if mean <= 0 or median >= _BUNCHED * mean or float(np.mean(steps == 0)) > _DOUBLED_RED:
+            yield Finding(BURSTS, "green", f"{name}: none", "none")
+            continue
+        size = max(2, round(1.0 / float(np.mean(steps > mean))))
+        message = (
+            f'the stamps of "{name}" come in bursts of about {size}: the readings of a packet were stamped as it '
+            "arrived; stamp each with its own time of measurement"
+        )
+        yield Finding(BURSTS, "amber", f"{name}: about {size} at a time", "none", message)
+
+
+def regular(recorded: Recorded) -> Iterator[Finding]:
+    """How regular the steps between stamps are, lost messages aside."""
+    for name, times in _streams(recorded):
+        spread = irregularity(times.steps_s)
+        if spread is None:
+            continue
+        found, expected = f"{name}: {spread:.0%} of a step", f"at most {_IRREGULAR:.0%}"
+        if spread <= _IRREGULAR:
+            yield Finding(REGULAR, "green", found, expected)
+            continue
+        message = (
+            f'the stamps of "{name}" are irregular, by {spread:.0%} of a step: they tell when a message was handled, not '
+            "when it was measured; stamp in the sensor's driver"
+        )
+        yield Finding(REGULAR, "amber", found, expected, message)
+
+
+def irregularity(steps_s: FloatArray) -> float | None:
+    """SD of the steps that are no gaps, over their median; None where stamps repeat or there are too few."""
+    steps = steps_s[steps_s > 0]
+    if len(steps) < 50:
+        return None
+    usual = float(np.median(steps))
+    kept = steps[steps < 1.9 * usual]
+    return float(np.std(kept) / usual) if len(kept) > 20 else None
+
+
+def clock(recorded: Recorded) -> Iterator[Finding]:
+    """A clock that was set in mid-log: stamps and arrivals part for good, or both go back together."""
+    for name, times in _streams(recorded):
+        parted = _parted(times)
+        back = _back(times.arrival_ns)
+        expected = "no step"
+        if parted is not None:
+            at_s, by_s = parted
+            message = (
+                f'{at_s:.0f} s into the session the stamps of "{name}" {"fall behind" if by_s > 0 else "run ahead of"} '
+                f"their arrivals by {abs(by_s):.2f} s and stay so: its clock was set; use a clock that is not set "
+                "while recording, or cut the log there"
+            )
+            yield Finding(STEPS, "red", f"{name}: {by_s:+.2f} s at {at_s:.0f} s", expected, message)
+        elif back is not None:
+            at, by_s = back
+            at_s = float(times.arrival_s[at] - times.arrival_s.min())
+            message = (
+                f'{at_s:.0f} s into the session the recorder\'s clock goes back by {by_s:.2f} s ("{name}"): it was set '
+                "while recording; use a clock that is not set, or cut the log there"
+            )
+            yield Finding(STEPS, "red", f"{name}: -{by_s:.2f} s at {at_s:.0f} s", expected, message)
+        else:
+            yield Finding(STEPS, "green", f"{name}: none", expected)
+
+
+def _parted(times: Times) -> tuple[float, float] | None:
+    """When and by how much the delay of arrivals jumps, both sides steady; None where it does not.
+
+    The delay's lower envelope is looked at: a busy network delays some messages, but a clock that was set all of them.
+    """
+    order = np.argsort(times.arrival_ns, kind="stable")
+    delay = (times.arrival_s - times.stamp_s)[order]
+    if len(delay) < 4 * _AROUND:
+        return None
+    windows = np.lib.stride_tricks.sliding_window_view(delay, _AROUND)
+    low, high = windows.min(axis=1), windows.max(axis=1)
+    before_low, before_high, after_low, after_high = low[:-_AROUND], high[:-_AROUND], low[_AROUND:], high[_AROUND:]
+    gap = np.maximum(after_low - before_high, before_low - after_high)
+    at = int(np.argmax(gap))
+    if gap[at] < _STEP_S:
+        return None
+    split = at + _AROUND
+    before, after = np.median(delay[:split]), np.median(delay[split:])
+    by_s = float(after - before)
+    if abs(by_s) < _STEP_S:
+        return None
+    return float(times.arrival_s[order][split] - times.arrival_s.min()), by_s
+
+
+def _back(arrival_ns: IntArray) -> tuple[int, float] | None:
+    """Where in the file the recorder's clock goes back and runs on from there, and by how many seconds."""
+    step = np.diff(arrival_ns)
+    for at in np.flatnonzero(step < -round(_STEP_S * 1e9)):
+        following = arrival_ns[at + 1 : at + 6]
+        if len(following) >= 4 and np.all(np.diff(following) >= 0) and following[-1] < arrival_ns[at] + 2e9:
+            overlapping = int(np.sum(arrival_ns[: at + 1] > following[0]))
+            if overlapping >= 2:
+                return int(at), float(-step[at] * 1e-9)
+    return None

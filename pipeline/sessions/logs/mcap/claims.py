@@ -1,0 +1,63 @@
+"""What messages in CDR say beside the values that are used: their frame, and what is to be disregarded.
+
+Nothing is decoded by it and nothing can fail by it: messages of another encoding claim nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.sessions.logs.log import Claims, IntArray
+from pipeline.sessions.logs.mcap.cdr import NUMBERS
+from pipeline.sessions.logs.mcap.container import Walk
+from pipeline.sessions.logs.mcap.messages import Messages
+
+_NAME_BYTES, _NAME = 12, 16  # where the length of the frame's name stands, and its first byte
+_ORIENTATION, _RATE_COVARIANCE, _FORCE_COVARIANCE = 0, 16, 28  # of the 37 numbers of an Imu
+_UNKNOWN = -1.0
+
+
+def claimed(walk: Walk, messages: Messages, which: IntArray, content: str) -> Claims:
+    """The claims of some decoded messages, in their order."""
+    encoded = {number for number, channel in walk.channels.items() if channel.message_encoding == "cdr"}
+    if not len(which) or not set(np.unique(messages.channel[which]).tolist()) <= encoded:
+        return Claims()
+    names: dict[bytes, int] = {}
+    frame = np.zeros(len(which), np.int64)
+    numbers = np.zeros((len(which), NUMBERS[content]))
+    length = messages.length[which]
+    for size in np.unique(length).tolist():
+        own = np.flatnonzero(length == size)
+        rows = messages.rows(which[own])
+        frame[own] = _frames(rows, names)
+        tail = np.ascontiguousarray(rows[:, size - (size - 4) % 8 - 8 * NUMBERS[content] :][:, : 8 * NUMBERS[content]])
+        little = rows[:, 1] == 1
+        numbers[own] = np.where(little[:, None], tail.view("<f8"), tail.view(">f8"))
+    texts = tuple(name.decode("utf-8", "replace") for name in names)
+    if content != "acceleration":
+        return Claims(texts, frame)
+    unknown = numbers[:, _ORIENTATION + 4] == _UNKNOWN
+    with np.errstate(over="ignore", invalid="ignore"):
+        size_of = np.sqrt((numbers[:, :4] ** 2).sum(axis=1))
+    return Claims(
+        texts,
+        frame,
+        np.where(unknown, np.nan, size_of),
+        numbers[:, _FORCE_COVARIANCE] == _UNKNOWN,
+        numbers[:, _RATE_COVARIANCE] == _UNKNOWN,
+    )
+
+
+def _frames(rows: np.ndarray[tuple[int, int], np.dtype[np.uint8]], names: dict[bytes, int]) -> IntArray:
+    """The number of each message's frame; names that are new are added."""
+    head = rows[:, _NAME_BYTES:]
+    changes = np.concatenate([[True], np.any(head[1:, :4] != head[:-1, :4], axis=1)])
+    width = int.from_bytes(head[0, :4].tobytes(), "little" if rows[0, 1] == 1 else "big")
+    text = rows[:, _NAME : _NAME + width]
+    if not changes[1:].any() and len(text) and (text == text[0]).all():
+        return np.full(len(rows), names.setdefault(text[0].tobytes().rstrip(b"\0"), len(names)))
+    found = np.zeros(len(rows), np.int64)
+    for index, row in enumerate(rows):
+        size = int.from_bytes(row[_NAME_BYTES:_NAME].tobytes(), "little" if row[1] == 1 else "big")
+        found[index] = names.setdefault(row[_NAME : _NAME + size].tobytes().rstrip(b"\0"), len(names))
+    return found
