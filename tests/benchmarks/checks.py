@@ -6,6 +6,10 @@ number of sessions in which anything is not green is the figure; it must be 0.
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of small products wait for each other, and count
+
 import sys
 import time
 

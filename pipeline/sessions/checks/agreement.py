@@ -138,7 +138,8 @@ def frame(recorded: Recorded) -> Iterator[Finding]:
         return
     expected = "within 20°, not mirrored"
     if motion.mirrored >= _SURE:
-        yield Finding(AXES, "red", f"mirrored ({motion.axes})", expected, _mirror_message(tracker, imu, motion))
+        found = f"mirrored ({motion.axes})" if motion.axes else "mirrored"
+        yield Finding(AXES, "red", found, expected, _mirror_message(tracker, imu, motion))
         return
     angle = motion.turn_deg
     if not np.isfinite(angle.value):
@@ -165,9 +166,10 @@ def _mirror_message(tracker: Positions, imu: Imu, motion: Compared) -> str:
             f'the accelerations of "{imu.name}" point against the movement of "{tracker.name}": their sign is flipped '
             "(iOS logs the acceleration of gravity, not the specific force); change the sign when logging"
         )
+    named = f" (its x y z are the phone's {motion.axes})" if motion.axes else ""
     return (
-        f'the movement of "{tracker.name}" is the mirror image of that of "{imu.name}" (its x y z are the phone\'s '
-        f"{motion.axes}): one of the frames is left-handed or two axes are exchanged; log right-handed axes in the "
+        f'the movement of "{tracker.name}" is the mirror image of that of "{imu.name}"{named}: '
+        "one of the frames is left-handed or two axes are exchanged; log right-handed axes in the "
         "order x, y, z"
     )
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.sessions.checks.motion import Compared
-from pipeline.sessions.checks.recorded import Imu, turned
+from pipeline.sessions.checks.recorded import Imu
+from pipeline.sessions.checks.turns import turned
 from pipeline.statistics.arrays import FloatArray
 
 _EXPLAINS_M_S2 = 0.7  # of the mean that is left once the mistake is undone

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.sessions.checks.finding import Finding, Status
 from pipeline.sessions.checks.recorded import Positions, Recorded
+from pipeline.sessions.logs.log import BoolArray
 from pipeline.statistics.arrays import FloatArray
 
 TARGETS, SPAN, SHOWN = "targets", "span of the events", "selections"
@@ -75,8 +76,8 @@ def _against_reach(recorded: Recorded, there: FloatArray) -> Iterator[Finding]:
         yield Finding(TARGETS, "green", found, expected)
         return
     message = (
-        f"{far} of {len(there)} targets are {np.median(off) / 1e3:.3g} m from where the hand ever was: they are probably "
-        "in millimetres where metres are expected; log metres"
+        f"{far} of {len(there)} targets are {np.median(off) / 1e3:.3g} m from where the hand ever was: they are "
+        "probably in millimetres where metres are expected; log metres"
     )
     yield Finding(TARGETS, "red" if far > len(there) / 2 else "amber", found, expected, message)
 
@@ -84,7 +85,7 @@ def _against_reach(recorded: Recorded, there: FloatArray) -> Iterator[Finding]:
 def span(recorded: Recorded) -> Iterator[Finding]:
     """Selections outside the time in which anything was measured: the events are of another clock."""
     events = recorded.events
-    times = [one.times.arrival_s for one in (*recorded.positions, *recorded.imus) if len(one.times.arrival_s)]
+    times = [one.times.arrival_s for one in recorded.streams if len(one.times.arrival_s)]
     if events is None or not times or not events.selects.any():
         return
     begin, end = min(float(one.min()) for one in times), max(float(one.max()) for one in times)
@@ -135,7 +136,7 @@ def _limit(shown: Positions, time: FloatArray, at: FloatArray) -> float:
     """How far off is not yet a contradiction: 10 mm, or for a sensor four times its noise."""
     if shown.kind == "display":
         return _OFF_MM
-    return max(_OFF_MM, 4.0 * (shown.noise_sd_mm or 0.0) * np.sqrt(2.0))
+    return max(_OFF_MM, 4.0 * float(np.sqrt(2.0)) * (shown.noise_sd_mm or 0.0))
 
 
 def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: float) -> str:
@@ -173,9 +174,10 @@ def _middle_of_lowest(cost: FloatArray) -> int:
     return (low + high) // 2
 
 
-def _within(shown: Positions, time: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _within(shown: Positions, time: FloatArray) -> BoolArray:
     stamps = shown.times.stamp_s
-    return (time >= stamps.min()) & (time <= stamps.max())
+    found: BoolArray = (time >= stamps.min()) & (time <= stamps.max())
+    return found
 
 
 def _apart(shown: Positions, time: FloatArray, at: FloatArray) -> FloatArray:

@@ -44,6 +44,7 @@ _RESAMPLES = 200
 _RIDGE = 1e-3  # of the accelerations' power: an axis without movement takes no part in the fit
 _SHORTEST = 10  # readings
 _DEALT = 16  # ways of dealing blocks
+_FLAT, _FLAT_UPRIGHT = 0.05, 0.15  # of the strongest direction's movement, the weakest's
 _LEFT_MIN = 0.02  # of an axis's variance, that is never taken for explained
 
 
@@ -69,7 +70,8 @@ class Compared:
     and `acceleration_mm` its SD in either. `scale` is the positions' size over the accelerations', too
     small where those are mostly noise, and `scale_most` what it would be if the positions were; `turn_deg` the angle
     between the frames, about any axis, NaN where the heading is not known; `mirrored` the share of resamples in which a
-    reflection fits better than any turn. `axes` names what the phone calls the tracker's x, y, z, such as "+y -x +z".
+    reflection fits better than any turn. `axes` names what the phone calls the tracker's x, y, z, such as "+y -x +z";
+    it is "" where the heading is not known.
     """
 
     explained: float
@@ -128,7 +130,8 @@ def _averaged(grid: FloatArray, time: FloatArray, value: FloatArray) -> FloatArr
     slope = (value[at + 1] - value[at]) / lasting[at]
     inside = area[at] + since * (value[at] + slope * since / 2)
     width = np.diff(np.clip(edges, time[0], time[-1]))[:, None]
-    return np.diff(inside, axis=0) / np.maximum(width, _STEP_S / 4)
+    found: FloatArray = np.diff(inside, axis=0) / np.maximum(width, _STEP_S / 4)
+    return found
 
 
 def _filtered(value: FloatArray, order: int) -> FloatArray:
@@ -146,7 +149,7 @@ def _filtered(value: FloatArray, order: int) -> FloatArray:
 def _without(value: FloatArray, order: int) -> FloatArray:
     """What is taken off first: of accelerations the mean, of positions a line, so that neither end is a jump."""
     if order:
-        return value.mean(axis=0)
+        return np.asarray(value.mean(axis=0))
     edge = min(5, len(value))
     first, last = value[:edge].mean(axis=0), value[-edge:].mean(axis=0)
     found: FloatArray = first + (last - first) * np.linspace(0.0, 1.0, len(value))[:, None]
@@ -181,15 +184,16 @@ def _blocks(grid: FloatArray, tracker_s: FloatArray, imu_s: FloatArray) -> npt.N
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Cross-products of each block: `cross` (blocks, shifts, 3, 3) of p and q, `own` (blocks, 3, 3) of q, `power` (blocks, 3) of p.
+    """Cross-products of each block: `cross` (blocks, shifts, 3, 3) of p and q, `own` (blocks, 3, 3) of q.
 
-    `chance` (3,) is the size of the diagonal of Σ p qᵀ where p and q have nothing to do with each other.
+    `power` (blocks, 3) is that of p by its axes, `dealt` (k, 3, 3) are Σ p qᵀ of blocks
+    that have nothing to do with each other.
     """
 
     cross: FloatArray
     own: FloatArray
     power: FloatArray
-    chance: FloatArray
+    dealt: FloatArray
 
     @staticmethod
     def of(seen: FloatArray, felt: FloatArray, rows: npt.NDArray[np.int64]) -> _Blocks:
@@ -202,13 +206,13 @@ class _Blocks:
         later = windows[starts].reshape(len(rows), -1, _BLOCK)
         cross = (later @ positions).reshape(len(rows), 2 * reach + 1, 3, 3)
         power = np.einsum("bti,bti->bi", positions, positions)
-        return _Blocks(cross.transpose(0, 1, 3, 2), own, power, _chance(positions, felt[rows]))
+        return _Blocks(cross.transpose(0, 1, 3, 2), own, power, _dealt(positions, felt[rows]))
 
     @cached_property
     def shifts_s(self) -> FloatArray:
         """The lag at each shift."""
         reach = round(LAG_RANGE_S / _STEP_S)
-        return _STEP_S * np.arange(-reach, reach + 1)
+        return np.arange(-reach, reach + 1).astype(np.float64) * _STEP_S
 
     def compared(self, heading_known: bool) -> Compared:
         """Everything, with intervals by resampled blocks, the same draws each time."""
@@ -221,9 +225,12 @@ class _Blocks:
         explained = by_axis.sum(axis=2) / power.sum(axis=1)[:, None]
         lag = _peak(explained, self.shifts_s)
         at = int(np.argmin(np.abs(self.shifts_s - lag[0])))
-        if not heading_known:
-            cross = cross @ _about_vertical(cross[0, at])
-        turn, mirror, size = _procrustes(cross[:, at], own, self.chance * np.sqrt(np.clip(1 - by_axis[0, at] / power[0], _LEFT_MIN, 1.0)))
+        heading = np.eye(3) if heading_known else _about_vertical(cross[0, at])
+        cross, own = cross @ heading, heading.T @ own @ heading
+        chance = np.sqrt(np.mean(np.einsum("kii->ki", self.dealt @ heading) ** 2, axis=0))
+        turn, mirror, size = _procrustes(
+            cross[:, at], own, chance * np.sqrt(np.clip(1 - by_axis[0, at] / power[0], _LEFT_MIN, 1.0))
+        )
         samples = count * _BLOCK
         return Compared(
             float(explained[0].max()),
@@ -234,17 +241,16 @@ class _Blocks:
             _interval(size),
             float(np.percentile(power.sum(axis=1) / np.maximum(size * np.trace(own, axis1=1, axis2=2), 1e-300), 97.5)),
             _interval(turn if heading_known else np.full_like(turn, np.nan)),
-            float(np.mean(mirror[1:])) if mirror[0] else 0.0,
-            _axes(cross[0, at]),
+            float(np.mean(mirror[1:])) if mirror[0] and not _flat(cross[0, at], heading_known) else 0.0,
+            _axes(cross[0, at]) if heading_known else "",
         )
 
 
-def _chance(positions: FloatArray, moved: FloatArray) -> FloatArray:
-    """The root mean square of Σ pᵢ qᵢ (3,) with the blocks of one dealt to others of the other."""
+def _dealt(positions: FloatArray, moved: FloatArray) -> FloatArray:
+    """Σ p qᵀ (k, 3, 3) with the blocks of one dealt to others of the other: what chance makes of it."""
     apart = range(1, min(len(positions), _DEALT + 1))
-    sums = [np.einsum("bti,bti->i", positions, np.roll(moved, shift, axis=0)) for shift in apart]
-    found: FloatArray = np.sqrt(np.mean(np.square(sums), axis=0))
-    return found
+    turned = positions.transpose(0, 2, 1)
+    return np.array([(turned @ np.roll(moved, shift, axis=0)).sum(axis=0) for shift in apart])
 
 
 def _explained(cross: FloatArray, own: FloatArray) -> FloatArray:
@@ -286,6 +292,12 @@ def _procrustes(
     own_power = np.maximum(np.trace(own, axis1=1, axis2=2), 1e-300)
     size = np.sum(np.linalg.svd(cross, compute_uv=False), axis=1) / own_power
     return angle, mirrored, size
+
+
+def _flat(cross: FloatArray, heading_known: bool) -> bool:
+    """Does the movement have less than three dimensions? An estimated vertical errs with the movement."""
+    strength = np.linalg.svd(cross, compute_uv=False)
+    return bool(strength[2] < (_FLAT if heading_known else _FLAT_UPRIGHT) * strength[0])
 
 
 def _interval(found: FloatArray) -> Interval:

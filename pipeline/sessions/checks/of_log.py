@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
-from pipeline.sessions.logs.log import Log, Readings
+from pipeline.sessions.logs.log import BoolArray, Log, Readings
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.study.streams import AccelerationStream, DisplayStream, PositionStream, ReferenceStream, Stream
 from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
+Placed = PositionStream | ReferenceStream | DisplayStream
 
 
 def of_log(log: Log, study: Study) -> Recorded:
@@ -46,10 +47,13 @@ def times(readings: Readings, origin_ns: int, stream: Stream | None = None) -> T
 
 
 def of_positions(
-    name: str, readings: Readings, origin_ns: int, stream: PositionStream | ReferenceStream | DisplayStream | None = None
+    name: str,
+    readings: Readings,
+    origin_ns: int,
+    stream: Placed | None = None,
 ) -> Positions:
     """A stream of positions, those that are not finite left out."""
-    whole = np.isfinite(readings.values).all(axis=1)
+    whole: BoolArray = np.all(np.isfinite(readings.values), axis=1)
     kept = _kept(readings, whole)
     return Positions(
         name,
@@ -63,7 +67,7 @@ def of_positions(
 
 def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStream | None = None) -> Imu:
     """A stream of accelerations, those that are not finite left out."""
-    whole = np.isfinite(readings.values[:, :6]).all(axis=1)
+    whole: BoolArray = np.all(np.isfinite(readings.values[:, :6]), axis=1)
     kept, claims = _kept(readings, whole), readings.claims
     count = kept.read
 
@@ -85,11 +89,11 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
     )
 
 
-def _kept(readings: Readings, whole: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Readings:
+def _kept(readings: Readings, whole: BoolArray) -> Readings:
     return Readings(readings.stamp_ns[whole], readings.arrival_ns[whole], readings.values[whole])
 
 
-def _frames(readings: Readings, whole: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Frames:
+def _frames(readings: Readings, whole: BoolArray) -> Frames:
     claims = readings.claims
     return Frames(claims.frames, claims.frame[whole]) if len(claims.frame) else Frames()
 
@@ -104,7 +108,7 @@ def events(readings: Readings, origin_ns: int) -> Events:
         return np.array([value * _MM_PER_M if isinstance(value, float) else np.nan for value in values])
 
     return Events(
-        (readings.arrival_ns[order] - origin_ns) * S_PER_NS,
+        (readings.arrival_ns[order] - origin_ns).astype(np.float64) * S_PER_NS,
         np.array([one["type"] == "selection" for one in listed], bool),
         np.column_stack([column(f"target_{axis}") for axis in "xyz"]),
         np.column_stack([column(axis) for axis in "xyz"]),

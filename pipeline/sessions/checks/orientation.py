@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.sessions.checks.finding import Finding, Status, graded
 from pipeline.sessions.checks.recorded import Imu, Recorded
+from pipeline.sessions.checks.turns import rotation_vector
 from pipeline.statistics.arrays import FloatArray
 
 TURNING, LENGTH, DISCLAIMED = "gyroscope", "orientation", "covariances"
@@ -86,8 +87,8 @@ def _turning_message(imu: Imu, ratio: float, alike: float) -> str:
             "to tracker frame"
         )
     return (
-        f'the gyroscope of "{imu.name}" reads {ratio:.2g} times what the orientation turns: its unit or range is wrong, '
-        "or the orientation is smoothed; log rad/s"
+        f'the gyroscope of "{imu.name}" reads {ratio:.2g} times what the orientation turns: its unit or range is '
+        "wrong, or the orientation is smoothed; log rad/s"
     )
 
 
@@ -109,17 +110,6 @@ def _turning(imu: Imu) -> tuple[FloatArray, FloatArray] | None:
     if whole.sum() < 10:
         return None
     return rotation_vector(before, after) / span[whole, None], measured
-
-
-def rotation_vector(before: FloatArray, after: FloatArray) -> FloatArray:
-    """The turn (n, 3) in rad, in the body's frame, between quaternions (n, 4) of about unit length."""
-    vector = before[:, 3:] * after[:, :3] - after[:, 3:] * before[:, :3] - np.cross(before[:, :3], after[:, :3])
-    scalar = np.sum(before * after, axis=1)
-    vector, scalar = vector * np.where(scalar < 0, -1.0, 1.0)[:, None], np.abs(scalar)
-    length = np.linalg.norm(vector, axis=1)
-    angle = 2 * np.arctan2(length, scalar)
-    found: FloatArray = vector * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 2.0)[:, None]
-    return found
 
 
 def _rms(values: FloatArray) -> float:

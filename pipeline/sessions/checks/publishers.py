@@ -17,7 +17,7 @@ _FAR_MM = 30.0
 
 def frame_ids(recorded: Recorded) -> Iterator[Finding]:
     """The frame that the messages name; it is not used, but one that changes says that positions are of two frames."""
-    for one in (*recorded.positions, *recorded.imus):
+    for one in recorded.streams:
         names, number = one.frames.names, one.frames.number
         if not len(number):
             continue
@@ -53,8 +53,8 @@ def publishers(recorded: Recorded) -> Iterator[Finding]:
             yield Finding(PUBLISHERS, "green", f"{positions.name}: one", expected)
             continue
         message = (
-            f'successive positions of "{positions.name}" go to and fro by {far:.0f} mm: two nodes publish on its topic; '
-            "give each a topic of its own"
+            f'successive positions of "{positions.name}" go to and fro by {far:.0f} mm: two nodes publish on its '
+            "topic; give each a topic of its own"
         )
         yield Finding(PUBLISHERS, "red", found, expected, message)
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.sessions.checks.motion import Compared, compare
-from pipeline.sessions.checks.tilt import levelled
-from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.checks.tilt import upright, with_z_up
+from pipeline.sessions.checks.turns import turned
+from pipeline.sessions.logs.log import BoolArray, IntArray
 from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
 
-BoolArray = npt.NDArray[np.bool_]
+_MOSTLY = 0.5  # of the readings: with fewer the log's orientations are left aside
 
 
 @dataclass(frozen=True)
@@ -33,19 +34,19 @@ class Times:
     @cached_property
     def stamp_s(self) -> FloatArray:
         """The stamps in s since the session's origin."""
-        found: FloatArray = (self.stamp_ns - self.origin_ns) * S_PER_NS
+        found: FloatArray = (self.stamp_ns - self.origin_ns).astype(np.float64) * S_PER_NS
         return found
 
     @cached_property
     def arrival_s(self) -> FloatArray:
         """The arrivals in s since the session's origin."""
-        found: FloatArray = (self.arrival_ns - self.origin_ns) * S_PER_NS
+        found: FloatArray = (self.arrival_ns - self.origin_ns).astype(np.float64) * S_PER_NS
         return found
 
     @cached_property
     def steps_s(self) -> FloatArray:
         """The steps between sorted stamps, those of length zero too."""
-        found: FloatArray = np.diff(np.sort(self.stamp_ns)) * S_PER_NS
+        found: FloatArray = np.diff(np.sort(self.stamp_ns)).astype(np.float64) * S_PER_NS
         return found
 
 
@@ -92,7 +93,7 @@ class Imu:
     @cached_property
     def oriented(self) -> BoolArray:
         """Where the orientation is known (n,)."""
-        found: BoolArray = np.isfinite(self.orientation_xyzw).all(axis=1)
+        found: BoolArray = np.all(np.isfinite(self.orientation_xyzw), axis=1)
         return found
 
     @cached_property
@@ -126,6 +127,11 @@ class Recorded:
         return next((one for one in self.positions if one.kind == kind), None)
 
     @property
+    def streams(self) -> Sequence[Positions | Imu]:
+        """Every stream of positions and every phone."""
+        return [*self.positions, *self.imus]
+
+    @property
     def tracker(self) -> Positions | None:
         """The first tracker."""
         return self.of_kind("position")
@@ -141,19 +147,10 @@ class Recorded:
         tracker, imu = self.tracker, self.imu
         if tracker is None or imu is None or len(imu.force_m_s2) < 2:
             return None
-        known = imu.oriented
-        if known.sum() >= len(known) / 2:
-            value, heading_known = imu.upright_m_s2, True
-            time_s = imu.times.stamp_s[known]
+        if imu.oriented.mean() >= _MOSTLY:
+            time_s, force, position_mm = imu.times.stamp_s[imu.oriented], imu.upright_m_s2, tracker.value_mm
         else:
-            time_s, value = levelled(imu.times.stamp_s, imu.force_m_s2, imu.gyroscope_rad_s, imu.gravity_mm_s2)
-            heading_known = False
-        return compare(tracker.times.stamp_s, tracker.value_mm, time_s, value * 1000.0, heading_known)
-
-
-def turned(orientation_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Vectors (n, 3) turned by quaternions (n, 4) of about unit length."""
-    axis, scalar = orientation_xyzw[:, :3], orientation_xyzw[:, 3:]
-    twice = 2 * np.cross(axis, vectors)
-    found: FloatArray = vectors + scalar * twice + np.cross(axis, twice)
-    return found
+            time_s, force = upright(imu.times.stamp_s, imu.force_m_s2, imu.gyroscope_rad_s)
+            position_mm = with_z_up(tracker.value_mm, imu.gravity_mm_s2)
+        heading_known = bool(imu.oriented.mean() >= _MOSTLY)
+        return compare(tracker.times.stamp_s, position_mm, time_s, force * 1e3, heading_known)

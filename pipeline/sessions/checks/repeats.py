@@ -48,7 +48,9 @@ def _jumps_to_zero(value: FloatArray) -> bool:
     edges = np.flatnonzero(np.diff(zero.astype(np.int8)))
     jumps = np.linalg.norm(value[edges + 1] - value[edges], axis=1)
     steps = np.linalg.norm(np.diff(value[~zero], axis=0), axis=1)
-    return len(jumps) > 0 and float(np.median(jumps)) > max(_JUMP_MM, 3.0 * float(np.median(steps)) if len(steps) else 0)
+    return len(jumps) > 0 and float(np.median(jumps)) > max(
+        _JUMP_MM, 3.0 * float(np.median(steps)) if len(steps) else 0
+    )
 
 
 def held(recorded: Recorded) -> Iterator[Finding]:
@@ -114,8 +116,8 @@ def frozen(recorded: Recorded) -> Iterator[Finding]:
             yield Finding(FROZEN, "green", found, expected)
             continue
         message = (
-            f'"{imu.name}" repeats one reading for up to {longest_s:.2g} s ({share:.0%} of the messages): the sensor or '
-            "its driver has stopped, or is sent on faster than it measures; leave the repeats out, or record anew"
+            f'"{imu.name}" repeats one reading for up to {longest_s:.2g} s ({share:.0%} of the messages): the sensor '
+            "or its driver has stopped, or is sent on faster than it measures; leave the repeats out, or record anew"
         )
         yield Finding(FROZEN, "red" if longest_s > 2.0 else "amber", found, expected, message)
 
@@ -139,8 +141,8 @@ def clipped(recorded: Recorded) -> Iterator[Finding]:
                 "red" if count > 0.05 * len(values) else "amber",
                 found,
                 expected,
-                f'{count} readings of "{imu.name}" rest at {limit:.3g} {unit}: the {what} was clipped at the end of the '
-                "sensor's range; set a larger range",
+                f'{count} readings of "{imu.name}" rest at {limit:.3g} {unit}: the {what} was clipped at the end of '
+                "the sensor's range; set a larger range",
             )
 
 

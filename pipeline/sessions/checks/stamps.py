@@ -31,7 +31,7 @@ _AROUND = 15  # messages to each side of a step
 
 
 def _streams(recorded: Recorded) -> Iterator[tuple[str, Times]]:
-    for one in (*recorded.positions, *recorded.imus):
+    for one in recorded.streams:
         if len(one.times.stamp_ns) >= 10:
             yield one.name, one.times
 
@@ -89,14 +89,14 @@ def rate(recorded: Recorded) -> Iterator[Finding]:
         elif hz > _FASTEST_HZ:
             unit = "microseconds" if hz < 1e6 else "milliseconds"
             message = (
-                f'by its stamps "{name}" measures {hz:.3g} times a second, which no sensor does: {unit} or another unit '
-                "stand where nanoseconds are expected; multiply the stamps when logging"
+                f'by its stamps "{name}" measures {hz:.3g} times a second, which no sensor does: {unit} or another '
+                "unit stand where nanoseconds are expected; multiply the stamps when logging"
             )
             yield Finding(RATE, "red", found, expected, message)
         else:
             message = (
-                f'by its stamps "{name}" measures every {1 / hz:.3g} s: its stamps are of another unit, or most messages '
-                "are missing; check the recorder"
+                f'by its stamps "{name}" measures every {1 / hz:.3g} s: its stamps are of another unit, or most '
+                "messages are missing; check the recorder"
             )
             yield Finding(RATE, "amber", found, expected, message)
 
@@ -129,8 +129,8 @@ def regular(recorded: Recorded) -> Iterator[Finding]:
             yield Finding(REGULAR, "green", found, expected)
             continue
         message = (
-            f'the stamps of "{name}" are irregular, by {spread:.0%} of a step: they tell when a message was handled, not '
-            "when it was measured; stamp in the sensor's driver"
+            f'the stamps of "{name}" are irregular, by {spread:.0%} of a step: they tell when a message was handled, '
+            "not when it was measured; stamp in the sensor's driver"
         )
         yield Finding(REGULAR, "amber", found, expected, message)
 

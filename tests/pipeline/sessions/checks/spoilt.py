@@ -88,9 +88,7 @@ def orientation(how: Callable[[np.ndarray], np.ndarray]) -> Callable[[Log, Study
 def later(readings: Readings, seconds: float, arrival: bool = True) -> Readings:
     """The same readings with later times."""
     by = round(seconds * 1e9)
-    return replace(
-        readings, stamp_ns=readings.stamp_ns + by, arrival_ns=readings.arrival_ns + (by if arrival else 0)
-    )
+    return replace(readings, stamp_ns=readings.stamp_ns + by, arrival_ns=readings.arrival_ns + (by if arrival else 0))
 
 
 def without_gravity(value: np.ndarray) -> np.ndarray:
@@ -266,7 +264,13 @@ def frozen(value: np.ndarray) -> np.ndarray:
 def about(axis: str, degrees: float) -> Callable[[np.ndarray], np.ndarray]:
     """Positions turned about an axis."""
     turn = Rotation.from_euler(axis, degrees, degrees=True)
-    return lambda value: turn.apply(value)
+    return turn.apply
+
+
+def in_degrees(value: np.ndarray) -> np.ndarray:
+    """The gyroscope in degrees per second."""
+    value[:, 3:6] = np.degrees(value[:, 3:6])
+    return value
 
 
 MM = ("speed", "millimetres")
@@ -288,7 +292,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("phone 50 ms early", change(IMU, lambda r: later(r, -0.05)), LAG, "ms later"),
     Fault("phone 200 ms late", change(IMU, lambda r: later(r, 0.2)), LAG, "ms later"),
     Fault("stamped on arrival", settings("tracker", stamp="measurement", latency_s=0.0), LAG, "stamp: arrival"),
-    Fault("latency twice the truth", settings("tracker", latency_s=0.2), LAG, "latency_s: 0.1"),
+    Fault("latency twice the truth", settings("tracker", latency_s=0.2), LAG, "set latency_s: 0."),
     Fault("left-handed z", values(TRACKER, lambda v: v * [1, 1, -1]), FRAME, "mirror image"),
     Fault("left-handed x", values(TRACKER, lambda v: v * [-1, 1, 1]), FRAME, "mirror image"),
     Fault("tracker's x and y exchanged", values(TRACKER, lambda v: v[:, [1, 0, 2]]), FRAME, "exchanged"),
@@ -298,12 +302,12 @@ FAULTS: tuple[Fault, ...] = (
     Fault("quaternion inverted", orientation(lambda q: q * [-1, -1, -1, 1]), "gyroscope", "inverted"),
     Fault("orientation a placeholder", orientation(lambda q: q * 0 + [0, 0, 0, 1]), "gyroscope", "frozen"),
     Fault("orientation all zeros", change(IMU, lambda r: of_length(r, 0.0)), "orientation", "all zeros"),
-    Fault("gyroscope in °/s", values(IMU, lambda v: v * ([1] * 3 + [180 / np.pi] * 3 + [1] * 4)), "gyroscope", "degrees"),
+    Fault("gyroscope in °/s", values(IMU, in_degrees), "gyroscope", "degrees"),
     Fault(
         "gyroscope in °/s, no orientation",
         both(
             orientation(lambda q: q * np.nan),
-            values(IMU, lambda v: v * ([1] * 3 + [180 / np.pi] * 3 + [1] * 4)),
+            values(IMU, in_degrees),
         ),
         "gyroscope",
         "degrees",

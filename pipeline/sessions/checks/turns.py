@@ -1,0 +1,26 @@
+"""Turning by quaternions (x, y, z, w) of about unit length; without scipy, whose import costs more than a check."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.statistics.arrays import FloatArray
+
+
+def turned(orientation_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Vectors (n, 3) turned by quaternions (n, 4) of about unit length."""
+    axis, scalar = orientation_xyzw[:, :3], orientation_xyzw[:, 3:]
+    twice = 2 * np.cross(axis, vectors)
+    found: FloatArray = vectors + scalar * twice + np.cross(axis, twice)
+    return found
+
+
+def rotation_vector(before: FloatArray, after: FloatArray) -> FloatArray:
+    """The turn (n, 3) in rad, in the body's frame, between quaternions (n, 4) of about unit length."""
+    vector = before[:, 3:] * after[:, :3] - after[:, 3:] * before[:, :3] - np.cross(before[:, :3], after[:, :3])
+    scalar = np.sum(before * after, axis=1)
+    vector, scalar = vector * np.where(scalar < 0, -1.0, 1.0)[:, None], np.abs(scalar)
+    length = np.linalg.norm(vector, axis=1)
+    angle = 2 * np.arctan2(length, scalar)
+    found: FloatArray = vector * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 2.0)[:, None]
+    return found

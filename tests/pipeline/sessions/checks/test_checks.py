@@ -1,0 +1,143 @@
+"""Every fault is found and its cause named; nothing is found where nothing is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pipeline.sessions.checks import Finding, checked
+from pipeline.sessions.checks.of_log import of_log
+from pipeline.sessions.ingest import _CONTENT
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Log, Wanted
+from pipeline.study.folder import find_sessions, load_study
+from pipeline.study.settings import Study
+from tests.benchmarks.checks import drawn
+from tests.conftest import real
+from tests.pipeline.sessions.checks.hand import Hand, session
+from tests.pipeline.sessions.checks.spoilt import EVENT_FAULTS, FAULTS, IMU, TRACKER, Fault, change, later, values
+
+
+@cache
+def simulated() -> tuple[Log, Study]:
+    """A session without a fault."""
+    return session(Hand())
+
+
+def recordings(study_name: str) -> list[tuple[str, Log, Study]]:
+    """The sessions of a study of real recordings."""
+    root = real(study_name)
+    study = load_study(root)
+    wanted = [Wanted(stream.topic, _CONTENT[stream.kind]) for stream in study.streams.values()]  # type: ignore[arg-type]
+    return [(one.id, read_log(one.path, wanted), study) for one in find_sessions(root, study).sessions]
+
+
+def alarms(log: Log, study: Study) -> list[Finding]:
+    """What is not green."""
+    return [one for one in checked(of_log(log, study)) if one.status != "green"]
+
+
+def names_the_cause(found: Sequence[Finding], fault: Fault) -> bool:
+    """Is there an alarm of the right check whose message names the cause?"""
+    return any(one.check == fault.check and fault.says in one.message for one in found)
+
+
+@pytest.mark.parametrize("fault", [*FAULTS, *EVENT_FAULTS], ids=lambda fault: fault.name)
+def test_a_fault_is_found_and_its_cause_named(fault: Fault) -> None:
+    found = alarms(*fault.spoil(*simulated()))
+    assert names_the_cause(found, fault), "\n".join(str(one) for one in found)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_fault_is_found_in_a_real_recording(fault: Fault) -> None:
+    for name, log, study in recordings("phone-in-hand"):
+        if name != "P02_iphone4s":  # two phones are enough
+            assert names_the_cause(alarms(*fault.spoil(log, study)), fault), name
+
+
+def test_nothing_is_found_where_nothing_is_wrong() -> None:
+    assert alarms(*simulated()) == []
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_nothing_is_found_in_sessions_of_any_sort(seed: int) -> None:
+    assert alarms(*session(drawn(seed))) == []
+
+
+@pytest.mark.parametrize("study_name", ["phone-in-hand", "broad-translation"])
+def test_nothing_is_found_in_real_recordings(study_name: str) -> None:
+    for name, log, study in recordings(study_name):
+        assert alarms(log, study) == [], name
+
+
+def test_every_finding_that_is_not_green_says_what_to_do() -> None:
+    for fault in (*FAULTS, *EVENT_FAULTS):
+        for one in alarms(*fault.spoil(*simulated())):
+            assert one.message
+            assert one.found
+            assert one.expected
+
+
+def test_a_green_finding_says_what_was_found_and_no_more() -> None:
+    assert all(one.found and one.expected and not one.message for one in checked(of_log(*simulated())))
+
+
+@pytest.mark.parametrize("shift_s", [-0.2, -0.1, -0.05, 0.0, 0.05, 0.15])
+def test_the_lag_is_found_within_its_interval(shift_s: float) -> None:
+    log, study = change(IMU, lambda readings: later(readings, shift_s))(*session(Hand(seed=3, seconds=90.0)))
+    motion = of_log(log, study).motion
+    assert motion is not None
+    assert abs(motion.lag_s.value - (0.1 - shift_s)) < 0.01
+    assert motion.lag_s.low <= 0.1 - shift_s <= motion.lag_s.high
+
+
+def test_the_lag_does_not_depend_on_the_frame_of_the_tracker() -> None:
+    log, study = simulated()
+    mirrored, _ = values(TRACKER, lambda value: -value[:, [2, 0, 1]])(log, study)
+    first, second = of_log(log, study).motion, of_log(mirrored, study).motion
+    assert first is not None
+    assert second is not None
+    assert np.isclose(first.lag_s.value, second.lag_s.value)
+    assert np.isclose(first.explained, second.explained)
+
+
+@pytest.mark.parametrize("factor", [0.1, 1.0, 25.4, 1000.0])
+def test_the_size_of_the_movement_is_its_unit(factor: float) -> None:
+    log, study = values(TRACKER, lambda value: value * factor)(*simulated())
+    motion = of_log(log, study).motion
+    assert motion is not None
+    assert motion.scale.value == pytest.approx(factor, rel=0.15)
+
+
+def test_without_an_orientation_the_lag_is_still_found() -> None:
+    log, study = session(Hand(oriented=False))
+    lag = next(one for one in checked(of_log(log, study)) if one.check == "lag")
+    assert lag.status == "green"
+    assert lag.found.endswith("]")
+
+
+def test_a_hand_that_rests_tells_no_lag() -> None:
+    log, study = session(Hand(span_mm=(0.0, 0.0, 0.0), turn_rad=0.0))
+    lag = next(one for one in checked(of_log(log, study)) if one.check == "lag")
+    assert (lag.status, lag.found) == ("green", "cannot be told from this movement")
+
+
+@pytest.mark.parametrize("topic", [TRACKER, IMU])
+def test_streams_that_are_empty_or_short_raise_nothing(topic: str) -> None:
+    log, study = simulated()
+    for count in (0, 1, 2, 5, 30):
+        readings = log.topics[topic]
+        short = replace(
+            readings,
+            stamp_ns=readings.stamp_ns[:count],
+            arrival_ns=readings.arrival_ns[:count],
+            values=readings.values[:count],
+            claims=type(readings.claims)(),
+        )
+        alone = Log({}, {topic: short})
+        assert alarms(alone, study) == []
+        assert all(one.found for one in checked(of_log(Log({}, {**log.topics, topic: short}), study)))
