@@ -10,7 +10,7 @@ STAGES: tuple[Stage, ...] = (
         "ingest",
         "session",
         "pipeline.sessions.ingest:run",
-        settings=("streams", "events", "conditions"),
+        settings=("streams", "events", "conditions", "task"),
         reads_log=True,
     ),
     Stage(

@@ -11,6 +11,8 @@ import pyarrow as pa
 
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import SessionError, did_you_mean
+from pipeline.sessions.checks import check_rows
+from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log, Readings, Wanted
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
@@ -37,7 +39,7 @@ _CONTENT = {
 
 
 def run(work: Work) -> Outcome:
-    """One session's positions, imu, events and quality; SessionError with the reason if it cannot be used."""
+    """One session's positions, imu, events, quality and checks; SessionError with the reason if it cannot be used."""
     study, session = work.study, work.session
     wanted = [Wanted(stream.topic, _CONTENT[stream.kind]) for stream in study.streams.values()]  # type: ignore[arg-type]
     if study.events is not None:
@@ -73,6 +75,7 @@ def run(work: Work) -> Outcome:
             tables.write(name, pa.concat_tables(parts).combine_chunks(), work.out)
     tables.write("events", events, work.out)
     tables.write("quality", tables.of_rows("quality", quality), work.out)
+    tables.write("checks", tables.of_rows("checks", check_rows(session.id, of_log(log, study))), work.out)
     ids = {"participant": participant, "condition": condition, "session": session.id}
     reasons = [f"{row['stream']}: {row['note']}" for row in left_out]
     listed = [{**ids, "what": "samples left out", "reason": reason} for reason in reasons]

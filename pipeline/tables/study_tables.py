@@ -194,6 +194,22 @@ STUDY_TABLES = (
         as_csv=True,
     ),
     Table(
+        "checks",
+        "One row per session and check of what its log claims: readings against each other and against study.yaml.",
+        (
+            SESSION,
+            text("check", "what was checked, and of which stream: as in rate: tracker"),
+            text("status", "green, amber or red"),
+            text("found", "what the readings say"),
+            text("expected", "what they should say"),
+            text("message", "the likely cause and the remedy; null where it is green"),
+        ),
+        stages=("ingest", "compare"),
+        key=("session", "check"),
+        in_results=True,
+        as_csv=True,
+    ),
+    Table(
         "exclusions",
         "One row per session, participant or value that is missing or was left out.",
         (

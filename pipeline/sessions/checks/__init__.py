@@ -6,10 +6,12 @@ Each check is a pure function of `Recorded` and yields findings; docs/checks.md 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import asdict
 
 from pipeline.sessions.checks import agreement, events, force, noise, orientation, publishers, repeats, stamps
 from pipeline.sessions.checks.finding import Finding, Status
 from pipeline.sessions.checks.recorded import Recorded
+from pipeline.tables.table import Row
 
 Check = Callable[[Recorded], Iterable[Finding]]
 
@@ -50,4 +52,9 @@ def checked(recorded: Recorded) -> tuple[Finding, ...]:
     return tuple(finding for check in CHECKS for finding in check(recorded))
 
 
-__all__ = ["CHECKS", "Check", "Finding", "Recorded", "Status", "checked"]
+def check_rows(session: str, recorded: Recorded) -> list[Row]:
+    """Rows of the table `checks`."""
+    return [{"session": session, **asdict(one), "message": one.message or None} for one in checked(recorded)]
+
+
+__all__ = ["CHECKS", "Check", "Finding", "Recorded", "Status", "check_rows", "checked"]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.finding import Finding, Status, graded
+from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.motion import Compared, Interval
 from pipeline.sessions.checks.recorded import Imu, Positions, Recorded
 
@@ -180,12 +180,12 @@ def speed(recorded: Recorded) -> Iterator[Finding]:
         fastest = _fastest_tenth(positions)
         if not np.isfinite(fastest):
             continue
-        found, expected = f"{positions.name}: {fastest / 1e3:.2g} m/s", f"below {_SPEED_MM_S / 1e3:g} m/s"
+        found, expected = f"{fastest / 1e3:.2g} m/s", f"below {_SPEED_MM_S / 1e3:g} m/s"
         if fastest <= _SPEED_MM_S:
-            yield Finding(SPEED, "green", found, expected)
+            yield Finding(of(SPEED, positions.name), "green", found, expected)
             continue
         yield Finding(
-            SPEED,
+            of(SPEED, positions.name),
             "red",
             found,
             expected,

@@ -182,7 +182,7 @@ def _within(shown: Positions, time: FloatArray) -> BoolArray:
 
 def _apart(shown: Positions, time: FloatArray, at: FloatArray) -> FloatArray:
     """Distances (n,) in mm between points and what was there at some times."""
-    stamps, first = np.unique(shown.times.stamp_s, return_index=True)
+    stamps, first = np.unique(shown.times.stamp_s - shown.times.late_s, return_index=True)
     value = shown.value_mm[first]
     there = np.column_stack([np.interp(time, stamps, value[:, axis]) for axis in (0, 1)])
     return np.asarray(np.linalg.norm(there - at, axis=1))

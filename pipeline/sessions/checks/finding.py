@@ -19,6 +19,11 @@ class Finding:
     message: str = ""
 
 
+def of(check: str, stream: str) -> str:
+    """A check of one stream: `rate: tracker`. What stands before the colon is the same in every study."""
+    return f"{check}: {stream}"
+
+
 def graded(value: float, amber: float, red: float) -> Status:
     """The status of a figure that is worse the larger it is."""
     return "red" if value > red else "amber" if value > amber else "green"

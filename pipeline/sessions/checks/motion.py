@@ -43,6 +43,7 @@ _GAP_S = 0.25
 _RESAMPLES = 200
 _RIDGE = 1e-3  # of the accelerations' power: an axis without movement takes no part in the fit
 _SHORTEST = 10  # readings
+_LONGEST = 180_000  # grid steps: of longer sessions the first two hours
 _DEALT = 16  # ways of dealing blocks
 _FLAT, _FLAT_UPRIGHT = 0.05, 0.15  # of the strongest direction's movement, the weakest's
 _LEFT_MIN = 0.02  # of an axis's variance, that is never taken for explained
@@ -103,7 +104,7 @@ def compare(
     if min(len(tracker_s), len(imu_s)) < _SHORTEST:
         return None
     begin, end = max(tracker_s[0], imu_s[0]), min(tracker_s[-1], imu_s[-1])
-    grid = begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), 10_000_000)))
+    grid = begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), _LONGEST)))
     rows = _blocks(grid, tracker_s, imu_s)
     if len(rows) < _BLOCKS_MIN:
         return None

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.finding import Finding, Status
+from pipeline.sessions.checks.finding import Finding, Status, of
 from pipeline.sessions.checks.recorded import Recorded, Times
 from pipeline.statistics.arrays import FloatArray
 
@@ -42,7 +42,7 @@ def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
         if measured is None or measured == 0:
             continue
         ratio = measured / positions.noise_sd_mm
-        found, expected = f"{positions.name}: {measured:.2g} mm", f"{positions.noise_sd_mm:g} mm by study.yaml"
+        found, expected = f"{measured:.2g} mm", f"{positions.noise_sd_mm:g} mm by study.yaml"
         status: Status = "red" if ratio > _TRACKER[1] else "amber" if ratio > _TRACKER[0] else "green"
         if status != "green":
             message = (
@@ -51,7 +51,7 @@ def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
             )
         else:
             message = ""
-        yield Finding(TRACKER_NOISE, status, found, expected, message)
+        yield Finding(of(TRACKER_NOISE, positions.name), status, found, expected, message)
 
 
 def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
@@ -63,7 +63,7 @@ def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
         if measured is None:
             continue
         ratio = measured / imu.noise_sd_mm_s2
-        found, expected = f"{imu.name}: {measured:.2g} mm/s²", f"{imu.noise_sd_mm_s2:g} mm/s² by study.yaml"
+        found, expected = f"{measured:.2g} mm/s²", f"{imu.noise_sd_mm_s2:g} mm/s² by study.yaml"
         status: Status = "red" if ratio > _IMU[1] else "amber" if ratio > _IMU[0] else "green"
         message = ""
         if status != "green":
@@ -71,7 +71,7 @@ def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
                 f'the readings of "{imu.name}" scatter by {measured:.2g} mm/s² and study.yaml states '
                 f"{imu.noise_sd_mm_s2:g}: set noise_sd_mm_s2: {measured:.2g}, or look for vibration"
             )
-        yield Finding(IMU_NOISE, status, found, expected, message)
+        yield Finding(of(IMU_NOISE, imu.name), status, found, expected, message)
 
 
 def noise_sd(times: Times, value: FloatArray) -> float | None:

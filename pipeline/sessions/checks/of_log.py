@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
+from pipeline.sessions.checks.turns import turned
 from pipeline.sessions.logs.log import BoolArray, Log, Readings
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
@@ -12,6 +13,7 @@ from pipeline.study.streams import AccelerationStream, DisplayStream, PositionSt
 from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
+_DAY_NS = 86_400e9
 Placed = PositionStream | ReferenceStream | DisplayStream
 
 
@@ -42,7 +44,8 @@ def of_log(log: Log, study: Study) -> Recorded:
 
 def times(readings: Readings, origin_ns: int, stream: Stream | None = None) -> Times:
     """When they were stamped and arrived, and how late study.yaml says that the stamps are."""
-    late_s = stream.latency_s if stream is not None and stream.stamp == "arrival" else 0.0
+    late = stream is not None and (stream.stamp == "arrival" or stream.kind in ("reference", "display"))
+    late_s = stream.latency_s if stream is not None and late else 0.0
     return Times(readings.stamp_ns, readings.arrival_ns, origin_ns, late_s)
 
 
@@ -53,13 +56,16 @@ def of_positions(
     stream: Placed | None = None,
 ) -> Positions:
     """A stream of positions, those that are not finite left out."""
-    whole: BoolArray = np.all(np.isfinite(readings.values), axis=1)
+    whole = _sound(readings, 3)
     kept = _kept(readings, whole)
+    value_mm = kept.values * _MM_PER_M
+    if isinstance(stream, ReferenceStream):
+        value_mm = turned(_unit(stream.rotation_xyzw), value_mm) + np.array(stream.translation_mm)
     return Positions(
         name,
         "position" if stream is None else stream.kind,
         times(kept, origin_ns, stream),
-        kept.values * _MM_PER_M,
+        value_mm,
         stream.noise_sd_mm if isinstance(stream, PositionStream) else None,
         _frames(readings, whole),
     )
@@ -67,7 +73,7 @@ def of_positions(
 
 def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStream | None = None) -> Imu:
     """A stream of accelerations, those that are not finite left out."""
-    whole: BoolArray = np.all(np.isfinite(readings.values[:, :6]), axis=1)
+    whole = _sound(readings, 6)
     kept, claims = _kept(readings, whole), readings.claims
     count = kept.read
 
@@ -77,7 +83,7 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
     return Imu(
         name,
         times(kept, origin_ns, stream),
-        kept.values[:, :3],
+        kept.values[:, :3] if stream is None else turned(_unit(stream.mounting_xyzw), kept.values[:, :3]),
         kept.values[:, 3:6],
         kept.values[:, 6:10],
         of(claims.orientation_length, np.nan),
@@ -85,8 +91,23 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
         of(claims.gyroscope_disclaimed.astype(float), 0.0) > 0,
         None if stream is None else stream.gravity_mm_s2,
         None if stream is None else stream.noise_sd_mm_s2,
+        stream is not None and stream.calibrate_s > 0,
         _frames(readings, whole),
     )
+
+
+def _unit(quaternion_xyzw: tuple[float, float, float, float]) -> FloatArray:
+    """A rotation of study.yaml (1, 4), which need not be of unit length there."""
+    found: FloatArray = np.array([quaternion_xyzw]) / np.linalg.norm(quaternion_xyzw)
+    return found
+
+
+def _sound(readings: Readings, figures: int) -> BoolArray:
+    """Where the first so many figures are numbers and the times are of one day with the others."""
+    found: BoolArray = np.all(np.isfinite(readings.values[:, :figures]), axis=1)
+    for one in (readings.stamp_ns, readings.arrival_ns):
+        found &= np.abs(one.astype(np.float64) - float(np.median(one))) <= _DAY_NS
+    return found
 
 
 def _kept(readings: Readings, whole: BoolArray) -> Readings:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.finding import Finding, Status, graded
+from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.recorded import Imu, Recorded
 from pipeline.sessions.checks.turns import rotation_vector
 from pipeline.statistics.arrays import FloatArray
@@ -49,9 +49,9 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
         return
     if turns < _STILL * reads:
         yield Finding(
-            TURNING,
+            of(TURNING, imu.name),
             "red",
-            f"{imu.name}: turns by {reads:.2g} rad/s, the orientation does not",
+            f"turns by {reads:.2g} rad/s, the orientation does not",
             expected,
             f'the gyroscope of "{imu.name}" turns and its orientation does not: the orientation is frozen or a '
             "placeholder; log the real one, or say that it is unknown by orientation_covariance[0] = -1",
@@ -59,9 +59,9 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
         return
     if reads < _STILL * turns:
         yield Finding(
-            TURNING,
+            of(TURNING, imu.name),
             "amber",
-            f"{imu.name}: {reads:.2g} rad/s while the orientation turns by {turns:.2g}",
+            f"{reads:.2g} rad/s while the orientation turns by {turns:.2g}",
             expected,
             f'the orientation of "{imu.name}" turns and its gyroscope reads nothing: it is not logged; log it, '
             "for it carries an orientation over gaps",
@@ -69,9 +69,10 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
         return
     ratio = float(np.sum(rate * measured) / np.sum(rate**2))
     alike = float(np.sum(rate * measured) / np.sqrt(np.sum(rate**2) * np.sum(measured**2)))
-    found = f"{imu.name}: {ratio:.3g} times, correlation {alike:.2f}"
+    found = f"{ratio:.3g} times, correlation {alike:.2f}"
     status: Status = "red" if alike < _ALIKE else graded(max(ratio, 1 / max(ratio, 1e-9)), _AMBER, _RED)
-    yield Finding(TURNING, status, found, expected, "" if status == "green" else _turning_message(imu, ratio, alike))
+    message = "" if status == "green" else _turning_message(imu, ratio, alike)
+    yield Finding(of(TURNING, imu.name), status, found, expected, message)
 
 
 def _turning_message(imu: Imu, ratio: float, alike: float) -> str:
@@ -122,12 +123,12 @@ def _against_gravity(imu: Imu) -> Iterator[Finding]:
     if ratio is None:
         return
     slope, alike = ratio
-    found, expected = f"{imu.name}: {slope:.2g} times the turning of gravity", "0.1 to 3 times"
+    found, expected = f"{slope:.2g} times the turning of gravity", "0.1 to 3 times"
     if alike < 0.3 or slope < 10:
-        yield Finding(TURNING, "green", found, expected)
+        yield Finding(of(TURNING, imu.name), "green", found, expected)
         return
     yield Finding(
-        TURNING,
+        of(TURNING, imu.name),
         "red",
         found,
         expected,
@@ -174,7 +175,7 @@ def length(recorded: Recorded) -> Iterator[Finding]:
         wrong = given[(given < _UNIT[0]) | (given > _UNIT[1])]
         expected = "1"
         if len(wrong) <= _STRAY_SHARE * len(given):
-            yield Finding(LENGTH, "green", f"{imu.name}: {np.median(given):.3g}", expected)
+            yield Finding(of(LENGTH, imu.name), "green", f"{np.median(given):.3g}", expected)
             continue
         share = len(wrong) / len(given)
         zero = bool(np.median(wrong) == 0)
@@ -184,9 +185,9 @@ def length(recorded: Recorded) -> Iterator[Finding]:
             else "it is no rotation; log a unit quaternion x, y, z, w"
         )
         yield Finding(
-            LENGTH,
+            of(LENGTH, imu.name),
             "amber" if zero else "red",
-            f"{imu.name}: {np.median(wrong):.3g} in {share:.0%} of the messages",
+            f"{np.median(wrong):.3g} in {share:.0%} of the messages",
             expected,
             f'the orientation of "{imu.name}" is {"all zeros" if zero else f"{np.median(wrong):.3g} long"} in '
             f"{len(wrong)} messages: {cause}",
@@ -213,9 +214,9 @@ def covariances(recorded: Recorded) -> Iterator[Finding]:
                 else "the values do vary, and they are used; correct the covariance in the driver if they are good"
             )
             yield Finding(
-                DISCLAIMED,
+                of(DISCLAIMED, f"{imu.name} {what}"),
                 "red" if empty else "amber",
-                f"{imu.name}: {what}_covariance[0] is -1 in {int(disclaimed.sum())} messages",
+                f"{what}_covariance[0] is -1 in {int(disclaimed.sum())} messages",
                 "not -1",
                 f'"{imu.name}" says by {what}_covariance[0] = -1 that its {what} is to be disregarded; {cause}',
             )

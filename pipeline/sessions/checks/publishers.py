@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.finding import Finding
+from pipeline.sessions.checks.finding import Finding, of
 from pipeline.sessions.checks.recorded import Positions, Recorded
 
 FRAME_ID, PUBLISHERS = "frame_id", "one publisher"
@@ -22,7 +22,7 @@ def frame_ids(recorded: Recorded) -> Iterator[Finding]:
         if not len(number):
             continue
         if len(names) < 2:
-            yield Finding(FRAME_ID, "green", f"{one.name}: {_named(names[0])}", "one")
+            yield Finding(of(FRAME_ID, one.name), "green", _named(names[0]), "one")
             continue
         changes = int(np.sum(np.diff(number) != 0))
         at_s = float(one.times.stamp_s[np.flatnonzero(np.diff(number) != 0)[0] + 1] - one.times.stamp_s.min())
@@ -32,7 +32,7 @@ def frame_ids(recorded: Recorded) -> Iterator[Finding]:
         else:
             cause = "the positions after it are of another frame; transform them into one frame, or cut the log there"
         message = f'"{one.name}" names several frames ({listed}), first changing {at_s:.0f} s in: {cause}'
-        yield Finding(FRAME_ID, "red", f"{one.name}: {listed}; {changes} changes", "one", message)
+        yield Finding(of(FRAME_ID, one.name), "red", f"{listed}; {changes} changes", "one", message)
 
 
 def _named(name: str) -> str:
@@ -48,15 +48,15 @@ def publishers(recorded: Recorded) -> Iterator[Finding]:
         if len(positions.value_mm) < 50:
             continue
         near, far = _steps(positions)
-        found, expected = f"{positions.name}: {far:.0f} mm to the next message, {near:.0f} to the one after", "one"
+        found, expected = f"{far:.0f} mm to the next message, {near:.0f} to the one after", "one"
         if far < _FAR_MM or far < _APART * near:
-            yield Finding(PUBLISHERS, "green", f"{positions.name}: one", expected)
+            yield Finding(of(PUBLISHERS, positions.name), "green", "one", expected)
             continue
         message = (
             f'successive positions of "{positions.name}" go to and fro by {far:.0f} mm: two nodes publish on its '
             "topic; give each a topic of its own"
         )
-        yield Finding(PUBLISHERS, "red", found, expected, message)
+        yield Finding(of(PUBLISHERS, positions.name), "red", found, expected, message)
 
 
 def _steps(positions: Positions) -> tuple[float, float]:

@@ -76,6 +76,7 @@ class Imu:
 
     `orientation_length` (n,) is the quaternion's own, NaN where the log says it is unknown; `force_disclaimed` and
     `gyroscope_disclaimed` (n,) say where a covariance of −1 tells the reader to disregard the values.
+    `calibrated_later`: how it is mounted is learned from the session itself.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Imu:
     gyroscope_disclaimed: BoolArray
     gravity_mm_s2: tuple[float, float, float] | None = None
     noise_sd_mm_s2: float | None = None
+    calibrated_later: bool = False
     frames: Frames = Frames()
 
     @cached_property

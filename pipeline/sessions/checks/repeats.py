@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.sessions.checks.finding import Finding, graded
+from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Positions, Recorded
 from pipeline.statistics.arrays import FloatArray
 
@@ -28,12 +28,12 @@ def zeros(recorded: Recorded) -> Iterator[Finding]:
         if not len(value):
             continue
         count = int(np.sum(np.all(value == 0.0, axis=1)))
-        found, expected = f"{positions.name}: {count}", "0"
+        found, expected = f"{count}", "0"
         if count == 0 or not _jumps_to_zero(value):
-            yield Finding(ZEROS, "green", found, expected)
+            yield Finding(of(ZEROS, positions.name), "green", found, expected)
             continue
         yield Finding(
-            ZEROS,
+            of(ZEROS, positions.name),
             graded(count / len(value), 0.0, 0.005),
             f"{found} of {len(value)}",
             expected,
@@ -66,22 +66,22 @@ def held(recorded: Recorded) -> Iterator[Finding]:
         same = np.all(np.diff(value, axis=0) == 0.0, axis=1) & (np.diff(time) > 0)
         same &= ~np.all(value[1:] == 0.0, axis=1)  # zeros have a check of their own
         share, longest_s = float(same.mean()), _longest(time, same)
-        found = f"{positions.name}: {share:.1%}, at most {longest_s:.2g} s"
+        found = f"{share:.1%}, at most {longest_s:.2g} s"
         expected = "no repeats"
         if longest_s > _HELD_S:
             message = (
                 f'"{positions.name}" holds one position for up to {longest_s:.2g} s: the tracker sends its last '
                 "position on while it sees nothing; send nothing then, or leave the repeats out of the log"
             )
-            yield Finding(HELD, "red" if longest_s > 1.0 else "amber", found, expected, message)
+            yield Finding(of(HELD, positions.name), "red" if longest_s > 1.0 else "amber", found, expected, message)
         elif share > _REPUBLISHED:
             message = (
                 f'{share:.0%} of the positions of "{positions.name}" repeat the one before: they are sent on faster '
                 "than the tracker measures; log the tracker's own topic, each measurement once with its own stamp"
             )
-            yield Finding(HELD, "amber", found, expected, message)
+            yield Finding(of(HELD, positions.name), "amber", found, expected, message)
         else:
-            yield Finding(HELD, "green", found, expected)
+            yield Finding(of(HELD, positions.name), "green", found, expected)
 
 
 def _coarse(positions: Positions) -> bool:
@@ -111,15 +111,15 @@ def frozen(recorded: Recorded) -> Iterator[Finding]:
         time, force = imu.times.stamp_s[order], imu.force_m_s2[order]
         same = np.all(np.diff(force, axis=0) == 0.0, axis=1) & (np.diff(time) > 0)
         longest_s, share = _longest(time, same), float(same.mean())
-        found, expected = f"{imu.name}: {share:.1%}, at most {longest_s:.2g} s", f"at most {_FROZEN_S:g} s"
+        found, expected = f"{share:.1%}, at most {longest_s:.2g} s", f"at most {_FROZEN_S:g} s"
         if longest_s <= _FROZEN_S and share < 0.5:
-            yield Finding(FROZEN, "green", found, expected)
+            yield Finding(of(FROZEN, imu.name), "green", found, expected)
             continue
         message = (
             f'"{imu.name}" repeats one reading for up to {longest_s:.2g} s ({share:.0%} of the messages): the sensor '
             "or its driver has stopped, or is sent on faster than it measures; leave the repeats out, or record anew"
         )
-        yield Finding(FROZEN, "red" if longest_s > 2.0 else "amber", found, expected, message)
+        yield Finding(of(FROZEN, imu.name), "red" if longest_s > 2.0 else "amber", found, expected, message)
 
 
 def clipped(recorded: Recorded) -> Iterator[Finding]:
@@ -132,12 +132,12 @@ def clipped(recorded: Recorded) -> Iterator[Finding]:
             if len(values) < 100:
                 continue
             count, limit = max((_at_limit(column) for column in values.T), key=lambda one: one[0])
-            found, expected = f"{imu.name}: {count} at the limit of the {what}", "0"
+            found, expected = f"{count} at the limit of the {what}", "0"
             if count <= _CLIPPED_SHARE * len(values):
-                yield Finding(CLIPPED, "green", found, expected)
+                yield Finding(of(CLIPPED, f"{imu.name} {what}"), "green", found, expected)
                 continue
             yield Finding(
-                CLIPPED,
+                of(CLIPPED, f"{imu.name} {what}"),
                 "red" if count > 0.05 * len(values) else "amber",
                 found,
                 expected,

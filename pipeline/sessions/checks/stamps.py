@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.finding import Finding, graded
+from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Recorded, Times
 from pipeline.sessions.logs.log import IntArray
 from pipeline.statistics.arrays import FloatArray
@@ -41,7 +41,7 @@ def doubled(recorded: Recorded) -> Iterator[Finding]:
     for name, times in _streams(recorded):
         steps = times.steps_s
         count = int(np.sum(steps == 0))
-        found, expected = f"{name}: {count}", "0"
+        found, expected = f"{count}", "0"
         status = graded(count / len(steps), _DOUBLED_AMBER, _DOUBLED_RED)
         message = ""
         if status != "green":
@@ -50,7 +50,7 @@ def doubled(recorded: Recorded) -> Iterator[Finding]:
                 "twice, two nodes publish on the topic, or the stamps are coarser than the rate; log each measurement "
                 "once, with its own stamp"
             )
-        yield Finding(DOUBLED, status, found, expected, message)
+        yield Finding(of(DOUBLED, name), status, found, expected, message)
 
 
 def rounded(recorded: Recorded) -> Iterator[Finding]:
@@ -64,7 +64,7 @@ def rounded(recorded: Recorded) -> Iterator[Finding]:
                     f'every stamp of "{name}" is a multiple of {unit_s:g} s: its nanoseconds are lost; log sec and '
                     "nanosec, or set stamp: arrival"
                 )
-                yield Finding(ROUNDED, "red", f"{name}: to {unit_s:g} s", "nanoseconds", message)
+                yield Finding(of(ROUNDED, name), "red", f"to {unit_s:g} s", "nanoseconds", message)
                 break
 
 
@@ -74,31 +74,31 @@ def rate(recorded: Recorded) -> Iterator[Finding]:
         steps = times.steps_s[times.steps_s > 0]
         if not len(steps):
             yield Finding(
-                RATE,
+                of(RATE, name),
                 "red",
-                f"{name}: one stamp for all messages",
+                "one stamp for all messages",
                 "1 to 5000 Hz",
                 f'all messages of "{name}" have the same stamp: the sender does not stamp; stamp each measurement, or '
                 "set stamp: arrival",
             )
             continue
         hz = 1.0 / float(np.median(steps))
-        found, expected = f"{name}: {hz:.4g} Hz", "1 to 5000 Hz"
+        found, expected = f"{hz:.4g} Hz", "1 to 5000 Hz"
         if _SLOWEST_HZ <= hz <= _FASTEST_HZ:
-            yield Finding(RATE, "green", found, expected)
+            yield Finding(of(RATE, name), "green", found, expected)
         elif hz > _FASTEST_HZ:
             unit = "microseconds" if hz < 1e6 else "milliseconds"
             message = (
                 f'by its stamps "{name}" measures {hz:.3g} times a second, which no sensor does: {unit} or another '
                 "unit stand where nanoseconds are expected; multiply the stamps when logging"
             )
-            yield Finding(RATE, "red", found, expected, message)
+            yield Finding(of(RATE, name), "red", found, expected, message)
         else:
             message = (
                 f'by its stamps "{name}" measures every {1 / hz:.3g} s: its stamps are of another unit, or most '
                 "messages are missing; check the recorder"
             )
-            yield Finding(RATE, "amber", found, expected, message)
+            yield Finding(of(RATE, name), "amber", found, expected, message)
 
 
 def bursts(recorded: Recorded) -> Iterator[Finding]:
@@ -108,14 +108,14 @@ def bursts(recorded: Recorded) -> Iterator[Finding]:
         mean = float(np.mean(steps[steps <= np.percentile(steps, 99.5)]))
         median = float(np.median(steps))
         if mean <= 0 or median >= _BUNCHED * mean or float(np.mean(steps == 0)) > _DOUBLED_RED:
-            yield Finding(BURSTS, "green", f"{name}: none", "none")
+            yield Finding(of(BURSTS, name), "green", "none", "none")
             continue
         size = max(2, round(1.0 / float(np.mean(steps > mean))))
         message = (
             f'the stamps of "{name}" come in bursts of about {size}: the readings of a packet were stamped as it '
             "arrived; stamp each with its own time of measurement"
         )
-        yield Finding(BURSTS, "amber", f"{name}: about {size} at a time", "none", message)
+        yield Finding(of(BURSTS, name), "amber", f"about {size} at a time", "none", message)
 
 
 def regular(recorded: Recorded) -> Iterator[Finding]:
@@ -124,15 +124,15 @@ def regular(recorded: Recorded) -> Iterator[Finding]:
         spread = irregularity(times.steps_s)
         if spread is None:
             continue
-        found, expected = f"{name}: {spread:.0%} of a step", f"at most {_IRREGULAR:.0%}"
+        found, expected = f"{spread:.0%} of a step", f"at most {_IRREGULAR:.0%}"
         if spread <= _IRREGULAR:
-            yield Finding(REGULAR, "green", found, expected)
+            yield Finding(of(REGULAR, name), "green", found, expected)
             continue
         message = (
             f'the stamps of "{name}" are irregular, by {spread:.0%} of a step: they tell when a message was handled, '
             "not when it was measured; stamp in the sensor's driver"
         )
-        yield Finding(REGULAR, "amber", found, expected, message)
+        yield Finding(of(REGULAR, name), "amber", found, expected, message)
 
 
 def irregularity(steps_s: FloatArray) -> float | None:
@@ -158,7 +158,7 @@ def clock(recorded: Recorded) -> Iterator[Finding]:
                 f"their arrivals by {abs(by_s):.2f} s and stay so: its clock was set; use a clock that is not set "
                 "while recording, or cut the log there"
             )
-            yield Finding(STEPS, "red", f"{name}: {by_s:+.2f} s at {at_s:.0f} s", expected, message)
+            yield Finding(of(STEPS, name), "red", f"{by_s:+.2f} s at {at_s:.0f} s", expected, message)
         elif back is not None:
             at, by_s = back
             at_s = float(times.arrival_s[at] - times.arrival_s.min())
@@ -166,9 +166,9 @@ def clock(recorded: Recorded) -> Iterator[Finding]:
                 f'{at_s:.0f} s into the session the recorder\'s clock goes back by {by_s:.2f} s ("{name}"): it was set '
                 "while recording; use a clock that is not set, or cut the log there"
             )
-            yield Finding(STEPS, "red", f"{name}: -{by_s:.2f} s at {at_s:.0f} s", expected, message)
+            yield Finding(of(STEPS, name), "red", f"-{by_s:.2f} s at {at_s:.0f} s", expected, message)
         else:
-            yield Finding(STEPS, "green", f"{name}: none", expected)
+            yield Finding(of(STEPS, name), "green", "none", expected)
 
 
 def _parted(times: Times) -> tuple[float, float] | None:

@@ -55,6 +55,7 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
         "accuracy",
         "replay_agreement",
         "quality",
+        "checks",
         "exclusions",
         "sensor_noise",
         "phones",
