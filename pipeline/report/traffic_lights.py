@@ -17,7 +17,7 @@ Light = Literal["not judged", "green", "amber", "red"]
 LIGHTS: tuple[Light, ...] = ("not judged", "green", "amber", "red")
 """From the least to the worst."""
 SYMBOLS: Mapping[Light, str] = {"not judged": "–", "green": "✓", "amber": "▲", "red": "✗"}
-FACTS = ("Rate", "Longest gap", "Delay", "Clock", "Lost", "Replay")
+FACTS = ("Rate", "Longest gap", "Delay", "Clock", "Lost", "Replay", "Checks")
 """What is judged of a session, in the order of the report."""
 _TO_COMPARE = 3  # sessions: with fewer the usual rate cannot be told from an unusual one
 
@@ -39,8 +39,8 @@ class Judged:
         return f"{head}: {self.shown} ({self.of})" if self.light in ("amber", "red") else head
 
 
-def judged(study: Study, quality: Sequence[Row], agreement: Sequence[Row]) -> list[Judged]:
-    """Every figure of every session; rows of the tables `quality` and `replay_agreement`."""
+def judged(study: Study, quality: Sequence[Row], agreement: Sequence[Row], checks: Sequence[Row] = ()) -> list[Judged]:
+    """Every figure of every session; rows of the tables `quality`, `replay_agreement` and `checks`."""
     limits, usual = study.quality_limits, _usual_rates(study, quality)
     found = [one for row in quality for one in _stream(study, row, usual.get(row["stream"]))]
     there = {(row["session"], row["stream"]) for row in quality}
@@ -51,6 +51,7 @@ def judged(study: Study, quality: Sequence[Row], agreement: Sequence[Row]) -> li
         apart = row["max_mm"]
         light: Light = "not judged" if apart is None else _above(apart, limits.agreement_mm)
         found.append(Judged(row["session"], "Replay", row["estimator"], f"{number(apart, 3)} mm apart", light))
+    found += [Judged(row["session"], "Checks", row["check"], row["found"], row["status"]) for row in checks]
     return found
 
 

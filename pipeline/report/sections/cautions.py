@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from pipeline.report.document.model import Strong, Text
+from pipeline.report.sections import checks
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
@@ -16,8 +17,14 @@ _FEW = 8  # participants
 
 
 def cautions(material: Material) -> list[Text]:
-    """From where the data come from, through assumptions and design, to what is missing."""
-    return [*_of_data(material), *_of_assumptions(material), *_of_design(material), *_of_gaps(material)]
+    """From what the data contradict and where they come from, through assumptions and design, to what is missing."""
+    return [
+        *checks.caution(material),
+        *_of_data(material),
+        *_of_assumptions(material),
+        *_of_design(material),
+        *_of_gaps(material),
+    ]
 
 
 def _of_data(material: Material) -> Iterator[Text]:

@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report import traffic_lights as session_quality
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
-from pipeline.report.sections import timeline
+from pipeline.report.sections import checks, timeline
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
@@ -24,6 +24,7 @@ def section(material: Material) -> Section:
     blocks: list[Block] = []
     if material.rows("quality"):
         blocks += _lights(material)
+        blocks += checks.blocks(material)
         blocks.append(_quality_table(material))
         blocks += timeline.blocks(material)
         if material.rows("sensor_noise"):
@@ -48,7 +49,8 @@ def section(material: Material) -> Section:
 def _lights(material: Material) -> list[Block]:
     """How many sessions are green, amber and red, and what it is in each."""
     found: dict[str, list[Judged]] = {}
-    judged = session_quality.judged(material.study, material.rows("quality"), material.rows("replay_agreement"))
+    rows = (material.rows(name) for name in ("quality", "replay_agreement", "checks"))
+    judged = session_quality.judged(material.study, *rows)
     for one in judged:
         found.setdefault(one.session, []).append(one)
     lights = [light_of(figures) for figures in found.values()]
@@ -64,7 +66,8 @@ def _lights(material: Material) -> list[Block]:
         columns(("Session", "Light", *facts), len(facts) + 2),
         cells,
         f"Amber from here on (red): {limits}. A rate is held against the one that study.yaml states, or the median of "
-        "three sessions and more; quality_limits in study.yaml moves the limits. Nobody is left out for a light.",
+        "three sessions and more; quality_limits in study.yaml moves the limits. Checks: what the readings "
+        "say of each other and of study.yaml, in the table of checks. Nobody is left out for a light.",
     )
     text = f"{counted(len(found), 'session')}: {listing(shares)}.{_not_whole(material)}"
     return [Paragraph((Strong("Quality: "), text)), table]

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.sessions.logs.log import Claims, Log, Readings
+from pipeline.sessions.logs.log import Claims, Content, Log, Readings
+from pipeline.sessions.logs.mcap import Message
 from pipeline.study.settings import Study
 
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -188,3 +189,18 @@ def _study(hand: Hand, gravity: np.ndarray, path: Path) -> Study:
             },
         }
     )
+
+
+def messages(log: Log) -> list[Message]:
+    """The log's messages, to be written to a file."""
+    found: list[Message] = []
+    for topic, readings in log.topics.items():
+        times = zip(readings.stamp_ns.tolist(), readings.arrival_ns.tolist(), strict=True)
+        for row, (stamp, arrival) in enumerate(times):
+            if readings.events:
+                event = {key: value for key, value in readings.events[row].items() if value is not None}
+                found.append(Message(topic, "events", stamp, arrival, event=event))
+            else:
+                content: Content = "position" if readings.values.shape[1] == 3 else "acceleration"
+                found.append(Message(topic, content, stamp, arrival, readings.values[row]))
+    return found

@@ -1,0 +1,84 @@
+"""What the readings contradict, and the lag between tracker and phone in every session."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from pipeline.report.document.model import Block, Paragraph, Strong, Table, Text, columns
+from pipeline.report.sections.material import Material
+from pipeline.report.traffic_lights import LIGHTS, SYMBOLS
+from pipeline.tables.table import Row
+from pipeline.words import counted, listing
+
+_ROWS_MAX = 40
+_NAMED_MAX = 3
+LAG = "lag"
+
+
+def blocks(material: Material) -> Iterator[Block]:
+    """How many checks were made, those that are not green, and the lags."""
+    rows = material.rows("checks")
+    if not rows:
+        return
+    contradicted = sorted(_contradicted(rows), key=lambda row: -LIGHTS.index(row["status"]))
+    found = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
+    text = f"{found} of what the logs and study.yaml claim; each is described in docs/checks.md." + _lags(rows)
+    yield Paragraph((Strong("Checks: "), text))
+    if contradicted:
+        yield _table(contradicted)
+
+
+def _contradicted(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["status"] != "green"]
+
+
+def _lags(rows: Sequence[Row]) -> str:
+    """The lag of each session, as far as a paragraph takes them."""
+    lags = [f"{row['session']} {row['found']}" for row in rows if row["check"] == LAG]
+    if not lags:
+        return ""
+    more = f"; and {len(lags) - _ROWS_MAX} more in tables/checks.csv" if len(lags) > _ROWS_MAX else ""
+    return (
+        " How much later the tracker's stamps are than the phone's, by their movement, with the 95 % interval: "
+        f"{'; '.join(lags[:_ROWS_MAX])}{more}."
+    )
+
+
+def _table(rows: Sequence[Row]) -> Table:
+    cells = tuple(
+        (
+            row["session"],
+            row["check"],
+            f"{SYMBOLS[row['status']]} {row['status']}",
+            row["found"],
+            row["expected"],
+            row["message"] or "",
+        )
+        for row in rows[:_ROWS_MAX]
+    )
+    more = f" The worst {_ROWS_MAX} of {len(rows)}; all are in tables/checks.csv." if len(rows) > _ROWS_MAX else ""
+    titles = ("Session", "Check", "Light", "Found", "Expected", "Likely cause and remedy")
+    return Table(
+        "table-checks",
+        f"Where readings contradict each other or study.yaml, the worst first.{more}",
+        columns(titles, len(titles)),
+        cells,
+    )
+
+
+def caution(material: Material) -> Iterator[Text]:
+    """For the first page: what is red, and where; the figures of those sessions are not to be believed."""
+    red = [row for row in material.rows("checks") if row["status"] == "red"]
+    if not red:
+        return
+    sessions = list(dict.fromkeys(row["session"] for row in red))
+    kinds = list(dict.fromkeys(row["check"] for row in red))
+    more = f" and {counted(len(kinds) - _NAMED_MAX, 'other check')}" if len(kinds) > _NAMED_MAX else ""
+    first = red[0]
+    text = (
+        f"in {counted(len(sessions), 'session')} ({listing(sessions[:_NAMED_MAX])}"
+        f"{', …' if len(sessions) > _NAMED_MAX else ''}), by {listing(kinds[:_NAMED_MAX])}{more}. "
+        f"{first['session']}: {first['message']}. Figures that rest on these sessions are not to be believed before "
+        "that is put right; data quality has the table of checks."
+    )
+    yield (Strong("The data contradict themselves or study.yaml "), text)
