@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from pipeline.commands import console
 from pipeline.errors import PipelineError, SessionError
+from pipeline.sessions.checks.agreement import LAG
+from pipeline.sessions.inspection import Inspection, Topic, inspected
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.stream_quality import quality_row
 from pipeline.tables import table as tables
-from pipeline.words import number
+from pipeline.words import counted, listing, number
 
 
 def inspect(files: Sequence[Path], as_json: bool) -> None:
-    """Print a row a topic; exit with 1 where a log was read in part, 2 where none of one can be read."""
+    """Print each topic, what it is usable as, a block for study.yaml and the checks.
+
+    Exit with 1 where a log was read in part or holds nothing that a study can use, 2 where none of one can be read.
+    """
     rows: list[dict[str, object]] = []
     code = 0
     for path in files:
@@ -34,21 +40,68 @@ def inspect(files: Sequence[Path], as_json: bool) -> None:
             console.warn(f"steadyhand: {path}: {fault}")
         if log.faults or any(row["messages_lost"] for row in found):
             code = max(code, 1)
-        if not as_json:
-            _print(path, found, log.facts)
+        if as_json:
+            continue
+        seen = inspected(path, log)
+        _print(path, found, log.facts, {topic.name: topic for topic in seen.topics})
+        for line in (*_block(seen), *_checks(seen)):
+            console.say(line)
+        if not seen.usable:
+            console.warn(f"steadyhand: {path}: no topic is usable as position, acceleration or events")
+            code = max(code, 1)
     if as_json:
         console.say(json.dumps(rows, indent=1, ensure_ascii=False))
     sys.exit(code)
 
 
-def _print(path: Path, rows: Sequence[dict[str, object]], facts: object) -> None:
+def _print(path: Path, rows: Sequence[dict[str, object]], facts: object, topics: Mapping[object, Topic]) -> None:
     console.say(f"{path}  {dict(facts) if isinstance(facts, dict) and facts else 'no session facts'}")
     for row in rows:
-        lost = row.get("messages_lost")
-        rate = row.get("rate_hz")
+        lost, topic = row.get("messages_lost"), topics.get(row["stream"])
+        rate = row.get("rate_hz") if topic is None or topic.rate_hz is None else topic.rate_hz
         console.say(
             f"  {row['stream']}: {row['messages_read']} messages, "
             f"{'an unknown number' if lost is None else lost} lost"
             + (f", {number(rate, 1)} Hz" if isinstance(rate, float) else "")
             + (f"; {row['note']}" if row.get("note") else "")
         )
+        if topic is not None:
+            console.say(f"    {_described(topic)}")
+
+
+def _described(topic: Topic) -> str:
+    """`geometry_msgs/msg/PointStamped (cdr), frame_id "tracker"; usable as position`."""
+    frames = f", frame_id {listing([json.dumps(name) for name in topic.frames])}" if topic.frames else ""
+    use = f"usable as {topic.content}" if topic.content is not None else f"not usable, because {topic.why_not}"
+    return f"{topic.type.name or 'no type'} ({topic.type.encoding or 'no encoding'}){frames}; {use}"
+
+
+def _block(seen: Inspection) -> Iterator[str]:
+    """What study.yaml would say of this log, to be pasted and looked over."""
+    if not seen.usable:
+        return
+    yield "For study.yaml, as this log has it:"
+    if seen.streams:
+        yield "streams:"
+    for name, stream in seen.streams.items():
+        yield f"  {name}: {{{', '.join(f'{key}: {_yaml(value)}' for key, value in stream.items())}}}"
+    if seen.events is not None:
+        yield f"events: {{topic: {_yaml(seen.events)}}}"
+
+
+def _yaml(value: object) -> str:
+    """A value as YAML reads it: words and topics plain, anything else as JSON, which is YAML too."""
+    plain = isinstance(value, str) and re.fullmatch(r"[A-Za-z/][\w/.-]*", value)
+    return str(value) if plain else json.dumps(value, ensure_ascii=False)
+
+
+def _checks(seen: Inspection) -> Iterator[str]:
+    """What contradicts what; the lag in any case."""
+    contradicted = [one for one in seen.findings if one.status != "green"]
+    if seen.findings:
+        yield f"Checks: {counted(len(contradicted), 'contradiction')} in {len(seen.findings)}"
+    for one in seen.findings:
+        if one.check == LAG:
+            yield f"  lag of the tracker's stamps behind the phone's, by their movement: {one.found}"
+    for one in contradicted:
+        yield f"  {one.status}, {one.check}: found {one.found}, expected {one.expected}; {one.message}"

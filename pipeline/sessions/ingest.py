@@ -27,6 +27,7 @@ MM_PER_M = 1000.0
 _NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
 _DAY_NS = 86_400e9
 _SAME_CLOCK_S = 3600.0
+_TOPICS_MAX = 40  # named in a message
 _LATE_S = 0.5  # what an estimator remembers by default
 _CONTENT = {
     "acceleration": "acceleration",
@@ -110,8 +111,7 @@ def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings
     readings = log.topics.get(stream.topic)
     fault = None
     if readings is None:
-        there = ", ".join(sorted(log.topics)) or "none of those that study.yaml names"
-        fault = f'stream "{name}": topic {stream.topic} is not in the log (there: {there})'
+        fault = f'stream "{name}": topic {stream.topic} is not in the log{_nearest(stream.topic, log)}'
     elif readings.read == 0:
         why = f": {'; '.join(readings.notes)}" if readings.notes else ""
         fault = f'stream "{name}": topic {stream.topic} holds no samples{why}'
@@ -125,6 +125,17 @@ def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings
         raise SessionError("; ".join([fault, *log.faults]))
     in_part.append(fault)
     return None
+
+
+def _nearest(topic: str, log: Log) -> str:
+    """The topic of the log that was probably meant, and all that there are."""
+    names = sorted(log.types or log.topics)
+    if not names:
+        return "; it has no topic at all"
+    more = f", and {len(names) - _TOPICS_MAX} more" if len(names) > _TOPICS_MAX else ""
+    there = f" (there: {', '.join(names[:_TOPICS_MAX])}{more})"
+    meant = did_you_mean(topic, names)
+    return (meant if "did you mean" in meant else "") + there
 
 
 def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:

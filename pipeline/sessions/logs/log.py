@@ -65,9 +65,22 @@ class Readings:
 
 
 @dataclass(frozen=True)
+class MessageType:
+    """What a topic's messages are called and how they are encoded; `content` is None where the name does not tell."""
+
+    name: str
+    encoding: str
+    content: Content | None
+
+
+@dataclass(frozen=True)
 class Log:
-    """A log's facts and topics; `faults` say what is wrong with the file as a whole (it was read in part)."""
+    """A log's facts and topics; `faults` say what is wrong with the file as a whole (it was read in part).
+
+    `types` has every topic of the log, those that were not wanted too.
+    """
 
     facts: Mapping[str, str]
     topics: Mapping[str, Readings]
     faults: tuple[str, ...] = field(default=())
+    types: Mapping[str, MessageType] = field(default_factory=dict)

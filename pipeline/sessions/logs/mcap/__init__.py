@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from pipeline.sessions.logs.log import Log, Wanted
-from pipeline.sessions.logs.mcap.container import MAGIC, walk_log
+from pipeline.sessions.logs.log import Log, MessageType, Wanted
+from pipeline.sessions.logs.mcap.container import MAGIC, Walk, walk_log
 from pipeline.sessions.logs.mcap.payload import counted, decode
+from pipeline.sessions.logs.mcap.schemas import content_of
 from pipeline.sessions.logs.mcap.writer import Message, in_order, write
 
 __all__ = ["MAGIC", "Message", "in_order", "read", "write"]
@@ -28,4 +29,15 @@ def read(path: Path, wanted: Iterable[Wanted]) -> Log:
         topics = {topic: decode(walked, topic, content) for topic, content in asked.items() if topic in walked.topics}
     else:
         topics = {topic: counted(walked, topic) for topic in walked.topics}
-    return Log(walked.facts, topics, tuple(walked.faults))
+    return Log(walked.facts, topics, tuple(walked.faults), _types(walked))
+
+
+def _types(walked: Walk) -> dict[str, MessageType]:
+    """The type of every topic that the log names; of several on one topic the last."""
+    found = {}
+    for channel in walked.channels.values():
+        schema = walked.schemas.get(channel.schema_id)
+        name = "" if schema is None else schema.name
+        content = content_of(channel.message_encoding, name)
+        found[channel.topic] = MessageType(name, channel.message_encoding, content)
+    return found

@@ -1,0 +1,163 @@
+"""What a log's topics could be in a study: which stream each is, what study.yaml would say of it, and its checks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.sessions.checks import Finding, checked
+from pipeline.sessions.checks.agreement import told
+from pipeline.sessions.checks.force import gravity_seen_mm_s2
+from pipeline.sessions.checks.noise import noise_sd
+from pipeline.sessions.checks.of_log import of_log
+from pipeline.sessions.checks.recorded import Imu, Recorded
+from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs.log import Content, Log, MessageType, Readings, Wanted
+from pipeline.sessions.stream_quality import quality_row
+from pipeline.study.settings import Study
+
+_CONTENTS: Sequence[Content] = ("position", "acceleration", "events")
+_NEEDS: Mapping[Content, str] = {
+    "position": "geometry_msgs/msg/PointStamped",
+    "acceleration": "sensor_msgs/msg/Imu",
+    "events": "steadyhand.Event in JSON",
+}
+_USABLE_SHARE = 0.5  # of a topic's messages: with fewer that can be read it is something else
+_LATE_MIN_S = 0.03
+_G_MM_S2 = 9806.65
+_ALONG_DEG = 5.0  # gravity that is so near to an axis is along it
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic: its type, what it is usable as, else why not, and its readings if it is usable."""
+
+    name: str
+    type: MessageType
+    content: Content | None
+    why_not: str
+    frames: tuple[str, ...]
+    rate_hz: float | None
+    readings: Readings | None
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """The topics of a log, the streams it could have in study.yaml (as its keys and values), and what is checked."""
+
+    topics: tuple[Topic, ...]
+    streams: Mapping[str, Mapping[str, Any]]
+    events: str | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Is there anything that a study could use?"""
+        return bool(self.streams) or self.events is not None
+
+
+def inspected(path: Path, counted: Log) -> Inspection:
+    """A log looked at again, with what its topics can be read as; `counted` is the log with nothing wanted."""
+    decoded = _decoded(path, counted)
+    topics = tuple(_topic(name, counted, decoded.get(name)) for name in sorted(counted.types))
+    streams = _streams(topics)
+    events = next((topic.name for topic in topics if topic.content == "events"), None)
+    log = Log(counted.facts, {topic.name: topic.readings for topic in topics if topic.readings is not None})
+    if streams:
+        streams = _measured(streams, of_log(log, _study(streams, events)))
+    findings = checked(of_log(log, _study(streams, events))) if streams else ()
+    return Inspection(topics, streams, events, findings)
+
+
+def _decoded(path: Path, counted: Log) -> dict[str, tuple[Content, Readings]]:
+    """Each topic as the content that its type has, else as the first that most of its messages can be read as."""
+    found: dict[str, tuple[Content, Readings]] = {}
+    for content in _CONTENTS:
+        wanted = [
+            Wanted(name, content)
+            for name, one in counted.types.items()
+            if one.content in (None, content) and name not in found
+        ]
+        if not wanted:
+            continue
+        for name, readings in read_log(path, wanted).topics.items():
+            if readings.read and readings.read >= _USABLE_SHARE * counted.topics[name].read:
+                found[name] = content, readings
+    return found
+
+
+def _topic(name: str, counted: Log, decoded: tuple[Content, Readings] | None) -> Topic:
+    kind, every = counted.types[name], counted.topics.get(name)
+    if decoded is not None:
+        content, readings = decoded
+        rate = quality_row("", name, readings, []).get("rate_hz") if content != "events" else None
+        return Topic(name, kind, content, "", readings.claims.frames, rate, readings)
+    if every is None or not every.read:
+        return Topic(name, kind, None, "it has no messages", (), None, None)
+    notes = "; ".join(every.notes).removeprefix("counted, but a study would lose them: ")
+    needed = ", ".join(f"{content}: {needs}" for content, needs in _NEEDS.items())
+    why = notes if kind.content is not None and notes else f"its type is none of those that are read ({needed})"
+    return Topic(name, kind, None, why, (), None, None)
+
+
+def _streams(topics: Iterable[Topic]) -> dict[str, dict[str, Any]]:
+    """Names and kinds by what the topics are called: a reference, a display, or else the tracker and the phone."""
+    found: dict[str, dict[str, Any]] = {}
+    for topic in topics:
+        if topic.content not in ("position", "acceleration"):
+            continue
+        kind: str = topic.content
+        for other in ("reference", "display") if kind == "position" else ():
+            if other in topic.name.lower() and all(one["kind"] != other for one in found.values()):
+                kind = other
+        name = _name(kind, topic.name, found)
+        found[name] = {"topic": topic.name, "kind": kind}
+        if kind == "acceleration":
+            found[name]["gravity_mm_s2"] = [0.0, 0.0, -_G_MM_S2]
+    return found
+
+
+def _name(kind: str, topic: str, taken: Mapping[str, object]) -> str:
+    usual = {"position": "tracker", "acceleration": "imu"}.get(kind, kind)
+    if usual not in taken:
+        return usual
+    own = re.sub(r"\W+", "_", topic).strip("_") or usual
+    return own if own not in taken else f"{own}_{len(taken)}"
+
+
+def _study(streams: Mapping[str, Mapping[str, Any]], events: str | None) -> Study:
+    settings: dict[str, Any] = {"conditions": ["any"], "sessions": "{participant}_{condition}.mcap", "streams": streams}
+    return Study.model_validate(settings | ({"events": {"topic": events}} if events is not None else {}))
+
+
+def _measured(streams: dict[str, dict[str, Any]], recorded: Recorded) -> dict[str, dict[str, Any]]:
+    """With gravity, noise and the tracker's lag as this log has them."""
+    for imu in recorded.imus:
+        streams[imu.name]["gravity_mm_s2"] = _gravity(imu)
+    motion, tracker = recorded.motion, recorded.tracker
+    for positions in recorded.positions:
+        measured = noise_sd(positions.times, positions.value_mm) if positions.kind == "position" else None
+        if measured:
+            streams[positions.name]["noise_sd_mm"] = float(f"{measured:.2g}")
+    if tracker is not None and motion is not None and told(motion) and motion.lag_s.value > _LATE_MIN_S:
+        streams[tracker.name] |= {"stamp": "arrival", "latency_s": round(motion.lag_s.value, 2)}
+    elif tracker is not None:
+        streams[tracker.name] |= {"stamp": "measurement"}
+    return streams
+
+
+def _gravity(imu: Imu) -> list[float]:
+    """Along the nearest axis where it is near to one, 9806.65 mm/s² long; down z where the log does not tell."""
+    seen = gravity_seen_mm_s2(imu)
+    if seen is None or not np.any(seen):
+        return [0.0, 0.0, -_G_MM_S2]
+    direction = seen / np.linalg.norm(seen)
+    axis = int(np.argmax(np.abs(direction)))
+    if np.degrees(np.arccos(min(1.0, abs(float(direction[axis]))))) < _ALONG_DEG:
+        direction = np.where(np.arange(3) == axis, np.sign(direction[axis]), 0.0)
+    return [round(float(value), 2) + 0.0 for value in _G_MM_S2 * direction]
