@@ -97,8 +97,7 @@ def _ranked_together(values: FloatArray, effect: tuple[int, ...]) -> FloatArray:
     outside = tuple(place for place in range(values.ndim - 1) if place not in effect)
     means = values.mean(axis=0)
     aligned = values - means + means.mean(axis=outside, keepdims=True) - means.mean()
-    ranks = _ranked(aligned, values)
-    return ranks
+    return _ranked(aligned, values)
 
 
 def _ranked(aligned: FloatArray, values: FloatArray) -> FloatArray:

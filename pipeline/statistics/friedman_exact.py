@@ -57,4 +57,5 @@ def _with_one_more(states: IntArray, chances: FloatArray, orders: IntArray, base
     sums = np.sort((states[:, None, :] + orders).reshape(-1, states.shape[1]), axis=1)
     digits = base ** np.arange(states.shape[1])
     _, first, which = np.unique(sums @ digits, return_index=True, return_inverse=True)
-    return sums[first], np.bincount(which, np.repeat(chances / len(orders), len(orders)))
+    added: FloatArray = np.bincount(which, np.repeat(chances / len(orders), len(orders))).astype(np.float64)
+    return sums[first].astype(np.int64), added

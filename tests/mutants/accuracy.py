@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.fusion_core import test_accuracy
+from tests.fusion_core.accuracy import test_accuracy
 from tests.mutants.mutant import Mutant
 from tests.pipeline.sessions import test_movements, test_sensors
 

@@ -85,7 +85,8 @@ def _paths_words(
             counts.append(f"{condition} ({line}), n = {len(mine)}")
         for session in mine:
             own = (rows[rows["session"] == session] for rows in (tracks, positions))
-            points = way(*own, line, plane)
+            tracks_of_one, positions_of_one = own
+            points = way(tracks_of_one, positions_of_one, line, plane)
             reach = float(np.hypot(*_span_of(points)))
             if reach > furthest[1]:
                 furthest = (str(session), reach, _size_words(points))
@@ -126,7 +127,8 @@ def paths(
         for place, (condition, line) in enumerate(shown.items()):
             for session in mine.loc[mine["condition"] == condition, "session"]:
                 own = (rows[rows["session"] == session] for rows in (tracks, positions))
-                points = way(*own, line, plane)
+                tracks_of_one, positions_of_one = own
+                points = way(tracks_of_one, positions_of_one, line, plane)
                 axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(place), zorder=zorder)
         _marked(axes, events[events["session"].isin(mine["session"])], plane, small=True)
         axes.set_aspect("equal", adjustable="box")

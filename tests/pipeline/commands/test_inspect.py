@@ -15,7 +15,8 @@ from tests.pipeline.report.test_checks import SETTINGS
 from tests.pipeline.sessions.checks.hand import Hand, messages, session
 from tests.pipeline.sessions.checks.spoilt import FAULTS
 
-Capsys, Patch = pytest.CaptureFixture[str], pytest.MonkeyPatch
+Capsys = pytest.CaptureFixture[str]
+Patch = pytest.MonkeyPatch
 
 
 def block_of(out: str) -> dict[str, object]:

@@ -64,7 +64,7 @@ def test_where_it_would_take_long_the_method_says_that_p_is_that_of_chi_squared(
 def test_against_orders_drawn_at_random() -> None:
     random = np.random.default_rng(3)
     for n, k in ((60, 3), (12, 4), (7, 5)):
-        values = random.integers(0, 9, size=(n, k)).astype(float) + np.arange(k)
+        values = random.integers(0, 9, size=(n, k)).astype(np.float64) + np.arange(k, dtype=np.float64)
         ranks = stats.rankdata(values, axis=1)
         drawn = random.permuted(np.broadcast_to(ranks, (20_000, n, k)), axis=2).sum(axis=1)
         share = float(np.mean(np.sum(drawn**2, axis=1) >= np.sum(ranks.sum(axis=0) ** 2)))

@@ -29,7 +29,7 @@ from pipeline.statistics.result import Result, rounded_differences
 EPOCH_US = (
     np.array([123456, 98765, 150001, 99999, 134567, 88888, 101010], dtype=float)
     + 1_700_000_000_000_000
-    + 1_000_000 * np.arange(7),
+    + 1_000_000 * np.arange(7, dtype=float),
     1_700_000_000_000_000 + 1_000_000 * np.arange(7, dtype=float),
 )
 GIANT = (
@@ -66,7 +66,7 @@ def test_two_participants_and_a_huge_t_have_bounds() -> None:
     # With one degree of freedom and t this large δ is t·s, s the quantile of √χ²: both bounds in closed form.
     scale = found.statistic / np.sqrt(2)
     low, high = (float(scale * np.sqrt(stats.chi2.ppf(level, 1))) for level in (0.025, 0.975))
-    assert (found.ci_low, found.ci_high) == (pytest.approx(low, rel=1e-4), pytest.approx(high, rel=1e-4))
+    assert (found.ci_low, found.ci_high) == pytest.approx((low, high), rel=1e-4)
     assert f.ci_high is not None
     partial = f.details["partial_eta_squared_ci"]
     # Partial η² = λ / (λ + df2), and λ = δ².
