@@ -99,7 +99,7 @@ def check(
 @app.command()
 def diff(
     before: Annotated[Path, typer.Argument(metavar="A", help="A results.json, or a folder that holds one.")],
-    now: Annotated[Path, typer.Argument(metavar="B", help="Another.")],
+    now: Annotated[Path, typer.Argument(metavar="B", help="Another one.")],
     tolerance: Annotated[
         float,
         typer.Option(
@@ -205,8 +205,8 @@ def explore(
     """A better tracker or a better filter? Simulate small studies over both: error, time and participants needed."""
     from pipeline.commands import explore as command
 
-    asked = command.Asked(latency, noise, rate, estimators, participants, repeats)
-    command.explore(study, asked, out, jobs, executor)
+    options = command.Options(latency, noise, rate, estimators, participants, repeats)
+    command.explore(study, options, out, jobs, executor)
 
 
 @app.command()
@@ -214,7 +214,7 @@ def inspect(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="A log, or several.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows of the table `quality`.")] = False,
 ) -> None:
-    """Say what a log holds and what of it can be read."""
+    """Show what a log contains and how much of it can be read."""
     from pipeline.commands import inspect as command
 
     command.inspect(files, as_json)
@@ -243,13 +243,13 @@ def power(
         typer.Option(help="Of a participant's values in two conditions; 0.5 is assumed where it is not given."),
     ] = None,
     conditions: Annotated[int, typer.Option(min=2, max=100, help="How many, for rm_anova.")] = 2,
-    target: Annotated[float, typer.Option("--power", help="The chance wanted that the effect is found.")] = 0.8,
+    target: Annotated[float, typer.Option("--power", help="Power: the chance wanted that the effect is found.")] = 0.8,
     alpha: Annotated[float, typer.Option(help="The level of significance, two-sided.")] = 0.05,
     simulations: Annotated[
         int, typer.Option(min=100, max=1_000_000, help="Studies to simulate for each number of participants.")
     ] = 10_000,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulation.")] = 1,
-    most: Annotated[int, typer.Option("--max-n", min=2, max=3000, help="The most participants to look at.")] = 1000,
+    most: Annotated[int, typer.Option("--max-n", min=2, max=3000, help="The most participants to consider.")] = 1000,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write power.svg, power.csv and power.json there.")
     ] = None,
@@ -301,7 +301,7 @@ app.add_typer(cache_app, name="cache")
 
 @cache_app.command("show")
 def cache_show(cache: CacheFolder = None) -> None:
-    """Say what is kept: entries, size and last use, stage by stage."""
+    """Show what the cache holds: entries, size and last use, stage by stage."""
     from pipeline.commands import cache as command
 
     command.show(cache)
@@ -310,15 +310,15 @@ def cache_show(cache: CacheFolder = None) -> None:
 @cache_app.command("prune")
 def cache_prune(
     older_than: Annotated[
-        float | None, typer.Option(min=0, metavar="DAYS", help="Remove what was not used for so many days.")
+        float | None, typer.Option(min=0, metavar="DAYS", help="Remove what has not been used for this many days.")
     ] = None,
     keep_current: Annotated[
         list[Path] | None,
-        typer.Option(metavar="STUDY", help="Remove what this study, as it is now, has no use for; may be repeated."),
+        typer.Option(metavar="STUDY", help="Remove what this study, as it is now, does not use; may be repeated."),
     ] = None,
     cache: CacheFolder = None,
 ) -> None:
-    """Remove entries; with both options, those to which both apply. What is needed again is computed again."""
+    """Remove entries; with both options, those to which both apply. What is needed again will be computed again."""
     from pipeline.commands import cache as command
 
     command.prune_cache(cache, older_than, keep_current or [])
@@ -333,9 +333,10 @@ def cache_verify(cache: CacheFolder = None) -> None:
 
 
 def main() -> None:
-    """Run the command; an error the user can mend is a message, not a traceback."""
+    """Run the command; an error that the user can correct is a message, not a traceback."""
     threads.one_a_process()
-    from pipeline.errors import PipelineError
+    from pipeline.commands.console import warn
+    from pipeline.errors import RUN_AGAIN, PipelineError
 
     try:
         app()
@@ -343,24 +344,21 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except PipelineError as error:
-        from pipeline.commands.console import warn
-
         warn(f"steadyhand: {error}")
         sys.exit(error.exit_code)
     except SystemExit as stop:
         if stop.code == _INTERRUPTED:  # Typer makes this of Ctrl-C
-            print("steadyhand: interrupted; what was computed is kept, run it again to go on", file=sys.stderr)  # noqa: T201
+            warn(f"steadyhand: interrupted. {RUN_AGAIN}")
         raise
     except OSError as error:
         where = error.filename or "a file"
-        print(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache", file=sys.stderr)  # noqa: T201
+        warn(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache")
         sys.exit(2)
     except Exception as error:
         if os.environ.get("STEADYHAND_TRACEBACK"):
             raise
-        fault = f"{type(error).__name__}: {error}"
-        print(f"steadyhand: a fault of Steadyhand's own, please report it: {fault}", file=sys.stderr)  # noqa: T201
-        print("(STEADYHAND_TRACEBACK=1 shows where)", file=sys.stderr)  # noqa: T201
+        warn(f"steadyhand: internal error; please report it: {type(error).__name__}: {error}")
+        warn("(set STEADYHAND_TRACEBACK=1 to see where it happened)")
         sys.exit(2)
 
 

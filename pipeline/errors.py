@@ -20,6 +20,10 @@ class WorkerLostError(Exception):
     """The process that computed something died of it, or was killed; its text says by what."""
 
 
+RUN_AGAIN = "Finished work is cached: run the command again to continue"
+"""The remedy wherever a run stops before its end."""
+
+
 def did_you_mean(found: str, known: Iterable[str]) -> str:
     """`; did you mean "x"?` for the likeliest of the known words, else what there is to choose from."""
     words = list(known)

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline.commands import console
-from pipeline.commands.run import PROCESS, cache_in, executor_of, mended, what_befell
 from pipeline.engine import threads
-from pipeline.engine.resources import Means
+from pipeline.engine.executors import PROCESS, executor_of
+from pipeline.engine.folders import cache_in
+from pipeline.engine.messages import damage_messages, session_messages
+from pipeline.engine.progress import show_progress
+from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date
 from pipeline.errors import PipelineError, did_you_mean
@@ -94,7 +96,7 @@ class Tables(Mapping[str, pd.DataFrame]):
 
 
 def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str = PROCESS) -> Tables:
-    """A study brought up to date. What befell sessions, and what of the cache was damaged, is a warning.
+    """A study brought up to date. Sessions set aside and entries of the cache that were damaged are warnings.
 
     Raises PipelineError where nothing can be done.
     """
@@ -103,9 +105,9 @@ def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str =
             "a script that loads with several jobs is run by each; put it under: if __name__ == '__main__'"
         )
     threads.one_a_process()
-    with executor_of(jobs, executor) as where, console.progress() as progress:
-        result = bring_up_to_date(folder, COMPARE, Means(cache_in(cache), where, progress))
-    for line in (*mended(result), *what_befell(result)):
+    with executor_of(jobs, executor) as opened, show_progress() as progress:
+        result = bring_up_to_date(folder, COMPARE, Resources(cache_in(cache), opened, progress))
+    for line in (*damage_messages(result), *session_messages(result)):
         warnings.warn(line, stacklevel=3)
     return _tables(result)
 

@@ -12,6 +12,7 @@ STAGES: tuple[Stage, ...] = (
         "pipeline.sessions.ingest:run",
         settings=("streams", "events", "conditions", "task"),
         reads_log=True,
+        label="reading logs",
     ),
     Stage(
         "fuse",
@@ -19,6 +20,7 @@ STAGES: tuple[Stage, ...] = (
         "pipeline.sessions.fuse:run",
         reads=("ingest",),
         settings=("streams", "estimators", "axes"),
+        label="fusing",
     ),
     Stage(
         "assess",
@@ -26,6 +28,7 @@ STAGES: tuple[Stage, ...] = (
         "pipeline.sessions.assess:run",
         reads=("ingest", "fuse"),
         settings=("streams", "estimators", "axes", "shown", "task"),
+        label="assessing sessions",
     ),
     Stage(
         "measure",
@@ -44,6 +47,7 @@ STAGES: tuple[Stage, ...] = (
             "measures",
         ),
         files=("participants", "trials", "questionnaires", "measures"),
+        label="measuring",
     ),
     Stage(
         "compare",
@@ -67,6 +71,7 @@ STAGES: tuple[Stage, ...] = (
             "repeats",
         ),
         files=("participants", "printed", "repeats"),
+        label="comparing",
     ),
     Stage(
         "report",
@@ -75,6 +80,7 @@ STAGES: tuple[Stage, ...] = (
         reads=("ingest", "fuse", "assess", "measure", "compare"),
         settings=tuple(Study.model_fields),
         names_inputs=True,
+        label="writing the report",
     ),
 )
 
@@ -90,5 +96,7 @@ REPLAY = Stage(
     "pipeline.sessions.replay:run",
     reads=("ingest",),
     settings=("streams", "estimators", "axes"),
+    label="replaying",
+    unit="sessions by variants",
 )
 """What `steadyhand replay` runs for each session and variant, by a study that holds the one estimator alone."""

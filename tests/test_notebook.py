@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.commands import run
+from pipeline.engine import folders
 from tests.conftest import CLONE
 
 PAGE = CLONE / "docs" / "notebook.md"
@@ -32,7 +32,7 @@ def shown_by(block: str, names: dict[str, object]) -> str:
 
 def test_the_tutorial_shows_what_its_code_gives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "reports").mkdir()
-    monkeypatch.setattr(run, "reports_folder", lambda: tmp_path / "reports")  # and so the cache is beside it
+    monkeypatch.setattr(folders, "reports_folder", lambda: tmp_path / "reports")  # and so the cache is beside it
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.chdir(CLONE)
     text = PAGE.read_text(encoding="utf-8")
@@ -41,4 +41,4 @@ def test_the_tutorial_shows_what_its_code_gives(monkeypatch: pytest.MonkeyPatch,
     assert len(blocks) == text.count("```python")
     for block, output in blocks:
         assert [line.rstrip() for line in shown_by(block, names).splitlines()] == output.splitlines(), block
-    assert (tmp_path / run.CACHE_FOLDER).is_dir()
+    assert (tmp_path / folders.CACHE_FOLDER).is_dir()

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.commands import console
-from pipeline.commands.run import cache_in
 from pipeline.engine.cache import Cache
-from pipeline.engine.housekeeping import Held, held, prune, verify
+from pipeline.engine.folders import cache_in
+from pipeline.engine.housekeeping import Item, items_in, prune, verify
 from pipeline.engine.run import current_entries
 from pipeline.errors import PipelineError
 from pipeline.stages import STAGES
@@ -21,15 +21,15 @@ DAMAGED = 1  # the exit code
 
 
 def show(folder: Path | None) -> None:
-    """A line a stage: entries, size, and how long ago the one used least recently was of use."""
+    """Print a line a stage: entries, size, and how long ago the least and the most recent were last used."""
     cache = _existing(folder)
-    found = list(held(cache))
+    kept = list(items_in(cache))
     order = [stage.name for stage in STAGES]
-    stages = sorted({one.stage for one in found}, key=lambda name: (not name, name not in order, order.index(name)))
-    console.say(f"{cache.root}: {_amount(found)}")
+    stages = sorted({one.stage for one in kept}, key=lambda name: (not name, name not in order, order.index(name)))
+    console.say(f"{cache.root}: {_amount(kept)}")
     lines = []
     for stage in stages:
-        of_stage = [one for one in found if one.stage == stage]
+        of_stage = [one for one in kept if one.stage == stage]
         oldest, newest = (_days_ago(pick(one.used_s for one in of_stage)) for pick in (min, max))
         lines.append((stage or "(unfinished)", str(len(of_stage)), _megabytes(of_stage), oldest, newest))
     if lines:
@@ -37,42 +37,42 @@ def show(folder: Path | None) -> None:
 
 
 def prune_cache(folder: Path | None, older_than_days: float | None, studies: Sequence[Path]) -> None:
-    """Remove what was not used for some days, or what the studies as they are now have no use for."""
+    """Remove what was not used for some days, or what the studies as they are now do not use."""
     if older_than_days is None and not studies:
-        raise PipelineError("cache prune: say what may go: --older-than DAYS, --keep-current STUDY, or both")
+        raise PipelineError("cache prune: say what to remove: --older-than DAYS, --keep-current STUDY, or both")
     cache = _existing(folder)
     keep = set[Path]().union(*(current_entries(study, STAGES, cache) for study in studies)) if studies else None
     unused_s = None if older_than_days is None else older_than_days * _DAY_S
-    gone = prune(cache, time.time(), unused_s, keep)
-    console.say(f"Removed {_amount(gone.removed)}; {_amount(gone.left)} left.")
+    pruned = prune(cache, time.time(), unused_s, keep)
+    console.say(f"Removed {_amount(pruned.removed)}; {_amount(pruned.left)} left.")
 
 
 def verify_cache(folder: Path | None) -> None:
-    """Exit with 1 where an entry was damaged; it is removed, and computed again when it is needed."""
+    """Remove damaged entries, which are computed again when they are needed; exit with 1 where there was one."""
     cache = _existing(folder)
 
-    def say(one: Held, fault: str) -> None:
-        console.warn(f"{one.folder.relative_to(cache.root)}: damaged, removed: {fault}")
+    def say(one: Item, damage: str) -> None:
+        console.warn(f"{one.folder.relative_to(cache.root)}: damaged, removed: {damage}")
 
-    gone = verify(cache, say)
-    whole = [one for one in gone.left if one.stage]
-    console.say(f"{_amount(whole)} whole, {len(gone.removed)} damaged and removed.")
-    sys.exit(DAMAGED if gone.removed else 0)
+    verified = verify(cache, say)
+    intact = [one for one in verified.left if one.stage]
+    console.say(f"{_amount(intact)} intact, {len(verified.removed)} damaged and removed.")
+    sys.exit(DAMAGED if verified.removed else 0)
 
 
 def _existing(folder: Path | None) -> Cache:
     cache = cache_in(folder)
     if not cache.root.is_dir():
-        raise PipelineError(f"{cache.root}: there is no cache; name its folder with --cache")
+        raise PipelineError(f"{cache.root}: there is no cache here; name its folder with --cache")
     return cache
 
 
-def _amount(found: Sequence[Held]) -> str:
-    return f"{len(found)} {'entry' if len(found) == 1 else 'entries'} ({_megabytes(found)} MB)"
+def _amount(entries: Sequence[Item]) -> str:
+    return f"{len(entries)} {'entry' if len(entries) == 1 else 'entries'} ({_megabytes(entries)} MB)"
 
 
-def _megabytes(found: Sequence[Held]) -> str:
-    return f"{sum(one.size for one in found) / _MB:.1f}"
+def _megabytes(entries: Sequence[Item]) -> str:
+    return f"{sum(one.size_bytes for one in entries) / _MB:.1f}"
 
 
 def _days_ago(used_s: float) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from pipeline.commands import console, explanation
 from pipeline.commands.check import MOVED
-from pipeline.commands.explanation import Explanation, Made
+from pipeline.commands.explanation import Explanation, ResultsFile
 from pipeline.errors import PipelineError
 from pipeline.study.folder import SETTINGS_FILE
 from pipeline.tables import differences, results
@@ -26,58 +26,62 @@ _SAME = "Settings, inputs, versions and code are the same."
 
 def diff(before: Path, now: Path, tolerance: float, as_json: bool) -> None:
     """Print what changed from one result to the other; exit with 3 where anything did."""
-    old, new = (explanation.made(_results_in(path)) for path in (before, now))
+    old, new = (explanation.read_with_provenance(_results_in(path)) for path in (before, now))
     identity = results.identity_of(old.content)
     if identity is None or identity is not results.identity_of(new.content):
-        raise PipelineError(f"{old.path} and {new.path}: one is of a study and one of a replay; give two of a kind")
-    found = differences.between(old.content, new.content, identity, tolerance)
-    why = explanation.explained(old, new)
+        raise PipelineError(
+            f"{old.path} and {new.path}: results of a study cannot be compared with results of a replay"
+        )
+    changed = differences.between(old.content, new.content, identity, tolerance)
+    why = explanation.explain(old, new)
     for side in (old, new):
         _warn(side, identity)
     if as_json:
-        console.say(json.dumps(_as_object(old, new, tolerance, found, why), indent=1, ensure_ascii=False))
+        console.say(json.dumps(_as_object(old, new, tolerance, changed, why), indent=1, ensure_ascii=False))
     else:
-        _show(found)
-        _explain(why, bool(found))
-    sys.exit(MOVED if found else 0)
+        _show(changed)
+        _explain(why, bool(changed))
+    sys.exit(MOVED if changed else 0)
 
 
 def _results_in(path: Path) -> Path:
     """The file itself, or the one in a folder."""
     if not path.exists():
-        raise PipelineError(f"{path}: there is no such file or folder; name a results.json, or a folder that holds one")
+        raise PipelineError(f"{path}: there is no such file or folder; name a results.json or a folder with one")
     if path.is_dir() and not (path / _RESULTS).is_file():
         study = path if (path / SETTINGS_FILE).is_file() else "STUDY"
-        raise PipelineError(f"{path}: holds no {_RESULTS}; write one with: steadyhand compare {study} --out DIR")
+        raise PipelineError(f"{path}: contains no {_RESULTS}; write one with: steadyhand compare {study} --out DIR")
     return path / _RESULTS if path.is_dir() else path
 
 
-def _warn(side: Made, identity: Mapping[str, Sequence[str]]) -> None:
-    """What of a side is not looked at."""
-    if side.unknown is not None:
-        console.warn(side.unknown)
+def _warn(side: ResultsFile, identity: Mapping[str, Sequence[str]]) -> None:
+    """Say what of one of the two results is not compared."""
+    if side.unused_because is not None:
+        console.warn(side.unused_because)
     strange = set(side.content) - {"schema_version", "study", "studies", *identity}
     if strange:
-        console.warn(f"{side.path}: {', '.join(sorted(strange))}: not known to this Steadyhand, and not compared")
+        console.warn(
+            f"{side.path}: {', '.join(sorted(strange))}: unknown to this version of Steadyhand, and not compared"
+        )
 
 
-def _changes(found: Differences, of_number: bool) -> Iterator[tuple[Identified, Change]]:
-    return ((one.row, change) for one in found.moved for change in one.changes if change.is_numeric == of_number)
+def _changes(changed: Differences, of_number: bool) -> Iterator[tuple[Identified, Change]]:
+    return ((one.row, change) for one in changed.moved for change in one.changes if change.is_numeric == of_number)
 
 
-def _show(found: Differences) -> None:
-    """How much changed, then a table of numbers, rows, and a table of text."""
-    if not found:
-        console.say(f"No figure changed, of {found.compared}.")
+def _show(changed: Differences) -> None:
+    """Print how much changed, then a table of numbers, the rows only one side has, and a table of text."""
+    if not changed:
+        console.say(f"None of {changed.compared} figures changed.")
         return
-    numbers, texts = ([*_changes(found, one)] for one in (True, False))
-    told = f"{counted(len(numbers), 'number')} moved and {counted(len(texts), 'text')} changed"
-    only = f"{counted(len(found.removed), 'row')} only in A, {counted(len(found.added), 'row')} only in B"
-    console.say(f"{told}, of {found.compared} figures in both; {only}")
+    numbers, texts = ([*_changes(changed, one)] for one in (True, False))
+    moved = f"{counted(len(numbers), 'number')} moved and {counted(len(texts), 'text')} changed"
+    only = f"{counted(len(changed.removed), 'row')} only in A, {counted(len(changed.added), 'row')} only in B"
+    console.say(f"{moved}, of {changed.compared} figures in both; {only}")
     for table, changes in _by_table(numbers):
         lines = [(name, *change.cells) for name, change in changes]
         _table((table, "A", "B", "difference", "relative"), lines, left=1)
-    for side, rows in (("A", found.removed), ("B", found.added)):
+    for side, rows in (("A", changed.removed), ("B", changed.added)):
         if rows:
             console.say(f"Only in {side}:")
         for row in rows:
@@ -93,7 +97,7 @@ def _by_table(changes: Sequence[tuple[Identified, Change]]) -> Iterator[tuple[st
 
 
 def _explain(why: Explanation, moved: bool) -> None:
-    """What is not the same in the making of the two."""
+    """Print which settings, inputs, versions and code differ."""
     parts = (
         ("setting", [(one.name, *map(_shortened, _setting(one))) for one in why.settings]),
         ("input, SHA-256", [(one.name, *_digests(one)) for one in why.inputs]),
@@ -104,7 +108,7 @@ def _explain(why: Explanation, moved: bool) -> None:
         if why.complete:
             console.say(_SAME)
         return
-    console.say("What may explain it:" if moved else "What differs without a change in the results:")
+    console.say("Possible explanations:" if moved else "Different, but without effect on the results:")
     for title, rows in parts:
         if rows:
             _table((title, "A", "B"), rows)
@@ -115,7 +119,7 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int | Non
 
 
 def _setting(change: Change) -> tuple[str, str]:
-    """Both values as they stand in study.yaml; what does not stand there has its default, or is an entry less."""
+    """Both values as study.yaml states them; what it does not state is a default, or an entry less of a mapping."""
     absent = "absent" if isinstance(change.before, dict) or isinstance(change.now, dict) else "default"
     before, now = (absent if value is ABSENT else explanation.json_text(value) for value in (change.before, change.now))
     return before, now
@@ -129,7 +133,9 @@ def _shortened(text: str) -> str:
     return text if len(text) <= _CELL_LENGTH else f"{text[: _CELL_LENGTH - 1]}…"
 
 
-def _as_object(old: Made, new: Made, tolerance: float, found: Differences, why: Explanation) -> dict[str, Any]:
+def _as_object(
+    old: ResultsFile, new: ResultsFile, tolerance: float, changed: Differences, why: Explanation
+) -> dict[str, Any]:
     """All of it for a program; what is absent on a side has no key for that side."""
 
     def rows(listed: Sequence[Identified]) -> list[dict[str, Any]]:
@@ -139,7 +145,7 @@ def _as_object(old: Made, new: Made, tolerance: float, found: Differences, why: 
         return {side: value for side, value in (("a", change.before), ("b", change.now)) if value is not ABSENT}
 
     def figures(of_number: bool) -> Iterator[dict[str, Any]]:
-        for row, change in _changes(found, of_number):
+        for row, change in _changes(changed, of_number):
             by = {"difference": change.difference, "relative": change.relative} if of_number else {}
             yield {"table": row.table, "row": dict(row.key), "figure": change.name, **sides(change), **by}
 
@@ -148,11 +154,11 @@ def _as_object(old: Made, new: Made, tolerance: float, found: Differences, why: 
         "a": str(old.path),
         "b": str(new.path),
         "tolerance": tolerance,
-        "compared": found.compared,
+        "compared": changed.compared,
         "numbers": list(figures(True)),
         "texts": list(figures(False)),
-        "only_in_a": rows(found.removed),
-        "only_in_b": rows(found.added),
+        "only_in_a": rows(changed.removed),
+        "only_in_b": rows(changed.added),
         "making_known": why.complete,
         **{part: [{"name": one.name, **sides(one)} for one in changes] for part, changes in parts.items()},
     }

@@ -15,23 +15,23 @@ from pipeline.tables import results
 from pipeline.tables.differences import ABSENT, Change
 
 Content = Mapping[str, Any]
-_TOLD_APART = {"comparisons": ("measure", "test"), "variants": ("estimator", "variant")}
+_IDENTITY = {"comparisons": ("measure", "test"), "variants": ("estimator", "variant")}
 _STATED = ("title", "data_origin", "conditions", "alpha", "variants")  # in results.json itself
 
 
 @dataclass(frozen=True)
-class Made:
-    """Results, and what stands beside them of their making; None with the reason where nothing can be said of it."""
+class ResultsFile:
+    """A results.json and the provenance.json beside it; None, and the reason, where the latter cannot be used."""
 
     path: Path
     content: Content
     provenance: Content | None
-    unknown: str | None = None
+    unused_because: str | None = None
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """What is not the same. `complete` says that the making of both is known."""
+    """What is not the same. `complete` says that the provenance of both is known."""
 
     complete: bool
     settings: Sequence[Change]
@@ -40,7 +40,7 @@ class Explanation:
     code: Sequence[Change]
 
 
-def made(path: Path) -> Made:
+def read_with_provenance(path: Path) -> ResultsFile:
     """A results.json with the provenance.json beside it, as far as that belongs to it.
 
     Raises PipelineError where the former cannot be used.
@@ -48,28 +48,30 @@ def made(path: Path) -> Made:
     content = results.read_checked(path)
     beside = path.parent / PROVENANCE
     if not beside.is_file():
-        return Made(path, content, None, f"{path}: there is no {PROVENANCE} beside it")
+        return ResultsFile(path, content, None, f"{path}: there is no {PROVENANCE} beside it")
     try:
         provenance = results.read_object(beside)
     except (PipelineError, OSError) as error:
-        return Made(path, content, None, f"{error}; it is not used")
+        return ResultsFile(path, content, None, f"{error}; it is not used")
     if provenance.get("results_sha256", digest := file_digest(path)) != digest:
-        return Made(path, content, None, f"{beside}: belongs to other results than {path.name} there; it is not used")
-    return Made(path, content, provenance)
+        return ResultsFile(
+            path, content, None, f"{beside}: belongs to other results than {path.name} there; it is not used"
+        )
+    return ResultsFile(path, content, provenance)
 
 
-def explained(before: Made, now: Made) -> Explanation:
-    """What is not the same in the making of two results, as far as it is known of both."""
+def explain(before: ResultsFile, now: ResultsFile) -> Explanation:
+    """What is not the same in the provenance of two results, as far as it is known of both."""
     old, new = before.provenance, now.provenance
     stated = (_stated(before.content), _stated(now.content))
     if old is None or new is None:
         return Explanation(False, tuple(_changed((), *stated)), (), (), ())
-    made_of = [_made_of(one) for one in (old, new)]
-    settings = [_over(known["settings"], said) for known, said in zip(made_of, stated, strict=True)]
+    parts = [_parts_of(one) for one in (old, new)]
+    settings = [_over(known["settings"], own) for known, own in zip(parts, stated, strict=True)]
     return Explanation(
         True,
         tuple(_changed((), *settings)),
-        *(tuple(_changed((), *(one[part] for one in made_of))) for part in ("inputs", "versions", "code")),
+        *(tuple(_changed((), *(one[part] for one in parts))) for part in ("inputs", "versions", "code")),
     )
 
 
@@ -80,7 +82,7 @@ def _stated(content: Content) -> Content:
     return {study["name"]: {key: study[key] for key in _STATED if key in study} for study in content["studies"]}
 
 
-def _made_of(provenance: Content) -> dict[str, Content]:
+def _parts_of(provenance: Content) -> dict[str, Content]:
     """Settings, digests of inputs, versions, and digests of code; those of several studies by their names."""
     studies = provenance.get("studies")
     if isinstance(studies, Mapping):
@@ -107,7 +109,7 @@ def _mapping(content: Any, key: str) -> Content:
 
 
 def _over(settings: Content, stated: Content) -> Content:
-    """Settings with those that the results state themselves, defaults among them."""
+    """Settings, overridden by those that the results state themselves, defaults among them."""
     merged = dict(settings)
     for key, value in stated.items():
         below = settings.get(key)
@@ -144,8 +146,8 @@ def _without(listed: Any, other: Any) -> list[Content]:
 
 
 def _entries(listed: Sequence[Content], of: str) -> dict[str, Content]:
-    """Objects by what tells them apart in such a list, and by themselves where that does not."""
-    names = [", ".join(str(one[key]) for key in _TOLD_APART.get(of, ()) if one.get(key)) for one in listed]
+    """Objects by what identifies them in such a list; where that is not unique, by all they hold."""
+    names = [", ".join(str(one[key]) for key in _IDENTITY.get(of, ()) if one.get(key)) for one in listed]
     return {
         name if name and names.count(name) == 1 else f"{name} {json_text(one)}": one
         for name, one in zip(names, listed, strict=True)

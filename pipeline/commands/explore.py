@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.commands import console
-from pipeline.commands.run import executor_of, reports_folder, short
+from pipeline.engine.executors import executor_of
+from pipeline.engine.folders import reports_folder
+from pipeline.engine.progress import show_progress
 from pipeline.errors import PipelineError
 from pipeline.study.folder import load_study
 from pipeline.study.settings import Study
@@ -28,8 +30,8 @@ _LIMITS = {"--latency": (0.0, 0.9), "--noise": (0.01, 1000.0), "--rate": (1.0, 1
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The options as they were typed; None for what the study decides."""
+class Options:
+    """The command's options as they were typed; None for what the study decides."""
 
     latency: str | None
     noise: str | None
@@ -39,7 +41,7 @@ class Asked:
     repeats: int
 
 
-def explore(folder: Path, asked: Asked, out: Path | None, jobs: int | None, where: str) -> None:
+def explore(folder: Path, options: Options, out: Path | None, jobs: int | None, executor_name: str) -> None:
     """Simulate every point and write the report; nothing is written before all is computed."""
     from pipeline.commands.publish import refuse_study
 
@@ -50,10 +52,10 @@ def explore(folder: Path, asked: Asked, out: Path | None, jobs: int | None, wher
     from pipeline.simulation.session import Setting
 
     setting = Setting(study, str(folder / "study.yaml"))
-    grid = _grid(setting, asked)
+    grid = _grid(setting, options)
     try:
-        with executor_of(jobs, where) as executor, console.progress() as progress:
-            begin = partial(progress.begin, "explore")
+        with executor_of(jobs, executor_name, console.warn) as executor, show_progress() as progress:
+            begin = partial(progress.begin, "exploring", unit="small studies")
             rows = exploration.explore(setting, grid, executor, begin, progress.advance)
             progress.end()
     except KeyboardInterrupt:
@@ -61,7 +63,7 @@ def explore(folder: Path, asked: Asked, out: Path | None, jobs: int | None, wher
     explored = _explored(folder.resolve().name, setting, grid, rows)
     _write(explored, grid, target)
     _say(explored)
-    console.say(f"Report: {short(target / _PAGE)}  {short(target / _PRINT)}")
+    console.say(f"Report: {console.short_path(target / _PAGE)}  {console.short_path(target / _PRINT)}")
 
 
 class _StoppedError(PipelineError):
@@ -71,58 +73,58 @@ class _StoppedError(PipelineError):
 def _study(folder: Path) -> Study:
     study = load_study(folder, to_be_made=True)
     if not isinstance(study.simulation, SelectionSimulation):
-        found = "none" if study.simulation is None else f"kind: {study.simulation.kind}"
+        kind = "none" if study.simulation is None else f"kind: {study.simulation.kind}"
         raise PipelineError(
-            f"{folder / 'study.yaml'}: explore needs a `simulation:` block of kind: selection, found {found};"
+            f"{folder / 'study.yaml'}: explore needs a `simulation:` block of kind: selection, found {kind};"
             " studies/peephole has one to start from"
         )
     return study
 
 
-def _grid(setting: Setting, asked: Asked) -> Grid:
-    """What is asked for; else the study's own tracker, better and worse ones, and the estimators it shows."""
+def _grid(setting: Setting, options: Options) -> Grid:
+    """What the options say; else the study's own tracker, better and worse ones, and the estimators it shows."""
     from pipeline.simulation.exploration import Grid, shown_estimators, stated
 
     own = stated(setting)
     late = (own.latency_s / 2, own.latency_s, min(2 * own.latency_s, 0.9)) if own.latency_s else (0.0, 0.05, 0.1)
     return Grid(
-        _numbers("--latency", asked.latency) or late,
-        _numbers("--noise", asked.noise) or (own.noise_sd_mm / 4, own.noise_sd_mm / 2, own.noise_sd_mm),
-        _numbers("--rate", asked.rate) or (own.rate_hz / 2, own.rate_hz, 2 * own.rate_hz),
-        _names("--estimators", asked.estimators) or shown_estimators(setting.study),
-        asked.participants,
-        asked.repeats,
+        _numbers("--latency", options.latency) or late,
+        _numbers("--noise", options.noise) or (own.noise_sd_mm / 4, own.noise_sd_mm / 2, own.noise_sd_mm),
+        _numbers("--rate", options.rate) or (own.rate_hz / 2, own.rate_hz, 2 * own.rate_hz),
+        _names("--estimators", options.estimators) or shown_estimators(setting.study),
+        options.participants,
+        options.repeats,
     )
 
 
 def _numbers(option: str, text: str | None) -> tuple[float, ...]:
-    """`0.05,0.1` from the least to the largest; empty where nothing was asked."""
+    """The numbers of `0.1,0.05`, in ascending order; empty where the option was not given."""
     low, high = _LIMITS[option]
-    found = []
+    values = []
     for piece in _names(option, text, _RATES if option == "--rate" else _VALUES):
         try:
             value = float(piece)
         except ValueError:
-            raise PipelineError(f'{option}: "{piece}" is not a number; give some with commas between them') from None
+            raise PipelineError(f'{option}: "{piece}" is not a number; give numbers separated by commas') from None
         if not low <= value <= high:
             raise PipelineError(f"{option}: should lie between {low:g} and {high:g}, found {piece}")
-        found.append(value)
-    if len(set(found)) < len(found):
-        raise PipelineError(f"{option}: a value is there twice: {text}")
-    return tuple(sorted(found))
+        values.append(value)
+    if len(set(values)) < len(values):
+        raise PipelineError(f"{option}: a value is listed twice: {text}")
+    return tuple(sorted(values))
 
 
 def _names(option: str, text: str | None, most: int = _VALUES) -> tuple[str, ...]:
     if text is None:
         return ()
-    found = tuple(piece.strip() for piece in text.split(","))
-    if "" in found:
+    names = tuple(piece.strip() for piece in text.split(","))
+    if "" in names:
         raise PipelineError(f'{option}: a value is missing in "{text}"')
-    if len(set(found)) < len(found):
-        raise PipelineError(f"{option}: a value is there twice: {text}")
-    if len(found) > most:
-        raise PipelineError(f"{option}: takes up to {most} values at once, found {len(found)}; explore in several runs")
-    return found
+    if len(set(names)) < len(names):
+        raise PipelineError(f"{option}: a value is listed twice: {text}")
+    if len(names) > most:
+        raise PipelineError(f"{option}: takes up to {most} values at once, found {len(names)}; explore in several runs")
+    return names
 
 
 def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]]) -> Explored:

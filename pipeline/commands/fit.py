@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.commands import console
-from pipeline.commands.run import for_each
+from pipeline.commands.studies import for_each_study
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.sessions import recording
@@ -18,7 +18,7 @@ from pipeline.stages import INGEST
 
 
 def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache: Path | None) -> None:
-    """Fit each study; the highest of the exit codes."""
+    """Fit each study and print the block; exit with the highest of their codes."""
 
     def then(folder: Path, result: Result) -> int:
         recordings = {
@@ -26,45 +26,45 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
             for session in result.sessions
         }
         if not recordings:
-            raise PipelineError(f"{folder}: has no logs to fit to")
+            raise PipelineError(f"{folder}: has no session to fit to")
         try:
-            found = fit(result.study, recordings, first_s)
+            fitted = fit(result.study, recordings, first_s)
         except PipelineError as error:
             raise PipelineError(f"{folder}: {error}") from None
-        for line in _lines(result.name, found, first_s, recordings):
+        for line in _lines(result.name, fitted, first_s, recordings):
             console.say(line)
         return result.exit_code
 
-    sys.exit(for_each(studies, INGEST, jobs, cache, then))
+    sys.exit(for_each_study(studies, INGEST, jobs, cache, then))
 
 
-def _lines(name: str, found: Fit, first_s: float, recordings: dict[str, recording.Recording]) -> Iterator[str]:
-    yield f"# {name}: fitted on the first {first_s:g} s of {len(recordings)} sessions; paste what you trust."
-    yield from _block(found.parameters)
-    for stream, (mean, half) in found.gravity_mm_s2.items():
+def _lines(name: str, fitted: Fit, first_s: float, recordings: dict[str, recording.Recording]) -> Iterator[str]:
+    yield f"# {name}: fitted on the first {first_s:g} s of {len(recordings)} sessions; copy what you trust."
+    yield from _block(fitted.parameters)
+    for stream, (mean, half) in fitted.gravity_mm_s2.items():
         values = ", ".join(f"{value:.0f}" for value in mean)
         yield f"# streams.{stream}.gravity_mm_s2 by the mean specific force: [{values}] ± {float(np.max(half)):.0f}"
     yield from _mountings(recordings)
-    for row in found.parameters:
+    for row in fitted.parameters:
         if not row.fitted.told:
             yield (
-                f"# The data cannot tell {row.where}.{row.key}: anything from {_short(row.fitted.low)} to"
+                f"# {row.where}.{row.key} cannot be fitted from these data: anything from {_short(row.fitted.low)} to"
                 f" {_short(row.fitted.high)} fits; {_short(row.stated)} was kept."
             )
-    if found.scores:
-        yield "# On the rest of each session, RMSE in mm as set -> as fitted:"
-    for score in found.scores:
+    if fitted.scores:
+        yield "# RMSE in mm on the rest of each session, with study.yaml's values -> with the fitted ones:"
+    for score in fitted.scores:
         yield f"#   {score.session}  {score.estimator}: {score.stated_rmse_mm:.1f} -> {score.fitted_rmse_mm:.1f}"
 
 
 def _block(parameters: Sequence[Parameter]) -> Iterator[str]:
     """YAML, section by section, each value with its interval."""
-    told = [row for row in parameters if row.fitted.told]
-    for section in dict.fromkeys(row.where.split(".", 1)[0] for row in told):
+    fitted = [row for row in parameters if row.fitted.told]
+    for section in dict.fromkeys(row.where.split(".", 1)[0] for row in fitted):
         yield f"{section}:"
-        for where in dict.fromkeys(row.where for row in told if row.where.startswith(f"{section}.")):
+        for where in dict.fromkeys(row.where for row in fitted if row.where.startswith(f"{section}.")):
             yield f"  {where.split('.', 1)[1]}:"
-            for row in told:
+            for row in fitted:
                 if row.where == where:
                     interval = f"{_short(row.fitted.low)} to {_short(row.fitted.high)}"
                     yield f"    {row.key}: {_short(row.fitted.value)}  # {interval}; was {_short(row.stated)}"

@@ -34,16 +34,16 @@ def inspect(files: Sequence[Path], as_json: bool) -> None:
             console.warn(f"steadyhand: {path}: {error}")
             code = 2
             continue
-        found = [quality_row(path.stem, topic, readings, []) for topic, readings in sorted(log.topics.items())]
-        rows += tables.records("quality", tables.frame("quality", found))
+        of_log = [quality_row(path.stem, topic, readings, []) for topic, readings in sorted(log.topics.items())]
+        rows += tables.records("quality", tables.frame("quality", of_log))
         for fault in log.faults:
             console.warn(f"steadyhand: {path}: {fault}")
-        if log.faults or any(row["messages_lost"] for row in found):
+        if log.faults or any(row["messages_lost"] for row in of_log):
             code = max(code, 1)
         if as_json:
             continue
         seen = inspected(path, log)
-        _print(path, found, log.facts, {topic.name: topic for topic in seen.topics})
+        _print(path, of_log, log.facts, {topic.name: topic for topic in seen.topics})
         for line in (*_block(seen), *_checks(seen)):
             console.say(line)
         if not seen.usable:

@@ -16,17 +16,17 @@ _NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010fff
 
 @dataclass(frozen=True)
 class Case:
-    """One thing that was looked at. `fault` is a headline and its details; `broken` says that it was no test at all."""
+    """One check. `failure` is a headline and its details; `broken` says that the check itself could not be made."""
 
     group: str
     name: str
-    fault: tuple[str, str] | None = None
+    failure: tuple[str, str] | None = None
     broken: bool = False
 
 
 @dataclass(frozen=True)
 class Suite:
-    """What was looked at together, in how long, and what else there is to say."""
+    """The checks of one study, how long they took, and what else there is to say."""
 
     name: str
     cases: Sequence[Case]
@@ -35,13 +35,13 @@ class Suite:
 
 
 def refuse_other(path: Path) -> None:
-    """Only a new file, or one that holds XML, is written over; asked before anything is computed."""
+    """Refuse to overwrite a file that is not XML; called before anything is computed."""
     if path.is_dir() or (path.exists() and not path.read_bytes()[:100].lstrip().startswith(b"<?xml")):
-        raise PipelineError(f"--junit {path}: is there and is no JUnit file; name a new one, such as junit.xml")
+        raise PipelineError(f"--junit {path}: already exists and is not a JUnit file; choose another name")
 
 
 def write(path: Path, suites: Sequence[Suite]) -> None:
-    """The suites as one file."""
+    """Write the suites as one file."""
     root = ElementTree.Element(
         "testsuites", {"name": "steadyhand check", **_counts([c for s in suites for c in s.cases])}
     )
@@ -60,8 +60,8 @@ def write(path: Path, suites: Sequence[Suite]) -> None:
 
 def _add(suite: ElementTree.Element, case: Case) -> None:
     element = ElementTree.SubElement(suite, "testcase", {"classname": _text(case.group), "name": _text(case.name)})
-    if case.fault is not None:
-        headline, details = map(_text, case.fault)
+    if case.failure is not None:
+        headline, details = map(_text, case.failure)
         kind = "error" if case.broken else "failure"
         ElementTree.SubElement(element, kind, {"message": headline, "type": kind}).text = details
 
@@ -69,8 +69,8 @@ def _add(suite: ElementTree.Element, case: Case) -> None:
 def _counts(cases: Sequence[Case]) -> dict[str, str]:
     return {
         "tests": str(len(cases)),
-        "failures": str(sum(case.fault is not None and not case.broken for case in cases)),
-        "errors": str(sum(case.fault is not None and case.broken for case in cases)),
+        "failures": str(sum(case.failure is not None and not case.broken for case in cases)),
+        "errors": str(sum(case.failure is not None and case.broken for case in cases)),
     }
 
 

@@ -21,7 +21,7 @@ _NAMED_AS = "name them as study.yaml does, as in: steadyhand plan kinect fusion 
 def plan(
     names: Sequence[str], study: Path | None, participants: int, *, prefix: str, seed: int | None, out: Path | None
 ) -> None:
-    """Print the table, or write it to `out`; what its balance lacks is said beside it."""
+    """Print the table, or write it to `out`; beside it, print how balanced it is."""
     conditions = _conditions(names, study)
     _printable("--prefix", prefix)
     orders = assigned(len(conditions), participants, seed)
@@ -37,27 +37,27 @@ def plan(
 
 def _conditions(names: Sequence[str], study: Path | None) -> list[str]:
     if study is not None and names:
-        raise PipelineError("plan: conditions stand on the command line and in --study; give one of them")
-    found = [str(identifier(name.strip())) for name in (load_study(study).conditions if study else names)]
-    for name in found:
-        if found.count(name) > 1:
-            raise PipelineError(f'plan: condition "{name}" stands there twice; {_NAMED_AS}')
+        raise PipelineError("plan: conditions are given both on the command line and by --study; give only one of them")
+    conditions = [str(identifier(name.strip())) for name in (load_study(study).conditions if study else names)]
+    for name in conditions:
+        if conditions.count(name) > 1:
+            raise PipelineError(f'plan: condition "{name}" is listed twice; {_NAMED_AS}')
         if not name:
             raise PipelineError(f"plan: a condition has no name; {_NAMED_AS}")
         _printable("condition", name)
-    if len(found) < 2:
-        raise PipelineError(f"plan: an order needs two conditions or more, found {len(found)}; {_NAMED_AS}")
-    return found
+    if len(conditions) < 2:
+        raise PipelineError(f"plan: an order needs at least two conditions, found {len(conditions)}; {_NAMED_AS}")
+    return conditions
 
 
 def _printable(what: str, text: str) -> None:
-    """A line break or an escape in an id is a slip of the keyboard or worse."""
+    """Refuse control characters: a line break or an escape in an id is a slip of the keyboard or worse."""
     if any(unicodedata.category(character) in ("Cc", "Cs") for character in text):
-        raise PipelineError(f"plan: {what} {text!r} holds a character that cannot be printed; leave it out")
+        raise PipelineError(f"plan: {what} {text!r} contains a character that cannot be printed; leave it out")
 
 
 def _table(conditions: Sequence[str], orders: Sequence[Order], prefix: str) -> str:
-    """A CSV row a participant: the sequence as a label, and a column a period."""
+    """CSV with one row per participant: the sequence as a label, and a column for each period."""
     width = max(2, len(str(len(orders))))
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
@@ -70,26 +70,26 @@ def _table(conditions: Sequence[str], orders: Sequence[Order], prefix: str) -> s
 
 def _write(path: Path, text: str) -> None:
     if path.exists():
-        raise PipelineError(f"--out {path}: is already there and is not written over; name a new file, or remove it")
+        raise PipelineError(f"--out {path}: already exists; choose another file, or remove this one")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _balance_lines(conditions: Sequence[str], orders: Sequence[Order]) -> list[str]:
-    """How often each condition stands in each period and after each other one, counted from the orders."""
-    found = balance(orders)
+    """How often each condition is in each period and follows each other one, counted from the orders."""
+    counts = balance(orders)
     lines = [
-        f"Each condition stands in each period {_times(found.period)},"
-        f" and comes straight after each other one {_times(found.neighbours)}."
+        f"Each condition is in each period {_times(counts.period)},"
+        f" and directly follows each other one {_times(counts.neighbours)}."
     ]
-    if found.complete:
+    if counts.complete:
         return [*lines, "Counterbalancing is complete."]
     size, n = len(williams_design(len(conditions))), len(orders)
     fitting = [str(many) for many in (n // size * size, (n // size + 1) * size) if many]
     return [
         *lines,
-        f"Counterbalancing is incomplete: {len(conditions)} conditions take {size} sequences, and"
-        f" {counted(n, 'participant')} cannot share them evenly; {' or '.join(fitting)} participants would.",
+        f"Counterbalancing is incomplete: {len(conditions)} conditions take {size} sequences, which"
+        f" {counted(n, 'participant')} cannot share evenly; {' or '.join(fitting)} participants could.",
     ]
 
 

@@ -20,7 +20,7 @@ _LARGEST_EFFECT = 100.0
 
 @dataclass(frozen=True)
 class Expected:
-    """What the user says of the study, as on the command line."""
+    """The planned study, as the command line states it."""
 
     test: str
     effect: float | None
@@ -47,21 +47,21 @@ def power(expected: Expected, search: Search, out: Path | None) -> None:
     _within("--power", search.power, design.alpha, 1)
     if out is not None:
         refuse_study(out)
-    found = sample_size(design, search.power, search.simulations, search.seed, search.most)
-    if found is None:
+    planned = sample_size(design, search.power, search.simulations, search.seed, search.most)
+    if planned is None:
         raise PipelineError(_not_enough(design, search))
     for line in (power_output.heading(design, search.power), *_effect(expected, design)):
         console.say(line)
-    console.table(*power_output.table(power_output.records(found)), left=0)
-    for line in power_output.answer(design, search.simulations, search.seed, found):
+    console.table(*power_output.table(power_output.records(planned)), left=0)
+    for line in power_output.answer(design, search.simulations, search.seed, planned):
         console.say(line)
     if out is not None:
-        power_output.write(out, design, {**asdict(expected), **asdict(search)}, found)
+        power_output.write(out, design, {**asdict(expected), **asdict(search)}, planned)
         console.say(f"Written: {', '.join(str(out / name) for name in power_output.FILES)}")
 
 
 def _design(expected: Expected) -> Design:
-    """The study the options describe; PipelineError for the one that cannot be."""
+    """The study that the options describe. Raises PipelineError where there can be none."""
     test, k = expected.test, expected.conditions
     if test not in TESTS:
         raise PipelineError(f'--test: "{test}" is not known{did_you_mean(test, TESTS)}')
@@ -80,23 +80,23 @@ def _difference(expected: Expected, correlation: float) -> float:
     """The difference between two conditions, in SDs of a condition."""
     if expected.effect is not None:
         if expected.difference is not None or expected.sd is not None:
-            raise PipelineError("--effect and --difference with --sd say the same thing; give one of them")
+            raise PipelineError("--effect says the same as --difference with --sd; give only one of them")
         size = _size("--effect", expected.effect)
         if expected.test == "rm_anova":
             return difference_of_f(size, expected.conditions)
         return difference_of_dz(size, correlation) if expected.correlation is None else size
     if expected.difference is None or expected.sd is None:
         raise PipelineError(
-            "the effect to be found is missing; give --effect 0.5, or --difference and --sd in the measure's unit"
+            "the effect is missing; give --effect 0.5, for example, or --difference and --sd in the measure's unit"
         )
     _within("--sd", expected.sd, 0, math.inf)
     return _size("--difference over --sd", expected.difference / expected.sd)
 
 
 def _size(option: str, value: float) -> float:
-    """An effect's size without its sign, by which no power changes."""
+    """An effect's size without its sign, which changes no power."""
     if not 0 < abs(value) <= _LARGEST_EFFECT:
-        raise PipelineError(f"{option}: should be a size other than 0 and up to {_LARGEST_EFFECT:g}, found {value:g}")
+        raise PipelineError(f"{option}: should not be 0, and its size at most {_LARGEST_EFFECT:g}, found {value:g}")
     return abs(value)
 
 
@@ -110,13 +110,13 @@ def _not_enough(design: Design, search: Search) -> str:
     if reached is None:
         reached = simulate(design, search.most, search.simulations, search.seed).own.power
     return (
-        f"power: {search.most} participants reach a power of {share(reached)}, not {search.power:g}; raise --max-n,"
-        " or plan for a larger effect or a less noisy measure"
+        f"power: {search.most} participants reach a power of {share(reached)} only, not {search.power:g}; raise"
+        " --max-n, or plan for a larger effect or a less noisy measure"
     )
 
 
 def _effect(expected: Expected, design: Design) -> list[str]:
-    """The effect as it was said, and what is computed from it."""
+    """The effect as it was stated, and what follows from it."""
     assumed = "" if expected.correlation is not None else " (assumed; --correlation states it)"
     lines = []
     if expected.difference is not None and expected.sd is not None:
@@ -131,7 +131,9 @@ def _effect(expected: Expected, design: Design) -> list[str]:
     elif design.test != "rm_anova" and expected.correlation is not None:
         lines.append(f"d = {number(design.difference)}: the mean difference over the SD within a condition")
     if design.test == "rm_anova" or lines:
-        lines.append(f"r = {share(design.correlation, 2)}: a participant's values in two conditions correlate{assumed}")
+        lines.append(
+            f"r = {share(design.correlation, 2)}: correlation of a participant's values in two conditions{assumed}"
+        )
     if design.test == "rm_anova":
         return [*lines, f"f = {number(design.f)}: the SD of the conditions' means over the SD within a condition"]
     return [*lines, f"d_z = {number(design.dz)}: the mean difference over the SD of the differences"]

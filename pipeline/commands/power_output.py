@@ -31,10 +31,10 @@ _MEANING = {
 Record = dict[str, Any]
 
 
-def records(found: SampleSize) -> list[Record]:
-    """A row a number of participants; the columns are always the same, None where they do not apply."""
+def records(planned: SampleSize) -> list[Record]:
+    """One row per number of participants; the columns are always the same, None where they do not apply."""
     rows = []
-    for row in found.rows:
+    for row in planned.rows:
         record: Record = {"participants": row.n, "power_closed_form": row.closed_form}
         for column, each in (("power_simulated", row.simulated.own), ("power_corrected", row.simulated.corrected)):
             low, high = (None, None) if each is None else each.interval()
@@ -54,7 +54,7 @@ def _named(design: Design) -> str:
 
 
 def table(rows: Sequence[Record]) -> tuple[list[str], list[list[str]]]:
-    """Header and cells for people, less the columns that do not apply."""
+    """Header and cells for people, without the columns that do not apply."""
     header, lines = ["participants"], [[str(row["participants"])] for row in rows]
     for column in _present(rows):
         header += [_SERIES[column], *(["95 % interval"] if f"{column}_low" in rows[0] else [])]
@@ -69,19 +69,19 @@ def _present(rows: Sequence[Record]) -> list[str]:
     return [column for column in _SERIES if rows[0][column] is not None]
 
 
-def answer(design: Design, studies: int, seed: int, found: SampleSize) -> list[str]:
-    """How many participants by each way of computing it, and what to know of them."""
+def answer(design: Design, studies: int, seed: int, planned: SampleSize) -> list[str]:
+    """How many participants by each way of computing it, and what that rests on."""
     lines = []
-    if found.closed_form is not None:
-        lines.append(f"Closed form ({_FORMULAS[design.test]}): {found.closed_form} participants.")
-    lines.append(f"Simulation ({studies} studies a row, seed {seed}): {_within_error(found.simulated)}.")
-    if found.corrected is not None:
-        lines.append(f"  corrected by Greenhouse-Geisser, as a report judges: {_within_error(found.corrected)}.")
+    if planned.closed_form is not None:
+        lines.append(f"Closed form ({_FORMULAS[design.test]}): {planned.closed_form} participants.")
+    lines.append(f"Simulation ({studies} studies per row, seed {seed}): {_within_error(planned.simulated)}.")
+    if planned.corrected is not None:
+        lines.append(f"  corrected by Greenhouse-Geisser, as a report judges: {_within_error(planned.corrected)}.")
     lines.append(
         f"Power is the chance that p < {design.alpha:g} if the effect is as stated. Add those you expect to drop out."
     )
     lines.append(f"Assumed: {_assumed(design)}.")
-    sequences, judged = len(williams_design(design.conditions)), found.judged_by
+    sequences, judged = len(williams_design(design.conditions)), planned.judged_by
     if judged is not None:
         even = -(-judged // sequences) * sequences
         lines.append(
@@ -102,7 +102,7 @@ def _within_error(needed: Needed) -> str:
 
 
 def _assumed(design: Design) -> str:
-    """What the simulated studies are like."""
+    """What the simulated studies assume."""
     if design.test == "rm_anova":
         spherical = ", so that sphericity holds" if design.conditions > 2 else ""
         return f"normal values, equally spread in every condition, equally correlated between any two{spherical}"
@@ -111,9 +111,9 @@ def _assumed(design: Design) -> str:
     return "normal differences"
 
 
-def write(folder: Path, design: Design, settings: Mapping[str, Any], found: SampleSize) -> None:
+def write(folder: Path, design: Design, settings: Mapping[str, Any], planned: SampleSize) -> None:
     """The table as CSV and JSON, and the curve as SVG."""
-    rows = records(found)
+    rows = records(planned)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "power.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
@@ -123,27 +123,27 @@ def write(folder: Path, design: Design, settings: Mapping[str, Any], found: Samp
         "settings": dict(settings),
         "effect": {"d": design.difference, "d_z": design.dz, "f": design.f, "correlation": design.correlation},
         "needed": {
-            "closed_form": found.closed_form,
-            "simulated": vars(found.simulated),
-            "corrected": found.corrected and vars(found.corrected),
+            "closed_form": planned.closed_form,
+            "simulated": vars(planned.simulated),
+            "corrected": planned.corrected and vars(planned.corrected),
         },
         "meaning": _MEANING,
         "rows": rows,
     }
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     (folder / "power.json").write_text(text, encoding="utf-8")
-    _draw(folder / "power.svg", design, rows, found, settings["power"])
+    _draw(folder / "power.svg", design, rows, planned, settings["power"])
 
 
-def _draw(path: Path, design: Design, rows: Sequence[Record], found: SampleSize, target: float) -> None:
+def _draw(path: Path, design: Design, rows: Sequence[Record], planned: SampleSize, target: float) -> None:
     import pandas as pd
 
     from pipeline.report import figures
 
     needed = {
-        "power_closed_form": found.closed_form,
-        "power_simulated": found.simulated.n,
-        "power_corrected": found.corrected and found.corrected.n,
+        "power_closed_form": planned.closed_form,
+        "power_simulated": planned.simulated.n,
+        "power_corrected": planned.corrected and planned.corrected.n,
     }
     names = {
         "power_closed_form": f"closed form ({_FORMULAS.get(design.test)})",
@@ -154,4 +154,4 @@ def _draw(path: Path, design: Design, rows: Sequence[Record], found: SampleSize,
     effect = f"f = {number(design.f)}" if design.test == "rm_anova" else f"d_z = {number(design.dz)}"
     labels = figures.Labels(f"{_named(design)}: {effect}", f"Power (chance that p < {design.alpha:g})")
     shown = pd.DataFrame(rows).dropna(axis="columns", how="all")
-    figures.draw(figures.power, path, shown, series, target, found.judged_by, labels)
+    figures.draw(figures.power, path, shown, series, target, planned.judged_by, labels)

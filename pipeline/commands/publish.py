@@ -33,18 +33,18 @@ FORMATS: Mapping[str, tuple[str, ...]] = {
     "bib": ("references.bib",),
     "zip": (_ARCHIVE,),
 }
-"""What can be asked for: the files, and the folders of files, of each format. The ZIP holds the others asked for."""
+"""What `--format` takes: the files, and the folders of files, of each format. The ZIP holds the others asked for."""
 
 
 def publish(result: Result, folder: Path, command: Sequence[str], formats: Iterable[str] = FORMATS) -> None:
-    """Bring the report's files into `folder`; what an earlier report left there and this one lacks goes."""
-    made = {}
+    """Bring the report's files into `folder`, and remove those of an earlier report that this one does not have."""
+    available = {}
     if "report" in result.entries:
         entry = result.entry("report")
-        made = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
-    made[_RESULTS] = result.entry("compare") / _RESULTS
+        available = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
+    available[_RESULTS] = result.entry("compare") / _RESULTS
     wanted = [one for name in formats for one in FORMATS[name]]
-    files = {name: path for name, path in made.items() if _is_of(name, wanted)}
+    files = {name: path for name, path in available.items() if _is_of(name, wanted)}
     archive = [_ARCHIVE] if _ARCHIVE in wanted else []
     refuse_inputs(result, folder, [*files, *archive, PROVENANCE])
     for stale in set(_published(folder)) - {*files, *archive}:
@@ -56,12 +56,12 @@ def publish(result: Result, folder: Path, command: Sequence[str], formats: Itera
 
 
 def _is_of(name: str, wanted: Iterable[str]) -> bool:
-    """Is it one of these files, or in one of these folders?"""
+    """Whether it is one of these files, or in one of these folders."""
     return any(name == one or (one.endswith("/") and name.startswith(one)) for one in wanted)
 
 
 def _write_archive(files: Mapping[str, Path], study: str, path: Path) -> None:
-    """One file to mail: everything in a folder of the study's name, the same bytes for the same files."""
+    """One file to mail: everything in a folder of the study's name; the same files give the same bytes."""
     with _whole(path) as beside, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, source in sorted(files.items()):
             archive.writestr(zipfile.ZipInfo(f"{study}/{name}"), source.read_bytes(), zipfile.ZIP_DEFLATED)
@@ -87,7 +87,7 @@ def publish_exploration(study: Study, folder: Path, command: Sequence[str]) -> N
 
 
 def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
-    """What ran; the digest of a stage's code is one of the libraries it uses too."""
+    """What ran; the digest of a stage's code is one of the versions of its libraries too."""
     return {
         "command": [Path(command[0]).name, *command[1:]],
         "python": platform.python_version(),
@@ -103,7 +103,7 @@ def _read(result: Result) -> dict[str, Any]:
 
 
 def _write_provenance(provenance: dict[str, Any], results: Path, folder: Path) -> bool:
-    """Whether it is another than the one that was there."""
+    """Write it; whether it differs from the one that was there."""
     provenance["results_sha256"] = file_digest(results)
     text = (json.dumps(provenance, indent=1, ensure_ascii=False) + "\n").encode()
     path = folder / PROVENANCE
@@ -115,21 +115,21 @@ def _write_provenance(provenance: dict[str, Any], results: Path, folder: Path) -
 
 
 def refuse_study(folder: Path) -> None:
-    """A report never goes into a study's own folder; asked before anything is computed."""
+    """Refuse to write a report into a study's own folder; called before anything is computed."""
     if (folder / SETTINGS_FILE).exists():
-        raise PipelineError(f"--out {folder}: is a study, and its files are not changed; name a folder for the report")
+        raise PipelineError(f"--out {folder}: is the folder of a study; choose another folder for the report")
 
 
 def refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
-    """Nor over the files it was made from."""
+    """Refuse to overwrite the study's own input files."""
     inputs = {(result.folder / name).resolve() for name in result.inputs}
     for name in files:
         if (folder / name).resolve() in inputs:
-            raise PipelineError(f"--out {folder}: {name} there is the study's own; name a folder for the report alone")
+            raise PipelineError(f"--out {folder}: {name} there belongs to the study; choose another folder")
 
 
 def publish_results(result: Result, folder: Path, command: Sequence[str]) -> None:
-    """results.json and where it came from; what a report left there is still listed, for the next one to clear."""
+    """Write results.json and its provenance; that lists an earlier report's files too, for the next one to remove."""
     refuse_inputs(result, folder, [_RESULTS, PROVENANCE])
     copy(result.entry("compare") / _RESULTS, folder / _RESULTS)
     _publish_provenance(result, folder, command, {*_published(folder), _RESULTS})
@@ -148,7 +148,7 @@ def _published(folder: Path) -> list[str]:
 
 
 def copy(source: Path, target: Path) -> bool:
-    """Bring a file to its place, whole or not at all; one that is the same already stays. Whether it was brought."""
+    """Copy a file, whole or not at all, unless the target is the same already; whether it was copied."""
     if target.is_file() and target.read_bytes() == source.read_bytes():
         return False
     with _whole(target) as beside:
@@ -158,7 +158,7 @@ def copy(source: Path, target: Path) -> bool:
 
 @contextmanager
 def _whole(target: Path) -> Iterator[Path]:
-    """A file to fill, which then takes the target's place at once: who is interrupted leaves what was there before."""
+    """A file to fill, which then replaces the target at once: an interrupted run leaves what was there before."""
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     try:

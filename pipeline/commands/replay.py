@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,11 +13,13 @@ import pandas as pd
 from pipeline.analysis.ranking import ranked
 from pipeline.commands import console
 from pipeline.commands.publish import copy, publish_provenance, refuse_inputs, refuse_study
-from pipeline.commands.run import for_each, refuse_same_names, reports_folder, short, what_befell, what_was_done
+from pipeline.commands.studies import for_each_study, refuse_same_names
 from pipeline.engine.cache import Entry
-from pipeline.engine.resources import Means
+from pipeline.engine.folders import reports_folder
+from pipeline.engine.messages import computed_message, session_messages
+from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
-from pipeline.engine.run import bring_up_to_date, over_settings
+from pipeline.engine.run import bring_up_to_date, run_variants
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
 from pipeline.report.document import html, pdf
@@ -38,7 +40,7 @@ _TABLES, _IN_RESULTS = written_by("replay"), in_results_of("replay")
 
 @dataclass
 class _Gathered:
-    """What all studies gave."""
+    """The tables of all studies so far."""
 
     studies: list[Row] = field(default_factory=list)
     results: list[Result] = field(default_factory=list)
@@ -63,26 +65,26 @@ def replay(
     wanted, further = read_changes(changes), read_estimators(estimators)
     gathered = _Gathered()
 
-    def bring(study: Path, stages: Sequence[Stage], means: Means) -> Result:
+    def bring(study: Path, stages: Sequence[Stage], resources: Resources) -> Result:
         try:
             listed = variants(load_study(study), wanted, further, estimators)
         except PipelineError as error:
             raise PipelineError(_in_study(study, str(error))) from None
-        result = bring_up_to_date(study, stages, means)
-        kept, decided = _by_decision(result)
+        result = bring_up_to_date(study, stages, resources)
+        kept, excluded = _without_excluded(result)
         if not kept:
-            raise PipelineError(f"{study}: has no session to replay")
-        entries = over_settings(result, REPLAY, [variant.study for variant in listed], kept, means)
-        _gather(gathered, result, listed, list(zip(kept, entries, strict=True)), decided)
+            raise PipelineError(f"{study}: there is no session to replay")
+        entries = run_variants(result, REPLAY, [variant.study for variant in listed], kept, resources)
+        _gather(gathered, result, listed, list(zip(kept, entries, strict=True)), excluded)
         return result
 
     def then(_folder: Path, result: Result) -> int:
-        for line in what_befell(result):
+        for line in session_messages(result):
             console.warn(line)
-        console.say(f"{result.name}: {what_was_done(result)}")
+        console.say(f"{result.name}: {computed_message(result)}")
         return result.exit_code
 
-    code = for_each(studies, INGEST, jobs, cache, then, bring=bring, where=executor)
+    code = for_each_study(studies, INGEST, jobs, cache, then, bring=bring, executor_name=executor)
     if gathered.results:
         _write(gathered, folder)
     sys.exit(code)
@@ -92,8 +94,8 @@ def _in_study(study: Path, message: str) -> str:
     return message if message.startswith(str(study)) else f"{study}/{message}".replace("/--", ": --")
 
 
-def _by_decision(result: Result) -> tuple[list[Session], list[Row]]:
-    """The sessions to replay, and rows for those that study.yaml leaves out."""
+def _without_excluded(result: Result) -> tuple[list[Session], list[Row]]:
+    """The sessions to replay, and a row of exclusions for each that study.yaml excludes."""
     kept, rows = [], []
     for session in result.sessions:
         decision = result.study.exclusion_of(session)
@@ -109,29 +111,20 @@ def _gather(
     result: Result,
     listed: Sequence[Variant],
     entries: Sequence[tuple[Session, list[Entry]]],
-    decided: list[Row],
+    excluded: list[Row],
 ) -> None:
-    """Take a study's entries together; a variant that failed in a session is set aside there, and said."""
+    """Add a study's tables; a session that failed with one variant is set aside there, and said."""
     rows: list[Row] = [
         *({**session.ids, "what": "session set aside", "reason": why} for session, why in result.set_aside),
         *({**session.ids, "what": "session read in part", "reason": why} for session, why in result.in_part),
         *({"session": name, "what": "file not used", "reason": why} for name, why in result.unused),
-        *decided,
+        *excluded,
     ]
     accuracy = _of_variants("accuracy", listed, entries)
     trials = _of_variants("trials", listed, entries).assign(study=result.name)
     gathered.accuracy.append(tables.as_table("accuracy", accuracy))
     gathered.trials.append(tables.as_table("replay_trials", trials))
-    rated = set(zip(accuracy["session"], accuracy["place"], strict=True))
-    for session, found in entries:
-        for place, (variant, entry) in enumerate(zip(listed, found, strict=True)):
-            label, fault = variant.label or variant.estimator, entry.said["set_aside"]
-            if fault is not None:
-                result.set_aside.append((session, f"{label}: {fault}"))
-                rows.append({**session.ids, "variant": label, "what": "session set aside", "reason": fault})
-            elif (session.id, place) not in rated:
-                reason = "no instant with both an estimate and a reference"
-                rows.append({**session.ids, "variant": label, "what": "no accuracy", "reason": reason})
+    rows += _failures(result, listed, entries, set(zip(accuracy["session"], accuracy["place"], strict=True)))
     gathered.results.append(result)
     gathered.exclusions += [{"study": result.name, **row} for row in rows]
     gathered.studies.append(
@@ -145,11 +138,30 @@ def _gather(
     )
 
 
+def _failures(
+    result: Result,
+    listed: Sequence[Variant],
+    entries: Sequence[tuple[Session, list[Entry]]],
+    with_accuracy: Collection[tuple[str, int]],
+) -> Iterator[Row]:
+    """A row of exclusions for each session and variant without accuracy; `result` takes the sessions set aside."""
+    for session, of_session in entries:
+        for place, (variant, entry) in enumerate(zip(listed, of_session, strict=True)):
+            label, reason = variant.label or variant.estimator, entry.outcome["set_aside"]
+            if reason is not None:
+                result.set_aside.append((session, f"{label}: {reason}"))
+                yield {**session.ids, "variant": label, "what": "session set aside", "reason": reason}
+            elif (session.id, place) not in with_accuracy:
+                missing = "no instant with both an estimate and a reference"
+                yield {**session.ids, "variant": label, "what": "no accuracy", "reason": missing}
+
+
 def _of_variants(name: str, listed: Sequence[Variant], entries: Sequence[tuple[Session, list[Entry]]]) -> pd.DataFrame:
     """A table of all sessions and variants, session by session, with each variant's label and `place` in the list."""
     parts = []
     for place, variant in enumerate(listed):
-        folders = [found[place].folder for _, found in entries if found[place].said["set_aside"] is None]
+        of_variant = [of_session[place] for _, of_session in entries]
+        folders = [entry.folder for entry in of_variant if entry.outcome["set_aside"] is None]
         parts.append(tables.read(name, folders).assign(variant=variant.label, place=place))
     order = {session.id: number for number, (session, _) in enumerate(entries)}
     return pd.concat(parts).sort_values("session", key=lambda ids: ids.map(order), kind="stable")
@@ -162,9 +174,9 @@ def _settings(variant: Variant) -> Row:
 
 
 def _write(gathered: _Gathered, folder: Path) -> None:
-    """replay.html, replay.pdf, results.json and the tables as Parquet; and the ranking, to the terminal."""
+    """Write replay.html, replay.pdf, results.json and the tables as Parquet, and print the ranking."""
     accuracy, trials = pd.concat(gathered.accuracy), pd.concat(gathered.trials)
-    found = {
+    written = {
         "accuracy": accuracy,
         "replay_trials": trials,
         "replay_means": tables.frame("replay_means", ranked(accuracy, trials)),
@@ -173,27 +185,27 @@ def _write(gathered: _Gathered, folder: Path) -> None:
     files = [_PAGE, _PRINT, _RESULTS, *(f"{name}.parquet" for name in _TABLES)]
     for result in gathered.results:
         refuse_inputs(result, folder, files)
-    with tempfile.TemporaryDirectory() as written, tempfile.TemporaryDirectory() as drawn:
-        _fill(gathered.studies, found, Path(drawn), Path(written))
+    with tempfile.TemporaryDirectory() as filled, tempfile.TemporaryDirectory() as drawn:
+        _fill(gathered.studies, written, Path(drawn), Path(filled))
         for name in files:
-            copy(Path(written) / name, folder / name)
+            copy(Path(filled) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
-    _say(list(tables.records("replay_means", found["replay_means"])))
-    console.say(f"Report: {short(folder / _PAGE)}  {short(folder / _PRINT)}")
+    _say(list(tables.records("replay_means", written["replay_means"])))
+    console.say(f"Report: {console.short_path(folder / _PAGE)}  {console.short_path(folder / _PRINT)}")
 
 
-def _fill(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path, folder: Path) -> None:
+def _fill(studies: Sequence[Row], frames: Mapping[str, pd.DataFrame], drawn: Path, folder: Path) -> None:
     """Write every file of the report into a folder of its own, and the figures it shows into `drawn`."""
-    results.write_replay(folder / _RESULTS, studies, {name: found[name] for name in _IN_RESULTS})
+    results.write_replay(folder / _RESULTS, studies, {name: frames[name] for name in _IN_RESULTS})
     for name in _TABLES:
-        tables.write(name, found[name], folder)
-    shown = document(studies, found, drawn)
+        tables.write(name, frames[name], folder)
+    shown = document(studies, frames, drawn)
     html.render(shown, drawn, folder / _PAGE)
     pdf.render(shown, drawn, folder / _PRINT)
 
 
 def _say(rows: Sequence[Row]) -> None:
-    """The ranking: of all studies where there are several, else of the one."""
+    """Print the ranking: of all studies where there are several, else of the one."""
     first = [row for row in rows if row["study"] == rows[0]["study"]]
     header = ("variant", "sessions", "RMSE mm", "95 % interval", "lag ms", "jitter mm")
     lines = [

@@ -8,7 +8,8 @@ from functools import partial
 from pathlib import Path
 
 from pipeline.commands import console
-from pipeline.commands.run import PROCESS, executor_of
+from pipeline.engine.executors import PROCESS, executor_of
+from pipeline.engine.progress import show_progress
 from pipeline.errors import PipelineError
 from pipeline.simulation.up_to_date import is_made
 from pipeline.study.folder import load_study
@@ -19,8 +20,8 @@ from pipeline.study.simulation import ReachSimulation
 def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: bool = False) -> None:
     """Write the files of each study's `simulation:` block into its folder.
 
-    With `if_needed` only where they are not there as these settings and this code make them; a study that simulates
-    nothing is passed over.
+    With `if_needed` only where they are missing or were made from other settings or other code; a study without the
+    block is skipped.
     """
     for folder in studies:
         study = load_study(folder, to_be_made=True)
@@ -35,14 +36,14 @@ def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: boo
 
 
 def _reach(folder: Path, study: Study, if_needed: bool) -> None:
-    """The paper's Experiment 1, whose logs are small and come with the study."""
+    """Write the paper's Experiment 1, whose logs are small and come with the study."""
     from pipeline.study.folder import find_sessions
 
     if if_needed and find_sessions(folder, study).sessions:
         return
     reach = importlib.import_module("pipeline.simulation.reach")
-    with console.progress() as progress:
-        paths = reach.simulate(folder, study, partial(progress.begin, "simulate"), progress.advance)
+    with show_progress() as progress:
+        paths = reach.simulate(folder, study, partial(progress.begin, "simulating"), progress.advance)
         progress.end()
     console.say(f"{folder}: wrote {len(paths)} logs, {paths[0].name} to {paths[-1].name}")
 
@@ -52,7 +53,7 @@ def _selection(folder: Path, study: Study, jobs: int | None, if_needed: bool) ->
         return
     from pipeline.simulation.study_files import simulate_study
 
-    with executor_of(jobs, PROCESS) as executor, console.progress() as progress:
-        files = simulate_study(folder, study, executor, partial(progress.begin, "simulate"), progress.advance)
+    with executor_of(jobs, PROCESS) as executor, show_progress() as progress:
+        files = simulate_study(folder, study, executor, partial(progress.begin, "simulating"), progress.advance)
         progress.end()
     console.say(f"{folder}: wrote {len(files)} logs, {Path(files[0]).name} to {Path(files[-1]).name}, and tables")

@@ -1,4 +1,53 @@
-"""The content-addressed cache: an entry is a folder named by everything that may change what is in it."""
+"""The content-addressed cache of everything that is computed.
+
+Theory of operation
+===================
+
+An entry is a folder of tables that a stage computed. Its name, the key, is the SHA-256 of everything that may change
+what is in it (pipeline.engine.keys): the code of the stage, the settings it declared, the study's files it reads, and
+the entries of earlier stages. So "is this up to date?" is "is there a folder of this name?". Nothing is ever
+overwritten, nothing ever expires, and any number of studies, versions and runs may share one cache.
+
+    .steadyhand-cache/
+    ├── lock                    held while an entry is put in place or removed
+    ├── inputs/
+    │   └── 51d0….json          what is known of the files of one study (pipeline.engine.input_digests)
+    ├── new/
+    │   ├── fuse-k2x9a7/        a run is writing this, or was killed while it did
+    │   └── gone-7dz1p0/        an entry being removed
+    └── fuse/
+        └── 3f/                 the first two digits, so that no folder gets too long
+            └── 3f9c…/          an entry: all 64 digits of its key
+                ├── entry.json      size and SHA-256 of each file, the stage's outcome, the digest of both
+                └── tracks.parquet
+
+Keys and digests. Entries of earlier stages stand in a key by their `digest`, which is of their content, not by their
+key. Where an edit changes the key of an early stage and its tables come out the same, everything after it is found in
+the cache as before.
+
+Whole or not at all. A stage writes into a folder of its own below `new`, and `keep` renames that to its place. A rename
+within one file system happens at once: no reader ever sees half an entry, whenever a run is killed. Removal goes the
+same way, out of sight first. What a killed run leaves below `new` is in nobody's way; `prune` removes it after a day.
+
+The lock. Two runs may compute the same entry. Each writes its own folder, and the second finds the place taken and
+drops its own; the contents are the same. The lock only keeps one run from removing a damaged entry at the moment at
+which another has just replaced it. Readers take no lock.
+
+What `get` trusts. Reading every table to compare digests would take longer than many runs. So `keep` sets the time of
+each file to an even second in the past (`_seal`), and `get` takes a file as unchanged while it has that time and its
+size. Whatever writes to the file sets another time, even within one tick of the coarsest clock. A file with another
+time (after a copy of the cache, say) is read and compared. entry.json is always read, and checked against its own
+digest. `damage` and `verify` read everything: that also finds a disk that decays and a write that was lost with the
+power. A damaged entry counts as none: it is computed again, and the user is told.
+
+What must stay true. (1) A key names all that may change the entry, else stale results are taken for current ones; that
+is the one mistake the cache cannot notice. (2) A function that fills a folder writes there only. (3) Files below an
+entry are never written to. (4) `new` is on the same file system as the entries.
+
+What may change. Anything about `new`, the lock and `inputs`. A change to what entry.json holds needs another LAYOUT,
+which is in every key: entries of the former layout are then never looked for, and `verify` removes them. Where Outcome
+gets another field, keys change by themselves, since every stage imports it.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +58,14 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+LAYOUT = 2
+"""The version of what entry.json holds; it is part of every key."""
 _MANIFEST = "entry.json"
 _NEW = "new"
 _KEY_LENGTH = 64
@@ -34,18 +85,19 @@ def file_digest(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """A folder of results, what its stage said beside them, and a digest of both."""
+    """A folder of tables, what its stage reported beside them (stage.Outcome), and the digest of both."""
 
     folder: Path
-    said: Mapping[str, Any]
-    content: str
+    outcome: Mapping[str, Any]
+    digest: str
 
 
 class Cache:
-    """Entries under one folder, by stage and key. An entry appears whole or not at all."""
+    """Entries below one folder, by stage and key. `read_digest` is how a file is read; a test counts with it."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, read_digest: Callable[[Path], str] = file_digest) -> None:
         self.root = root
+        self._read_digest = read_digest
 
     @property
     def inputs(self) -> Path:
@@ -56,22 +108,22 @@ class Cache:
         return self.root / stage / key[:2] / key
 
     def get(self, stage: str, key: str) -> Entry | None:
-        """The entry, or None if there is none or a file of it is missing or not what was written.
+        """The entry; None where there is none, or a file of it is missing or not what was written.
 
-        A file whose size and time are those it was kept with is not read; `fault` and `verify` read all of them.
+        A file that still has the time and size it was kept with is not read.
         """
         folder = self._folder(stage, key)
         try:
-            entry = _read(folder, whole=False)
+            entry = _read(folder, self._read_digest, trust_times=True)
         except _DamagedError:
             return None
-        with suppress(OSError):  # when it was last of use, for `prune`
+        with suppress(OSError):  # the time of the manifest is when the entry was last used, for `prune`
             os.utime(folder / _MANIFEST)
         return entry
 
-    def fault(self, stage: str, key: str) -> str | None:
-        """What is wrong with an entry that is there; None where there is none, or nothing is wrong."""
-        return fault_of(self._folder(stage, key))
+    def damage(self, stage: str, key: str) -> str | None:
+        """What is wrong with an entry that is there, reading all of it; None where nothing is, or there is no entry."""
+        return damage_in(self._folder(stage, key))
 
     def entries(self) -> Iterator[Path]:
         """The folders of all entries, whole or damaged: stage/xx/key."""
@@ -80,18 +132,18 @@ class Cache:
                 yield folder
 
     def remnants(self) -> Iterator[Path]:
-        """What runs that were killed left behind, and what runs at work are writing now."""
+        """The folders that runs are writing now, and those that killed runs left."""
         with suppress(FileNotFoundError):
             yield from sorted((self.root / _NEW).iterdir())
 
     def remove(self, folder: Path) -> None:
         """Remove an entry or a remnant. An entry goes at once, not file by file."""
-        with self._alone():
+        with self._locked():
             _discard(folder, self.root / _NEW)
 
     @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Two runs must not take away what the other has just put in place."""
+    def _locked(self) -> Iterator[None]:
+        """Keep other runs from putting entries in place or removing them."""
         self.root.mkdir(parents=True, exist_ok=True)
         with (self.root / "lock").open("a") as file:
             with suppress(OSError):  # some network file systems have no locks; renames are whole even so
@@ -108,39 +160,40 @@ class Cache:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def keep(self, stage: str, key: str, folder: Path, said: Mapping[str, Any]) -> Entry:
+    def keep(self, stage: str, key: str, folder: Path, outcome: Mapping[str, Any]) -> Entry:
         """Take a filled folder into the cache under its key."""
         files = {
             path.relative_to(folder).as_posix(): {"size": path.stat().st_size, "sha256": file_digest(path)}
             for path in sorted(folder.rglob("*"))
             if path.is_file()
         }
-        content = digest_of([files, dict(said)])
+        digest = digest_of([files, dict(outcome)])  # without the time below: the same content has the same digest
         sealed_ns = _seal(folder, files)
         manifest = {
+            "layout": LAYOUT,
             "stage": stage,
             "key": key,
             "files": files,
-            "said": dict(said),
-            "content": content,
+            "outcome": dict(outcome),
+            "digest": digest,
             "sealed_ns": sealed_ns,
         }
         (folder / _MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
         final = self._folder(stage, key)
         final.parent.mkdir(parents=True, exist_ok=True)
-        with self._alone():
+        with self._locked():
             there = self.get(stage, key)
             if there is not None:
                 return there  # another run was first
             _discard(final, self.root / _NEW)
             folder.rename(final)
-        return Entry(final, dict(said), content)
+        return Entry(final, dict(outcome), digest)
 
 
 def _seal(folder: Path, files: Iterable[str]) -> int:
-    """Set the files' time of modification so far back that whatever writes to one later changes it; that time.
+    """Set the files' times of modification (ns since 1970) to one at least two seconds ago; any later write changes it.
 
-    A whole, even number of seconds, which every file system keeps as it is.
+    It is an even number of seconds, which every file system keeps as it is: FAT counts in steps of two.
     """
     sealed_ns = (int(time.time()) // _CLOCK_S - 1) * _CLOCK_S * 1_000_000_000
     for name in files:
@@ -153,45 +206,47 @@ class _DamagedError(Exception):
 
 
 def last_used_s(folder: Path) -> float:
-    """When an entry was last of use, in seconds since 1970; of a folder that is none, when it was last changed."""
+    """When an entry was last used, in seconds since 1970; of a folder that is no entry, when it was last changed."""
     manifest = folder / _MANIFEST
     return (manifest if manifest.is_file() else folder).stat().st_mtime
 
 
-def fault_of(folder: Path) -> str | None:
-    """What is wrong with the entry in a folder; None where nothing is, or there is none."""
+def damage_in(folder: Path) -> str | None:
+    """What is wrong with the entry in a folder, reading all of it; None where nothing is, or there is no folder."""
     if not folder.is_dir():
         return None
     try:
-        _read(folder, whole=True)
+        _read(folder, file_digest, trust_times=False)
     except _DamagedError as damage:
         return str(damage)
     return None
 
 
-def _read(folder: Path, whole: bool) -> Entry:
-    """The entry in a folder, each file of it compared with the digest of what was written. Raises _DamagedError.
+def _read(folder: Path, read_digest: Callable[[Path], str], trust_times: bool) -> Entry:
+    """The entry in a folder, each file of it compared with what was written. Raises _DamagedError.
 
-    Unless all are to be read, a file that still bears the time it was sealed with counts as what was written.
+    With `trust_times` a file that still has the time it was sealed with counts as what was written.
     """
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
-        files, said, content = manifest["files"], manifest["said"], manifest["content"]
-        if digest_of([files, said]) != content or manifest["key"] != folder.name:
-            raise _DamagedError(f"{_MANIFEST} is not what was written")
-        for name, stated in files.items():
+        if manifest.get("layout") != LAYOUT:
+            raise _DamagedError(f"{_MANIFEST} is of another version of Steadyhand")
+        files, outcome, digest = manifest["files"], manifest["outcome"], manifest["digest"]
+        if digest_of([files, outcome]) != digest or manifest["key"] != folder.name:
+            raise _DamagedError(f"{_MANIFEST} has changed since it was written")
+        for name, written in files.items():
             path = folder / name
-            found = path.stat()
-            untouched = not whole and found.st_mtime_ns == manifest.get("sealed_ns")
-            if found.st_size != stated["size"] or not (untouched or file_digest(path) == stated["sha256"]):
-                raise _DamagedError(f"{name} is not what was written")
+            now = path.stat()
+            untouched = trust_times and now.st_mtime_ns == manifest["sealed_ns"]
+            if now.st_size != written["size"] or not (untouched or read_digest(path) == written["sha256"]):
+                raise _DamagedError(f"{name} has changed since it was written")
     except FileNotFoundError as error:
         raise _DamagedError(f"{Path(error.filename).name} is missing") from None
     except OSError as error:
         raise _DamagedError(f"{Path(error.filename or folder).name} cannot be read: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, AttributeError):
         raise _DamagedError(f"{_MANIFEST} cannot be read") from None
-    return Entry(folder, said, content)
+    return Entry(folder, outcome, digest)
 
 
 def _discard(folder: Path, trash: Path) -> None:

@@ -1,11 +1,19 @@
-"""The digest of a stage's code: of its module, of all it reaches, and of the libraries it imports."""
+"""The digest of a stage's code: of its module, of all it reaches, of the files beside them, and of libraries' versions.
+
+It is part of every key of the cache (pipeline.engine.cache), so an edit makes exactly those stages compute again whose
+code can reach it. Imports are found in the text of a module, wherever they stand in it, without running it; so are
+modules named in a string, such as a stage's function. What files a module opens cannot be found that way. So every file
+counts that is no Python and stands beside a module that is reached, or in folders below that hold no modules:
+templates, scripts, styles, whatever comes. Nobody has to list them, so nobody can forget to.
+"""
 
 from __future__ import annotations
 
 import ast
+import hashlib
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -13,14 +21,8 @@ from pathlib import Path
 from pipeline.engine.cache import digest_of, file_digest
 
 _ROOT = Path(__file__).resolve().parents[2]
-
-
 _OURS = ("pipeline", "fusion_core")
-
-
 _MODULE_TEXT = re.compile(rf"(?:{'|'.join(_OURS)})(?:\.\w+)+")
-
-
 _DISTRIBUTIONS = {
     "yaml": "PyYAML",
     "mcap_ros2": "mcap-ros2-support",
@@ -29,12 +31,17 @@ _DISTRIBUTIONS = {
 }
 
 
-_DATA_FILES = (".bib", ".css", ".jinja", ".typ")
-
-
 @cache
 def code_digest(module: str) -> str:
-    """Digest of a module, of all our modules it reaches, their data files, and the libraries they import."""
+    """The digest of a module of the Steadyhand that runs."""
+    return code_digest_in(_ROOT, module)
+
+
+def code_digest_in(root: Path, module: str) -> str:
+    """The digest of a module, of all our modules it reaches, the files beside them, and the libraries they import.
+
+    `root` is the folder that holds our packages: a clone, or where Python keeps installed packages.
+    """
     sources: dict[str, str] = {}
     libraries: set[str] = set()
     followed: set[Path] = set()
@@ -42,27 +49,48 @@ def code_digest(module: str) -> str:
     while pending:
         reached_module = pending.pop()
         # A package is run on the way to its modules, but what else it imports for its users is not used here.
-        for package in map(_source, _parents(reached_module)):
-            if package is not None:
-                sources[package.relative_to(_ROOT).as_posix()] = file_digest(package)
-        path = _source(reached_module)
+        for package in _parents(reached_module):
+            path = _source(root, package)
+            if path is not None:
+                sources[path.relative_to(root).as_posix()] = file_digest(path)
+        path = _source(root, reached_module)
         if path is None or path in followed:
             continue
         followed.add(path)
-        sources[path.relative_to(_ROOT).as_posix()] = file_digest(path)
-        for beside in sorted(path.parent.iterdir()):
-            if beside.is_file() and beside.suffix in _DATA_FILES:
-                sources[beside.relative_to(_ROOT).as_posix()] = file_digest(beside)
-        for reached in _imports(path):
+        source = path.read_bytes()
+        sources[path.relative_to(root).as_posix()] = hashlib.sha256(source).hexdigest()
+        for reached in _imports(root, source):
             if reached.split(".")[0] in _OURS:
                 pending.append(reached)
             else:
                 libraries.add(reached.split(".")[0])
+    for folder in {path.parent for path in followed}:
+        sources |= {path.relative_to(root).as_posix(): file_digest(path) for path in _data_files(folder)}
     return digest_of([sources, versions(libraries), sys.version_info[:2]])
 
 
-def _source(module: str) -> Path | None:
-    path = _ROOT.joinpath(*module.split("."))
+def _data_files(folder: Path) -> Iterator[Path]:
+    """The files in a folder of modules that are no Python, and all files in folders below that hold no modules."""
+    for path in folder.iterdir():
+        if _is_dropping(path.name):
+            continue
+        if path.is_file():
+            if path.suffix != ".py":
+                yield path
+        elif path.is_dir() and not any(path.rglob("*.py")):
+            yield from _data_files(path)
+
+
+def _is_dropping(name: str) -> bool:
+    """Whether Python, an editor or a desktop left a file or folder of this name: it belongs to no version of the code.
+
+    A name that is not known here counts as data. That costs a computation; to pass over data would cost a right result.
+    """
+    return name == "__pycache__" or name.startswith((".", "#")) or name.endswith(("~", ".pyc"))
+
+
+def _source(root: Path, module: str) -> Path | None:
+    path = root.joinpath(*module.split("."))
     if path.with_suffix(".py").is_file():
         return path.with_suffix(".py")
     return path / "__init__.py" if (path / "__init__.py").is_file() else None
@@ -74,29 +102,30 @@ def _parents(module: str) -> list[str]:
 
 
 @cache
-def _imports(path: Path) -> tuple[str, ...]:
+def _imports(root: Path, source: bytes) -> tuple[str, ...]:
     """The modules a source imports, wherever it does, and those it names as text to import when needed."""
-    found: list[str] = []
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    reached: list[str] = []
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            found += (alias.name for alias in node.names)
+            reached += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            modules = [name for alias in node.names if _source(name := f"{node.module}.{alias.name}") is not None]
-            found += modules if len(modules) == len(node.names) else [node.module, *modules]
+            imported = [f"{node.module}.{alias.name}" for alias in node.names]
+            modules = [name for name in imported if _source(root, name) is not None]
+            reached += modules if len(modules) == len(imported) else [node.module, *modules]
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             named = _MODULE_TEXT.match(node.value)
             if named:
-                found.append(named.group())
-    return tuple(found)
+                reached.append(named.group())
+    return tuple(reached)
 
 
 def versions(libraries: Iterable[str]) -> dict[str, str]:
     """The installed version of each library that has one (those of Python itself have none)."""
-    found = {}
+    installed = {}
     for library in sorted(set(libraries) - sys.stdlib_module_names):
         try:
             name = _DISTRIBUTIONS.get(library, library)
-            found[name] = metadata.version(name)
+            installed[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-    return found
+    return installed

@@ -10,8 +10,9 @@ from importlib import import_module
 from pathlib import Path
 
 from pipeline.engine.cache import Cache, Entry, digest_of
+from pipeline.engine.processes import Processes
 from pipeline.engine.stage import Outcome, Stage, Work
-from pipeline.errors import PipelineError, SessionError
+from pipeline.errors import RUN_AGAIN, PipelineError, SessionError
 
 Piece = tuple[Work, str]
 """A piece of work, and the key of its result."""
@@ -22,37 +23,50 @@ def compute_all(stage: Stage, pieces: Sequence[Piece], cache_root: Path) -> list
     return [compute(stage, work, key, cache_root) for work, key in pieces]
 
 
-def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
-    """Run a stage's function into the cache. Runs in whatever process the executor has.
+def compute_with_processes(stage: Stage, work: Work, key: str, cache_root: Path, count: int) -> Entry:
+    """A piece of work whose jobs are done by `count` processes of its own."""
+    with Processes(count) as executor:
+        return compute(stage, replace(work, executor=executor), key, cache_root)
 
-    A session that cannot be used is an outcome, not an error: the others go on. So is a fault of ours that one
-    session alone brings out; such an outcome is kept under a key of its own and tried again in the next run.
+
+def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
+    """Run a stage's function into the cache.
+
+    A session that cannot be used is an outcome, not an error: the others go on. So is an internal error that one
+    session alone brings out; such an outcome is kept under a key of its own and tried again in the next run. Raises
+    PipelineError where the cache cannot be written.
     """
     cache = Cache(cache_root)
-    module, name = stage.function.split(":")
     try:
         with cache.new(stage.name) as out:
             try:
-                outcome = getattr(import_module(module), name)(replace(work, out=out))
+                outcome = _run(stage, replace(work, out=out))
             except SessionError as error:
                 outcome = Outcome(set_aside=str(error))
             except PipelineError:
                 raise
             except Exception as error:
-                if stage.scope != "session" or _is_full(error):
+                if stage.scope != "session" or _no_room(error):
                     raise
-                fault = f"{type(error).__name__}: {error}"
-                reason = f"a fault of Steadyhand's own in {stage.name}, please report it: {fault}"
-                return keep_unusable(cache, stage, key, reason)
+                return keep_unusable(cache, stage, key, _internal_error(stage, error))
             return cache.keep(stage.name, key, out, asdict(outcome))
     except OSError as error:
-        if not _is_full(error):
+        if not _no_room(error):
             raise
         raise PipelineError(
-            f"{cache_root}: cannot be written any more: {os.strerror(error.errno or 0)}; make room"
-            " (`steadyhand cache prune` may) or name another place with --cache; what was computed is kept, run it"
-            " again to go on"
+            f"{cache_root}: cannot be written: {os.strerror(error.errno or 0)}; free some space (perhaps with"
+            f" `steadyhand cache prune`) or choose another folder with --cache. {RUN_AGAIN}"
         ) from None
+
+
+def _run(stage: Stage, work: Work) -> Outcome:
+    module, name = stage.function.split(":")
+    outcome: Outcome = getattr(import_module(module), name)(work)
+    return outcome
+
+
+def _internal_error(stage: Stage, error: Exception) -> str:
+    return f'internal error in stage "{stage.name}"; please report it: {type(error).__name__}: {error}'
 
 
 def keep_unusable(cache: Cache, stage: Stage, key: str, reason: str) -> Entry:
@@ -61,6 +75,6 @@ def keep_unusable(cache: Cache, stage: Stage, key: str, reason: str) -> Entry:
         return cache.keep(stage.name, digest_of([key, reason]), out, asdict(Outcome(set_aside=reason)))
 
 
-def _is_full(error: Exception) -> bool:
-    """A disk without room, or none to write to: no session's fault."""
+def _no_room(error: Exception) -> bool:
+    """Whether the disk is full or cannot be written to, which is no session's fault."""
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)

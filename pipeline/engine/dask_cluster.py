@@ -17,11 +17,10 @@ from distributed.scheduler import KilledWorker
 from pipeline.engine import threads
 from pipeline.engine.code_digest import code_digest
 from pipeline.engine.stage import Work
-from pipeline.errors import PipelineError, WorkerLostError
+from pipeline.errors import RUN_AGAIN, PipelineError, WorkerLostError
 
-_STAGES = "pipeline.stages"  # its digest follows the code of every stage
-_CONNECT_S = 10.0
-_LEAVE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # to the process that started us
+_STAGES = "pipeline.stages"  # the digest of this module's code follows the code of every stage
+_IGNORE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # it is for the command alone
 
 
 class OneThread(WorkerPlugin):
@@ -35,7 +34,7 @@ class OneThread(WorkerPlugin):
 
 
 class OnDask(Executor):
-    """The workers of a cluster. Dask itself hands on the work of one that died."""
+    """The workers of a cluster. Dask itself hands the work of one that died to another."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -44,14 +43,14 @@ class OnDask(Executor):
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Compute on some worker, if its code is the same as here and it sees the folders."""
         folders = sorted(set(_folders(args)))
-        asked = self._client.submit(_guarded, self._code, folders, fn, args, kwargs, pure=False)
-        future = _Asked(asked)
-        asked.add_done_callback(future.take)
+        on_dask = self._client.submit(checked_call, self._code, folders, fn, args, kwargs, pure=False)
+        future = _DaskFuture(on_dask)
+        on_dask.add_done_callback(future.take)
         return future
 
 
 def _folders(args: Iterable[Any]) -> Iterator[Path]:
-    """Those that are named in a call, at any depth: a worker must see them."""
+    """The folders that a call names, at any depth: a worker must see them."""
     for arg in args:
         if isinstance(arg, list | tuple):
             yield from _folders(arg)
@@ -59,63 +58,66 @@ def _folders(args: Iterable[Any]) -> Iterator[Path]:
             yield arg.folder if isinstance(arg, Work) else arg
 
 
-class _Asked(Future[Any]):
+class _DaskFuture(Future[Any]):
     """A future of Python's for one of Dask's."""
 
-    def __init__(self, asked: Any) -> None:
+    def __init__(self, on_dask: Any) -> None:
         super().__init__()
-        self._asked = asked
+        self._on_dask = on_dask
 
     def cancel(self) -> bool:
-        """Let go of it here and there."""
+        """Cancel it here and on the cluster."""
         cancelled = super().cancel()
         if cancelled:
-            self._asked.cancel()
+            self._on_dask.cancel()
         return cancelled
 
-    def take(self, asked: Any) -> None:
-        """The outcome, once Dask has it."""
+    def take(self, on_dask: Any) -> None:
+        """Take over the result or the error, once Dask has it."""
         if not self.set_running_or_notify_cancel():
             return
         try:
-            self.set_result(asked.result())
+            self.set_result(on_dask.result())
         except KilledWorker:
-            self.set_exception(WorkerLostError("several workers died of it"))
+            self.set_exception(WorkerLostError("several workers died"))
         except (CancelledError, ConnectionError, TimeoutError):
-            self.set_exception(PipelineError("the Dask scheduler went away; what was computed is kept, run it again"))
+            self.set_exception(PipelineError(f"--executor dask: lost the Dask scheduler. {RUN_AGAIN}"))
         except ImportError as error:
             self.set_exception(_other_code(f"one cannot import {error.name}"))
         except Exception as error:  # noqa: BLE001 - handed on by the future
             self.set_exception(error)
 
 
-def _guarded(
+def checked_call(
     code: str, folders: list[Path], fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> Any:
-    """Call it, on a worker that gives the same result as the process that asks would."""
+    """Call the function on a worker, which must give the same result as the process of the command would.
+
+    Raises PipelineError where the worker's code has another digest than `code`, or a folder is not to be seen there.
+    """
     if code_digest(_STAGES) != code:
         raise _other_code("their code, Python or libraries differ")
     for folder in folders:
         if not folder.is_dir():
             raise PipelineError(
-                f"--executor dask: a worker does not see {folder}; put the studies and --cache on a file system that"
-                " all workers share, under the same path"
+                f"--executor dask: a worker cannot see {folder}; put the studies and --cache on a file system that all"
+                " workers share, under the same path"
             )
     return fn(*args, **kwargs)
 
 
-def _other_code(found: str) -> PipelineError:
+def _other_code(difference: str) -> PipelineError:
     return PipelineError(
-        f"--executor dask: the workers do not run the same Steadyhand as this command: {found}; install the same"
-        " version with the same libraries on them, and start them anew"
+        f"--executor dask: the workers do not run the same Steadyhand as this command: {difference}; install the same"
+        " version with the same libraries on them, and restart them"
     )
 
 
 @contextmanager
-def on_dask(address: str | None, count: int, say: Callable[[str], None]) -> Iterator[Executor]:
+def on_dask(address: str | None, count: int, say: Callable[[str], None], connect_s: float = 10.0) -> Iterator[Executor]:
     """The executor of the scheduler at an address, or of a cluster of `count` processes of this machine.
 
-    Raises PipelineError where no scheduler answers.
+    Raises PipelineError where no scheduler answers within `connect_s` seconds.
     """
     for name in filter(re.compile(r"distributed\b").match, [*logging.root.manager.loggerDict]):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is raised as well
@@ -128,13 +130,13 @@ def on_dask(address: str | None, count: int, say: Callable[[str], None]) -> Iter
                 threads_per_worker=1,
                 dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
-                preload=_LEAVE_CTRL_C,
+                preload=_IGNORE_CTRL_C,
             )
             open_until_done.enter_context(cluster)
             client = Client(cluster)
         else:
             try:
-                client = Client(f"tcp://{address}", timeout=_CONNECT_S)
+                client = Client(f"tcp://{address}", timeout=connect_s)
             except (OSError, ValueError) as error:
                 raise PipelineError(
                     f"--executor dask://{address}: no Dask scheduler answers there ({error}); start one with:"
@@ -142,5 +144,5 @@ def on_dask(address: str | None, count: int, say: Callable[[str], None]) -> Iter
                 ) from None
         open_until_done.enter_context(client)
         client.register_plugin(OneThread())
-        say(f"Dask's dashboard: {client.dashboard_link}")
+        say(f"Dask dashboard: {client.dashboard_link}")
         yield OnDask(client)

@@ -2,123 +2,146 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import replace
+from typing import Any
 
 from pipeline.engine.cache import Cache, Entry
-from pipeline.engine.compute import Piece, compute, compute_all, keep_unusable
-from pipeline.engine.processes import InThisProcess, in_a_process_of_its_own
-from pipeline.engine.resources import Means
-from pipeline.engine.result import Result
+from pipeline.engine.compute import Piece, compute, compute_all, compute_with_processes, keep_unusable
+from pipeline.engine.processes import InThisProcess, Processes, in_a_process_of_its_own
+from pipeline.engine.resources import Resources
+from pipeline.engine.result import Damaged, Result
 from pipeline.engine.stage import Stage, Work
-from pipeline.errors import PipelineError, WorkerLostError
+from pipeline.errors import RUN_AGAIN, PipelineError, WorkerLostError
 
 _AHEAD = 256  # groups of pieces handed to the executor before they are needed: more than a cluster has processes
-_TOGETHER = 8  # pieces of one session in a group, whose recording is then loaded once
-_ARCHIVE = 1000  # sessions
-_ENOUGH = 64  # groups to go round, before any is larger than one piece
+_LARGEST_GROUP = 8  # pieces of one session, whose recording is then loaded once
 
 
-def entries_of(stage: Stage, result: Result, works: Iterable[Piece], means: Means) -> list[Entry]:
-    """The entry of each piece of work with its key, each key computed once, where the cache has none.
+def entries_of(stage: Stage, result: Result, pieces: Iterable[Piece], resources: Resources) -> list[Entry]:
+    """The entry of each piece of work with its key; each key the cache has no entry for is computed once.
 
     Of the pieces only those that are to be computed are kept meanwhile.
     """
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     missing: dict[str, Piece] = {}
     keys = []
-    for work, key in works:
+    for work, key in pieces:
         keys.append(key)
-        if key in found or key in missing:
+        if key in entries or key in missing:
             continue
-        entry = _look_up(stage, key, work.session.id, result, means.cache)
+        entry = _look_up(stage, key, work.session.id, result, resources.cache)
         if entry is None:
             missing[key] = work, key
         else:
-            found[key] = entry
+            entries[key] = entry
     result.computed[stage.name] = len(missing)
     if missing:
-        means.cache.root.mkdir(parents=True, exist_ok=True)  # a worker elsewhere looks whether it is there
-        means.progress.begin(stage.name, len(missing))
-        for key, entry in _computed(stage, list(missing.values()), means):
-            found[key] = entry
-            means.progress.advance()
-        means.progress.end()
-    return [found[key] for key in keys]
+        resources.cache.root.mkdir(parents=True, exist_ok=True)  # a worker elsewhere looks whether it is there
+        resources.progress.begin(stage.label or stage.name, len(missing), stage.unit)
+        for key, entry in _computed(stage, list(missing.values()), resources):
+            entries[key] = entry
+            resources.progress.advance()
+        resources.progress.end()
+    return [entries[key] for key in keys]
 
 
-def entry_of_study(stage: Stage, result: Result, work: Work, key: str, means: Means) -> Entry:
-    """The entry of a stage of scope "study", computed here where the cache has none.
-
-    Of an archive in a process of its own: all its tables are joined then, and this process need not go on holding
-    what that leaves.
-    """
-    entry = _look_up(stage, key, "", result, means.cache)
+def entry_of_study(stage: Stage, result: Result, work: Work, key: str, resources: Resources) -> Entry:
+    """The entry of a stage of scope "study", computed where the cache has none."""
+    entry = _look_up(stage, key, "", result, resources.cache)
     result.computed[stage.name] = int(entry is None)
     if entry is None:
-        means.progress.begin(stage.name, 1)
-        if len(work.sessions) < _ARCHIVE or isinstance(means.executor, InThisProcess):
-            entry = compute(stage, work, key, means.cache.root)
-        else:
-            entry = _apart(stage, work, key, means.cache.root)
-        means.progress.advance()
-        means.progress.end()
+        resources.progress.begin(stage.label or stage.name, 1)
+        entry = _compute_study(stage, work, key, resources)
+        resources.progress.advance()
+        resources.progress.end()
     return entry
 
 
-def _apart(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
+def _compute_study(stage: Stage, work: Work, key: str, resources: Resources) -> Entry:
+    """In this process, which hands the stage's small jobs to the run's executor; or, of an archive, in another.
+
+    Joining the tables of an archive takes memory that Python hardly gives back; a process that ends does.
+    """
+    cache_root, helpers = resources.cache.root, _helpers(resources.executor)
+    if len(work.sessions) < resources.archive_sessions or isinstance(resources.executor, InThisProcess):
+        return compute(stage, replace(work, executor=helpers), key, cache_root)
+    if helpers is None:
+        return _compute_apart(stage, compute, stage, work, key, cache_root)
+    # Its jobs cannot come back through the pipe to the processes of this run, so that process has as many of its own.
+    # Those of the run end before, with all they hold: never are there more of them at once than the user allowed.
+    helpers.end_idle()
+    return _compute_apart(stage, compute_with_processes, stage, work, key, cache_root, helpers.count)
+
+
+def _helpers(executor: Executor) -> Processes | None:
+    """Processes for a stage's small jobs; None: the stage does them itself.
+
+    The jobs write files into a folder of the cache. Workers of a Dask cluster see that folder too, where it is shared,
+    but what another machine writes may be seen here late, and tables travel further than the drawing of them is worth.
+    """
+    return executor if isinstance(executor, Processes) else None
+
+
+def _compute_apart(stage: Stage, function: Callable[..., Entry], *arguments: Any) -> Entry:
     try:
-        found: Entry = in_a_process_of_its_own(compute, stage, work, key, cache_root)
+        entry: Entry = in_a_process_of_its_own(function, *arguments)
     except WorkerLostError as error:
         raise PipelineError(
-            f"the process that computed {stage.name} died ({error}); its memory may not have sufficed; what was"
-            " computed before is kept, run it again to go on"
+            f'the process computing stage "{stage.name}" died ({error}), possibly out of memory. {RUN_AGAIN}'
         ) from None
-    return found
+    return entry
 
 
 def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache) -> Entry | None:
-    """What the cache has. That an entry is damaged is noted: it will be computed again."""
+    """The cache's entry. If it is damaged, that is noted, and there is none: it will be computed again."""
     entry = cache.get(stage.name, key)
     if entry is None:
-        fault = cache.fault(stage.name, key)
-        if fault is not None:
-            result.damaged.append((stage.name, session, fault))
+        damage = cache.damage(stage.name, key)
+        if damage is not None:
+            result.damaged.append(Damaged(stage.name, session, damage))
     return entry
 
 
-def _computed(stage: Stage, missing: Sequence[Piece], means: Means) -> Iterator[tuple[str, Entry]]:
+def _computed(stage: Stage, missing: Sequence[Piece], resources: Resources) -> Iterator[tuple[str, Entry]]:
     """Entries by their keys, as they are done.
 
-    A piece whose worker died is tried once more after the others, by itself: it may have been another's doing, or the
-    machine's. If it is lost again, its session is set aside, and tried again in the next run.
+    A piece whose process died is tried once more after the others, by itself: another piece of its group may have
+    killed the process, or the machine was short of memory just then. If the process dies again, the session is set
+    aside, and tried again in the next run.
     """
     lost: list[Piece] = []
     waiting: dict[Future[list[Entry]], list[Piece]] = {}
     try:
-        for done in _as_completed(stage, _groups(missing), means, waiting):
+        for done in _as_completed(stage, _groups(missing, resources.fewest_groups), resources, waiting):
             try:
                 for (_, key), entry in zip(waiting[done], done.result(), strict=True):
-                    yield key, _at_hand(entry)
+                    yield key, _visible(entry)
             except WorkerLostError:
                 lost += waiting[done]
     finally:
         for future in waiting:
             future.cancel()
     for work, key in lost:
-        found = means.cache.get(stage.name, key)  # one of its group may have killed the worker after this was done
-        try:
-            entry = found or means.executor.submit(compute, stage, work, key, means.cache.root).result()
-        except WorkerLostError as error:
-            reason = f"the process that computed {stage.name} died twice ({error}); its memory may not have sufficed"
-            entry = keep_unusable(means.cache, stage, key, reason)
-        yield key, _at_hand(entry)
+        yield key, _visible(_second_try(stage, work, key, resources))
 
 
-def _groups(missing: Sequence[Piece]) -> Iterator[list[Piece]]:
-    """What is computed in one go: a few pieces of one session, once there are many."""
-    size = min(max(len(missing) // _ENOUGH, 1), _TOGETHER)
+def _second_try(stage: Stage, work: Work, key: str, resources: Resources) -> Entry:
+    kept = resources.cache.get(stage.name, key)  # perhaps its process died after this one was done
+    if kept is not None:
+        return kept
+    try:
+        entry: Entry = resources.executor.submit(compute, stage, work, key, resources.cache.root).result()
+    except WorkerLostError as error:
+        reason = f'the process computing stage "{stage.name}" died twice ({error}), possibly out of memory'
+        return keep_unusable(resources.cache, stage, key, reason)
+    return entry
+
+
+def _groups(missing: Sequence[Piece], fewest: int) -> Iterator[list[Piece]]:
+    """What is computed in one go: a few pieces of one session, where that leaves enough groups to share."""
+    size = min(max(len(missing) // fewest, 1), _LARGEST_GROUP)
     group: list[Piece] = []
     for piece in missing:
         if group and (len(group) == size or piece[0].session.id != group[0][0].session.id):
@@ -129,14 +152,14 @@ def _groups(missing: Sequence[Piece]) -> Iterator[list[Piece]]:
 
 
 def _as_completed(
-    stage: Stage, groups: Iterable[list[Piece]], means: Means, waiting: dict[Future[list[Entry]], list[Piece]]
+    stage: Stage, groups: Iterable[list[Piece]], resources: Resources, waiting: dict[Future[list[Entry]], list[Piece]]
 ) -> Iterator[Future[list[Entry]]]:
     """Submit all, some at a time, each in `waiting` until it is taken; futures as they are done.
 
     Of a future that is done nothing is kept: of ten thousand sessions they would be most of what this process holds.
     """
     for group in groups:
-        future = means.executor.submit(compute_all, stage, group, means.cache.root)
+        future = resources.executor.submit(compute_all, stage, group, resources.cache.root)
         waiting[future] = group
         if len(waiting) >= _AHEAD or future.done():
             yield from _done(waiting)
@@ -145,16 +168,17 @@ def _as_completed(
 
 
 def _done(waiting: dict[Future[list[Entry]], list[Piece]]) -> Iterator[Future[list[Entry]]]:
-    """Those that are done, at least one; each is out of `waiting` once it has been taken."""
+    """Those that are done, at least one; each leaves `waiting` once it has been taken."""
     for future in wait(waiting, return_when=FIRST_COMPLETED).done:
         yield future
         waiting.pop(future)
 
 
-def _at_hand(entry: Entry) -> Entry:
-    """An entry that another machine may have computed."""
+def _visible(entry: Entry) -> Entry:
+    """The entry, if it is to be seen here: another machine may have computed it."""
     if not entry.folder.is_dir():
         raise PipelineError(
-            f"{entry.folder}: was computed by a worker and is not here; put --cache on a file system that all share"
+            f"{entry.folder}: a worker computed this, but it cannot be seen here; put --cache on a file system that all"
+            " workers share"
         )
     return entry

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,31 +16,37 @@ _Stamp = list[int]
 _Known = dict[str, tuple[_Stamp, str]]
 
 
-def remembered(files: Mapping[str, Path], whose: Path, folder: Path) -> dict[str, str]:
-    """SHA-256 of each file, under its name. Only what changed since the last time is read.
+def file_digests(
+    files: Mapping[str, Path],
+    study: Path,
+    memory: Path,
+    read_digest: Callable[[Path], str] = file_digest,
+    now_ns: Callable[[], int] = time.time_ns,
+) -> dict[str, str]:
+    """SHA-256 of each file, under its name. Only what changed since the last time is read, by `read_digest`.
 
     A file is the same if its size, its times of modification and of change, and its inode are. One that changed
     within the last two seconds is read again the next time, for it might change once more at what is the same time to
-    the file system (as git does with its index). What is known of the files of `whose` is kept in `folder`.
+    the file system (as git does with its index). What is known of a study's files is kept in the folder `memory`.
     """
-    kept = folder / f"{digest_of(str(whose))}.json"
+    kept = memory / f"{digest_of(str(study))}.json"
     before = _read(kept)
     now: _Known = {}
-    found = {}
+    digests = {}
     for name, path in files.items():
         stamp = _stamp(path)
         known = before.get(name)
-        found[name] = known[1] if known is not None and known[0] == stamp else file_digest(path)
-        if max(stamp[1:3]) < time.time_ns() - _SETTLED_NS:
-            now[name] = (stamp, found[name])
+        digests[name] = known[1] if known is not None and known[0] == stamp else read_digest(path)
+        if max(stamp[1:3]) < now_ns() - _SETTLED_NS:
+            now[name] = (stamp, digests[name])
     if now != before:
         _write(now, kept)
-    return found
+    return digests
 
 
 def _stamp(path: Path) -> _Stamp:
-    said = path.stat()
-    return [said.st_size, said.st_mtime_ns, said.st_ctime_ns, said.st_ino]
+    state = path.stat()
+    return [state.st_size, state.st_mtime_ns, state.st_ctime_ns, state.st_ino]
 
 
 def _read(kept: Path) -> _Known:
@@ -55,7 +61,7 @@ def _read(kept: Path) -> _Known:
 
 
 def _write(known: _Known, kept: Path) -> None:
-    """Whole or not at all. What cannot be kept is found anew the next time."""
+    """Whole or not at all. What cannot be kept is read again the next time."""
     partial = kept.with_name(f"{kept.name}.{os.getpid()}")
     with suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)

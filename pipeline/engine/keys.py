@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.engine.cache import Entry, digest_of
+from pipeline.engine.cache import LAYOUT, Entry, digest_of
 from pipeline.engine.code_digest import code_digest
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage, Work
@@ -17,51 +17,49 @@ from pipeline.study.settings import Study
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a stage sees of a study's settings, and a digest of them and its code: the same in every session's key."""
+class Declared:
+    """A stage, the settings of a study that it declared, and a digest of both and of its code.
+
+    It is the same for every session, so it is made once.
+    """
 
     stage: Stage
     study: Study
     digest: str
 
 
-def seen_by(stage: Stage, study: Study) -> Seen:
-    """The study as the stage may see it."""
-    digest = digest_of([stage.name, code_digest(stage.module), _settings(study, stage)])
-    return Seen(stage, _declared(study, stage), digest)
+def declared_by(stage: Stage, study: Study) -> Declared:
+    """The study as the stage may see it: settings that the stage did not declare are at their defaults."""
+    visible = Study.model_construct(**{name: getattr(study, name) for name in stage.settings})
+    digest = digest_of([LAYOUT, stage.name, code_digest(stage.module), _settings(study, stage)])
+    return Declared(stage, visible, digest)
 
 
-def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
+def work_and_key(declared: Declared, result: Result, sessions: Sequence[Session]) -> tuple[Work, str]:
     """A piece of work without its folder, and the key of its result."""
-    stage = seen.stage
+    stage = declared.stage
     read = {name: _entries_for(result.entries[name], sessions) for name in stage.reads}
-    names = [getattr(result.study, field_name) for field_name in stage.files]
-    inputs = {name: result.inputs[Path(name).as_posix()] for name in names if name is not None}
-    if stage.reads_log:
-        path = sessions[0].path.relative_to(result.folder).as_posix()
-        inputs[path] = result.inputs[path]
-    if stage.names_inputs:
-        inputs = dict(result.inputs)
     whole = stage.scope == "study"
     work = Work(
         result.name,
-        seen.study,
+        declared.study,
         result.folder,
         Path(),
         tuple(sessions),
-        {name: tuple(entry.folder for entry in found) for name, found in read.items()},
+        {name: tuple(entry.folder for entry in entries) for name, entries in read.items()},
         tuple(result.set_aside) if whole else (),
         tuple(result.in_part) if whole else (),
         tuple(result.unused) if whole else (),
-        inputs,
+        _inputs(stage, result, sessions),
     )
     key = digest_of(
         [
-            seen.digest,
+            declared.digest,
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],
-            inputs,
-            {name: [entry.content for entry in found] for name, found in read.items()},
+            work.inputs,
+            # By what is in them, not by their keys: what comes out the same after a change ends what follows from it.
+            {name: [entry.digest for entry in entries] for name, entries in read.items()},
             [[session.id, reason] for session, reason in (*work.set_aside, *work.in_part)],
             work.unused,
         ]
@@ -69,10 +67,15 @@ def work_and_key(seen: Seen, result: Result, sessions: Sequence[Session]) -> tup
     return work, key
 
 
-def _declared(study: Study, stage: Stage) -> Study:
-    """The study as the stage may see it: settings it did not declare are at their defaults."""
-    kept = {name: getattr(study, name) for name in stage.settings}
-    return Study.model_construct(**kept)
+def _inputs(stage: Stage, result: Result, sessions: Sequence[Session]) -> dict[str, str]:
+    """SHA-256 of the study's own files that the stage reads, by their paths in the study."""
+    if stage.names_inputs:
+        return dict(result.inputs)
+    names = [getattr(result.study, field_name) for field_name in stage.files]
+    paths = [Path(name).as_posix() for name in names if name is not None]
+    if stage.reads_log:
+        paths.append(sessions[0].path.relative_to(result.folder).as_posix())
+    return {path: result.inputs[path] for path in paths}
 
 
 def _settings(study: Study, stage: Stage) -> Any:
@@ -81,5 +84,5 @@ def _settings(study: Study, stage: Stage) -> Any:
     return json.loads(study.model_dump_json(include=set(stage.settings))), ordered
 
 
-def _entries_for(found: dict[str, Entry], sessions: Sequence[Session]) -> list[Entry]:
-    return [found[""]] if "" in found else [found[session.id] for session in sessions if session.id in found]
+def _entries_for(entries: dict[str, Entry], sessions: Sequence[Session]) -> list[Entry]:
+    return [entries[""]] if "" in entries else [entries[session.id] for session in sessions if session.id in entries]

@@ -1,4 +1,4 @@
-"""Where sessions are computed: this process, or processes that may die without taking the others with them."""
+"""Where work is done: in this process, or in processes that may die without taking the others with them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.errors import WorkerLostError
 
 
 class InThisProcess(Executor):
-    """An executor that computes when asked to."""
+    """An executor that computes when it is asked to."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Compute now."""
@@ -29,13 +29,15 @@ class InThisProcess(Executor):
 
 
 class Processes(Executor):
-    """Processes of this machine, each with a thread here that hands it one call at a time.
+    """Up to `count` processes of this machine, each with a thread here that hands it one call at a time.
 
-    So a process that dies takes one call with it, whose future raises WorkerLostError, and another takes its place.
-    A process ends when this one does, however that ends.
+    Python's own ProcessPoolExecutor is not used because it breaks as a whole when one of its processes dies, and
+    does not say which call killed it. Here a process that dies takes one call with it, whose future raises
+    WorkerLostError, and another takes its place. A process ends when this one does, however that ends.
     """
 
     def __init__(self, count: int) -> None:
+        self.count = count
         self._threads = ThreadPoolExecutor(count)
         self._own = threading.local()
         self._started: list[_Process] = []
@@ -50,9 +52,15 @@ class Processes(Executor):
         if process is None or not process.alive:
             process = self._own.process = _Process()
             self._started.append(process)
-        if self._stopping:
+        if self._stopping:  # `shutdown` may have gone through the list before this one was in it
             process.stop()
         return process.call(fn, args, kwargs)
+
+    def end_idle(self) -> None:
+        """End the processes, which gives their memory back; later calls start others. Only between calls."""
+        for process in self._started:
+            process.stop()
+        self._started.clear()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Stop the processes, also those at work; a call they were at raises WorkerLostError."""
@@ -79,11 +87,12 @@ class _Process:
     """A process that computes what comes through a pipe. Where the other end closes, it ends."""
 
     def __init__(self, may_start_others: bool = False) -> None:
+        # Spawned, not forked: a fork would copy the locks of this process's threads in whatever state they are.
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_serve, args=(there,), daemon=not may_start_others)
         self._process.start()
-        there.close()
+        there.close()  # the process alone holds that end now, so that its death shows here as an end of file
         self.alive = True
 
     def call(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
@@ -100,6 +109,7 @@ class _Process:
         return value
 
     def stop(self) -> None:
+        self.alive = False
         self._process.terminate()
         self._process.join(5)
         self._process.kill()

@@ -1,31 +1,25 @@
-"""What a run needs beside the study: a cache, an executor, and somebody who is told."""
+"""What a run needs beside the study: a cache, an executor, and someone who is told how far it is."""
 
 from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Protocol
 
 from pipeline.engine.cache import Cache
-
-
-class Progress(Protocol):
-    """Who is told how far things are."""
-
-    def begin(self, stage: str, total: int) -> None:
-        """A stage is about to compute so many pieces of work."""
-
-    def advance(self) -> None:
-        """One piece is done."""
-
-    def end(self) -> None:
-        """The stage is done."""
+from pipeline.engine.progress import Progress
 
 
 @dataclass(frozen=True)
-class Means:
-    """Where results are kept, where they are computed, and who is told."""
+class Resources:
+    """Where results are kept, where they are computed, and who is told.
+
+    From `archive_sessions` sessions on, a stage of the whole study is computed in a process of its own. Pieces of one
+    session are computed in groups, as far as that leaves `fewest_groups` groups for the processes to share. Neither
+    changes a result; tests set them low.
+    """
 
     cache: Cache
     executor: Executor
     progress: Progress
+    archive_sessions: int = 1000
+    fewest_groups: int = 64

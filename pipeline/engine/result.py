@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from pipeline.engine.cache import Entry
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
+
+
+class Damaged(NamedTuple):
+    """An entry that was cached and could not be used any more; `session` is empty for one of the whole study."""
+
+    stage: str
+    session: str
+    damage: str
 
 
 @dataclass
@@ -15,7 +24,7 @@ class Result:
     """A study brought up to date: what each stage gave, by session, and what happened to the sessions.
 
     `sessions` are those that went through every stage. The entry of a stage of scope "study" stands under an empty
-    name. `damaged` has stage, session and fault of each entry that was kept but could not be used any more.
+    name. `computed` counts what the cache did not have, by stage.
     """
 
     folder: Path
@@ -26,7 +35,7 @@ class Result:
     set_aside: list[tuple[Session, str]] = field(default_factory=list)
     in_part: list[tuple[Session, str]] = field(default_factory=list)
     unused: list[tuple[str, str]] = field(default_factory=list)
-    damaged: list[tuple[str, str, str]] = field(default_factory=list)
+    damaged: list[Damaged] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 

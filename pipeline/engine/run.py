@@ -9,32 +9,32 @@ from pathlib import Path
 
 from pipeline.engine.cache import Cache, Entry
 from pipeline.engine.entries import entries_of, entry_of_study
-from pipeline.engine.keys import seen_by, work_and_key
-from pipeline.engine.resources import Means
+from pipeline.engine.keys import declared_by, work_and_key
+from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage
-from pipeline.engine.usable_sessions import found_in, require_something, still_usable
+from pipeline.engine.usable_sessions import open_study, require_data, usable_after
 from pipeline.errors import PipelineError
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
 
-def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Result:
+def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
     """Run the stages over a study; what the cache holds is not computed again.
 
     Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
     """
     began = time.monotonic()
-    result, sessions = found_in(folder, means.cache)
+    result, sessions = open_study(folder, resources.cache)
     for stage in stages:
         try:
             if stage.scope == "session":
-                result.entries[stage.name] = _run_sessions(stage, result, sessions, means)
-                sessions = still_usable(result, sessions, result.entries[stage.name])
-                require_something(folder, result, sessions)
+                result.entries[stage.name] = _run_sessions(stage, result, sessions, resources)
+                sessions = usable_after(result, sessions, result.entries[stage.name])
+                require_data(folder, result, sessions)
             else:
-                work, key = work_and_key(seen_by(stage, result.study), result, sessions)
-                result.entries[stage.name] = {"": entry_of_study(stage, result, work, key, means)}
+                work, key = work_and_key(declared_by(stage, result.study), result, sessions)
+                result.entries[stage.name] = {"": entry_of_study(stage, result, work, key, resources)}
         except PipelineError as error:
             raise PipelineError(_with_context(folder, result, str(error))) from None
     result.sessions = sessions
@@ -42,23 +42,25 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], means: Means) -> Res
     return result
 
 
-def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], means: Means) -> dict[str, Entry]:
+def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], resources: Resources) -> dict[str, Entry]:
     """The stage's entry for each session, computed where the cache has none."""
-    seen = seen_by(stage, result.study)
-    found = entries_of(stage, result, (work_and_key(seen, result, [session]) for session in sessions), means)
-    return {session.id: entry for session, entry in zip(sessions, found, strict=True)}
+    declared = declared_by(stage, result.study)
+    pieces = (work_and_key(declared, result, [session]) for session in sessions)
+    entries = entries_of(stage, result, pieces, resources)
+    return {session.id: entry for session, entry in zip(sessions, entries, strict=True)}
 
 
-def over_settings(
-    result: Result, stage: Stage, settings: Sequence[Study], sessions: Sequence[Session], means: Means
+def run_variants(
+    result: Result, stage: Stage, variants: Sequence[Study], sessions: Sequence[Session], resources: Resources
 ) -> list[list[Entry]]:
-    """A stage's entry for each of several settings of a study, by session: a list a session, in the settings' order."""
+    """A stage's entries with several settings of one study: a list for each session, in the order of the variants."""
     began = time.monotonic()
-    of_settings = [(seen_by(stage, study), replace(result, study=study)) for study in settings]
-    works = (work_and_key(seen, one, [session]) for session in sessions for seen, one in of_settings)
-    entries = entries_of(stage, result, works, means)
+    each = [(declared_by(stage, study), replace(result, study=study)) for study in variants]
+    # Session by session, so that the variants of one session may share a process that has loaded its recording.
+    pieces = (work_and_key(declared, variant, [session]) for session in sessions for declared, variant in each)
+    entries = entries_of(stage, result, pieces, resources)
     result.seconds += time.monotonic() - began
-    return [entries[at : at + len(settings)] for at in range(0, len(entries), len(settings))]
+    return [entries[at : at + len(variants)] for at in range(0, len(entries), len(variants))]
 
 
 def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[Path]:
@@ -67,24 +69,27 @@ def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[
     What follows from something that would have to be computed first cannot be known, and is not among them.
     Raises PipelineError where the study is bad.
     """
-    result, sessions = found_in(folder, cache)
+    result, sessions = open_study(folder, cache)
     used: set[Path] = set()
     complete = True
     for stage in stages:
         if stage.scope == "study" and not complete:
             break
-        parts = [[session] for session in sessions] if stage.scope == "session" else [sessions]
-        entries, seen = {}, seen_by(stage, result.study)
-        for part in parts:
-            entry = cache.get(stage.name, work_and_key(seen, result, part)[1])
-            if entry is not None:
-                entries[part[0].id if stage.scope == "session" else ""] = entry
+        entries = _cached(stage, result, sessions, cache)
         used |= {entry.folder for entry in entries.values()}
-        complete = complete and len(entries) == len(parts)
+        complete = complete and len(entries) == (len(sessions) if stage.scope == "session" else 1)
         result.entries[stage.name] = entries
         if stage.scope == "session":
-            sessions = still_usable(result, [one for one in sessions if one.id in entries], entries)
+            sessions = usable_after(result, [one for one in sessions if one.id in entries], entries)
     return used
+
+
+def _cached(stage: Stage, result: Result, sessions: Sequence[Session], cache: Cache) -> dict[str, Entry]:
+    """The stage's entries that the cache has, by session; that of the whole study under an empty name."""
+    declared = declared_by(stage, result.study)
+    parts = {session.id: [session] for session in sessions} if stage.scope == "session" else {"": sessions}
+    looked_up = {name: cache.get(stage.name, work_and_key(declared, result, part)[1]) for name, part in parts.items()}
+    return {name: entry for name, entry in looked_up.items() if entry is not None}
 
 
 def _with_context(folder: Path, result: Result, message: str) -> str:

@@ -1,8 +1,9 @@
-"""What a stage is: the contract between the runner, which knows no stage, and the stages, which know no runner."""
+"""What a stage is: the contract between the engine, which knows no stage, and the stages, which know no engine."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -17,7 +18,8 @@ class Stage:
 
     `function` is "module:function", imported only when there is something to compute. A stage of scope "session"
     runs once a session, one of scope "study" once. `reads` names earlier stages, `settings` keys of study.yaml,
-    `files` keys of study.yaml that name a file.
+    `files` keys of study.yaml that name a file. `label` and `unit` are for people who wait: what is being done, and
+    what a piece of its work is.
     """
 
     name: str
@@ -28,6 +30,8 @@ class Stage:
     files: tuple[str, ...] = ()
     reads_log: bool = False
     names_inputs: bool = False  # its output lists every file of the study that was read
+    label: str = ""
+    unit: str = "sessions"
 
     @property
     def module(self) -> str:
@@ -37,7 +41,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a stage says beside its tables. Not None: why the session cannot be used, or was read only in part."""
+    """What a stage reports beside its tables. Not None: why the session cannot be used, or was read only in part."""
 
     set_aside: str | None = None
     in_part: str | None = None
@@ -51,6 +55,9 @@ class Work:
 
     For a stage of scope "study" each stage read has a folder a session, in the order of `sessions`; a stage of
     scope "study" has one. `unused` are files among the sessions that are none, with the reason.
+
+    `executor` may take small jobs of a stage of scope "study" (pipeline.engine.jobs); None where all of it is to be
+    done in the process that computes the stage. No result may depend on it, so it is in no key.
     """
 
     study_name: str
@@ -63,6 +70,7 @@ class Work:
     in_part: tuple[tuple[Session, str], ...] = ()
     unused: tuple[tuple[str, str], ...] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
+    executor: Executor | None = None
 
     @property
     def session(self) -> Session:

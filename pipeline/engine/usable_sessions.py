@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.engine.cache import Cache, Entry
-from pipeline.engine.input_digests import remembered
+from pipeline.engine.input_digests import file_digests
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Outcome
 from pipeline.errors import PipelineError
@@ -16,13 +16,13 @@ from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
 
-def found_in(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
+def open_study(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
     """A study before its first stage, and its sessions as their names say. Raises PipelineError for a bad study."""
     study = load_study(folder)
-    found = find_sessions(folder, study)
-    result = Result(folder.resolve(), study, set_aside=found.set_aside, unused=found.unused)
-    result.inputs = _input_digests(result.folder, study, found.sessions, cache)
-    return result, found.sessions
+    listed = find_sessions(folder, study)
+    result = Result(folder.resolve(), study, set_aside=listed.set_aside, unused=listed.unused)
+    result.inputs = _input_digests(result.folder, study, listed.sessions, cache)
+    return result, listed.sessions
 
 
 def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache: Cache) -> dict[str, str]:
@@ -33,14 +33,17 @@ def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache:
         if name is not None:
             paths.append(root / name)
     files = {path.relative_to(root).as_posix(): path for path in paths}
-    return remembered(files, root, cache.inputs)
+    return file_digests(files, root, cache.inputs)
 
 
-def still_usable(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:
-    """The sessions that go on, with participant and condition as the log says; the others are set aside."""
+def usable_after(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:
+    """The sessions that go on after a stage, with participant and condition as the log says; `result` takes the rest.
+
+    `entries` are the stage's, by session.
+    """
     usable = []
     for session in sessions:
-        outcome = Outcome(**entries[session.id].said)
+        outcome = Outcome(**entries[session.id].outcome)
         known = replace(
             session,
             participant=outcome.participant or session.participant,
@@ -55,8 +58,8 @@ def still_usable(result: Result, sessions: Sequence[Session], entries: dict[str,
     return usable
 
 
-def require_something(folder: Path, result: Result, sessions: Sequence[Session]) -> None:
-    """A study without tables needs one usable session: PipelineError where there is none."""
+def require_data(folder: Path, result: Result, sessions: Sequence[Session]) -> None:
+    """Raise PipelineError where a study has neither tables nor a session that can be used."""
     study = result.study
     if sessions or study.trials or study.questionnaires or study.measures:
         return
@@ -65,5 +68,5 @@ def require_something(folder: Path, result: Result, sessions: Sequence[Session])
         raise PipelineError(f"{folder}: no session can be used:\n{reasons}")
     hint = "".join(f"\n  {name}: {reason}" for name, reason in result.unused)
     if study.simulation is not None:
-        hint = f"; its logs are made by: steadyhand simulate {folder}"
+        hint = f"; write its simulated logs with: steadyhand simulate {folder}"
     raise PipelineError(f'{folder}: no file matches sessions: "{study.sessions}"{hint}')

@@ -19,11 +19,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipeline.commands.console import PlainLines
-from pipeline.commands.run import executor_of
 from pipeline.engine.cache import Cache
+from pipeline.engine.executors import executor_of
 from pipeline.engine.processes import InThisProcess, Processes
-from pipeline.engine.resources import Means
+from pipeline.engine.progress import PlainLines
+from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date
 from pipeline.stages import COMPARE, INGEST
@@ -117,7 +117,7 @@ def reading(study: Path, cache: Path) -> None:
     stock = (time.process_time() - began) / len(logs)
     for named in ("cold", "warm"):
         began = time.process_time()
-        result = bring_up_to_date(study, INGEST, Means(Cache(cache / named), InThisProcess(), PlainLines()))
+        result = bring_up_to_date(study, INGEST, Resources(Cache(cache / named), InThisProcess(), PlainLines()))
     ours = (time.process_time() - began) / len(result.sessions)
     print(
         f"  first ingest of a session: {1000 * ours:.0f} ms; stock decoder: {1000 * stock:.0f} ms, {stock / ours:.1f} x"
@@ -151,7 +151,9 @@ def two_processes(study: Path, root: Path) -> None:
         with Processes(count) as executor:
             for named in ("cold", "warm"):
                 began = time.perf_counter()
-                bring_up_to_date(study, COMPARE[:3], Means(Cache(root / f"{count}-{named}"), executor, PlainLines()))
+                bring_up_to_date(
+                    study, COMPARE[:3], Resources(Cache(root / f"{count}-{named}"), executor, PlainLines())
+                )
                 taken[count] = time.perf_counter() - began
     print(f"  one process {taken[1]:.1f} s, two {taken[2]:.1f} s: {taken[1] / taken[2]:.2f} x")
 
@@ -163,15 +165,16 @@ class _KillsHalfWay:
     victim: subprocess.Popen[bytes]
     _left: dict[str, int] = field(default_factory=dict)
 
-    def begin(self, stage: str, total: int) -> None:
+    def begin(self, label: str, total: int, unit: str = "sessions") -> None:
         """What is left until then."""
-        self._left = {stage: total // 2} if stage == "fuse" else {}
+        del unit
+        self._left = {label: total // 2} if label == "fusing" else {}
 
     def advance(self) -> None:
         """One piece is done."""
-        for stage in self._left:
-            self._left[stage] -= 1
-            if self._left[stage] == 0:
+        for label in self._left:
+            self._left[label] -= 1
+            if self._left[label] == 0:
                 self.victim.kill()
 
     def end(self) -> None:
@@ -181,9 +184,9 @@ class _KillsHalfWay:
 def cluster(study: Path, root: Path) -> None:
     """Two workers of a Dask cluster, one of them killed half-way: are the tables those of this machine's processes?"""
     with executor_of(2) as executor:
-        here = bring_up_to_date(study, COMPARE, Means(Cache(root / "here"), executor, PlainLines()))
+        here = bring_up_to_date(study, COMPARE, Resources(Cache(root / "here"), executor, PlainLines()))
     with _on_loopback(root) as (address, workers), executor_of(None, f"dask://{address}") as executor:
-        there = bring_up_to_date(study, COMPARE, Means(Cache(root / "there"), executor, _KillsHalfWay(workers[0])))
+        there = bring_up_to_date(study, COMPARE, Resources(Cache(root / "there"), executor, _KillsHalfWay(workers[0])))
         died = workers[0].wait(10) == -signal.SIGKILL
     same = _files(here) == _files(there) and not there.set_aside
     print(

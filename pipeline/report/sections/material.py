@@ -12,7 +12,7 @@ from typing import Any
 import matplotlib.figure
 import pandas as pd
 
-from pipeline.engine.two_processes import Job
+from pipeline.engine.jobs import Jobs
 from pipeline.report import figures
 from pipeline.report.document.model import Figure
 from pipeline.report.figures import Drawing
@@ -37,7 +37,7 @@ class Material:
     """What a study's report is made from: its settings, its results, and every table that its stages wrote.
 
     `entries` has the folders of each stage: one per session, in their order, or a single one. `figures` is the folder
-    for the figures of the report, and `drawings` gathers those that are to be drawn.
+    for the figures of the report, and `jobs` draws them.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Material:
     entries: Mapping[str, tuple[Path, ...]]
     figures: Path
     inputs: Mapping[str, str]
-    drawings: list[Job] = field(default_factory=list)
+    jobs: Jobs = field(default_factory=Jobs)
 
     @cached_property
     def measures(self) -> pd.DataFrame:
@@ -92,7 +92,7 @@ class Material:
         *arguments: Any,
     ) -> Figure:
         """Have a figure drawn into the report's figures, under words of the section's own."""
-        self.drawings.append(Job(figures.draw, (drawing, self.figures / f"{name}.svg", *arguments)))
+        self.jobs.add(figures.draw, drawing, self.figures / f"{name}.svg", *arguments)
         return Figure(f"figure-{name}", f"{name}.svg", caption, alt)
 
     def drawn(self, name: str, drawing: Drawing[...], *arguments: Any, more: str = "") -> Figure:

@@ -85,7 +85,7 @@ def test_the_table_says_by_how_much(folder: Folder, check: Check) -> None:
     assert "descriptives | m | b | n absent 8 – –" in " ".join(ran.out.split())
     assert "descriptives | m | c | n 8 absent – –" in " ".join(ran.out.split())
     assert "status undefined: all differences are zero ok – –" in " ".join(ran.out.split())
-    assert f"they are meant: steadyhand check {root} --accept" in ran.out
+    assert f"If these changes are intended, accept them with: steadyhand check {root} --accept" in ran.out
 
 
 def test_accepting_shows_what_a_person_is_to_review(folder: Folder, check: Check) -> None:
@@ -214,11 +214,11 @@ def test_a_junit_file_is_written_over_no_other(folder: Folder, check: Check, tmp
     for path in (root / "measures.csv", root):
         ran = check(root, "--junit", path)
         assert ran.code == 2
-        assert "is there and is no JUnit file; name a new one" in ran.err
+        assert "already exists and is not a JUnit file; choose another name" in ran.err
     assert (root / "measures.csv").read_text() == MEASURES
     ran = check(root, "--accept", "--junit", tmp_path / "junit.xml")
     assert ran.code == 2
-    assert "give one of them" in ran.err
+    assert "--accept compares nothing that --junit could report; give only one of them" in ran.err
     assert not (root / "expected.json").exists()
     for _ in range(2):  # an earlier run's is
         check.page(root)

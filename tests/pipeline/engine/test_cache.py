@@ -19,7 +19,7 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.engine.cache import Cache
-from pipeline.engine.housekeeping import held, prune
+from pipeline.engine.housekeeping import items_in, prune
 from pipeline.sessions import fuse
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, Steadyhand, run
@@ -147,7 +147,7 @@ def test_ctrl_c_is_answered_with_what_to_do(
     monkeypatch.setattr(fuse, "run", interrupted)
     ran = steadyhand("compare", study)
     assert ran.code == 130
-    assert ran.err.endswith("steadyhand: interrupted; what was computed is kept, run it again to go on\n")
+    assert ran.err.endswith("steadyhand: interrupted. Finished work is cached: run the command again to continue\n")
     assert not any((steadyhand.cache / "new").iterdir())
 
 
@@ -193,7 +193,9 @@ def test_a_full_disk_is_said_and_is_no_sessions_fault(
         patched.setattr(fuse, "run", full)
         ran = steadyhand("compare", study)
     assert ran.code == 2
-    assert "cannot be written any more: No space left on device; make room (`steadyhand cache prune` may)" in ran.err
+    assert (
+        "cannot be written: No space left on device; free some space (perhaps with `steadyhand cache prune`)" in ran.err
+    )
     assert "set aside" not in ran.err
     assert steadyhand("compare", study).code == 0
 
@@ -213,18 +215,19 @@ def _set_aside(entry: Path) -> None:
 
 def test_a_damaged_entry_is_computed_again_and_said(study: Path, undisturbed: bytes, filled: Steadyhand) -> None:
     harms: list[tuple[Callable[[Path], object], str]] = [
-        (_with("tracks.parquet", "half"), "tracks.parquet is not what was written"),
+        (_with("tracks.parquet", "half"), "tracks.parquet has changed since it was written"),
         (_without("tracks.parquet"), "tracks.parquet is missing"),
         (_without("entry.json"), "entry.json is missing"),
         (_with("entry.json", "{"), "entry.json cannot be read"),
         (_with("entry.json", "[]"), "entry.json cannot be read"),
-        (_set_aside, "entry.json is not what was written"),
+        (_set_aside, "entry.json has changed since it was written"),
     ]
     for harm, said in harms:
         harm(next(filled.cache.glob("fuse/*/*")))
         ran = filled("compare", study)
         assert ran.code == 0
-        assert f"was damaged ({said}), and has been computed again" in ran.err
+        assert '"fuse" of session P1_' in ran.err
+        assert f"was damaged ({said}) and has been computed again" in ran.err
         assert "Computed: fuse 1 (" in ran.out
         assert (filled.out / "results.json").read_bytes() == undisturbed
     assert "damaged" not in filled("compare", study).err
@@ -241,7 +244,7 @@ def test_a_cache_that_is_not_there_is_said(cache: Callable[..., Ran]) -> None:
     for words in (["show"], ["verify"], ["prune", "--older-than", "1"]):
         ran = cache(*words)
         assert ran.code == 2
-        assert "there is no cache; name its folder with --cache" in ran.err
+        assert "there is no cache here; name its folder with --cache" in ran.err
 
 
 @pytest.mark.usefixtures("filled")
@@ -265,7 +268,7 @@ def test_verify_removes_what_is_damaged(filled: Steadyhand, cache: Callable[...,
     path.write_bytes(bytes(byte ^ (place == 100) for place, byte in enumerate(path.read_bytes())))
     ran = cache("verify")
     assert ran.code == 1
-    assert f"{entry.relative_to(filled.cache)}: damaged, removed: tracks.parquet is not" in ran.err
+    assert f"{entry.relative_to(filled.cache)}: damaged, removed: tracks.parquet has changed" in ran.err
     assert not entry.exists()
     assert cache("verify").code == 0
 
@@ -275,7 +278,7 @@ def test_prune_keeps_what_a_study_as_it_is_now_uses(
 ) -> None:
     ran = cache("prune")
     assert ran.code == 2
-    assert "say what may go: --older-than DAYS, --keep-current STUDY, or both" in ran.err
+    assert "say what to remove: --older-than DAYS, --keep-current STUDY, or both" in ran.err
     root = shutil.copytree(study, tmp_path / "study")
     assert "Removed 0 entries" in cache("prune", "--keep-current", root).out
     settings = (root / "study.yaml").read_text()
@@ -291,13 +294,13 @@ def test_prune_keeps_what_a_study_as_it_is_now_uses(
 
 def test_prune_goes_by_the_last_use(filled: Steadyhand) -> None:
     cache, long_ago = Cache(filled.cache), time.time() - 100
-    for one in held(cache):
+    for one in items_in(cache):
         os.utime(one.folder / "entry.json", (long_ago, long_ago))
-    used = next(one for one in held(cache) if one.stage == "fuse")
+    used = next(one for one in items_in(cache) if one.stage == "fuse")
     assert cache.get("fuse", used.folder.name) is not None
     gone = prune(cache, time.time(), 50, None)
     assert [one.folder for one in gone.left] == [used.folder]
-    assert list(held(cache)) == list(gone.left)
+    assert list(items_in(cache)) == list(gone.left)
 
 
 def test_what_killed_runs_left_goes_after_a_day(tmp_path: Path) -> None:

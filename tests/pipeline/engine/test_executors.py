@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
 
-from pipeline.commands.console import PlainLines
-from pipeline.commands.run import executor_of
 from pipeline.engine import threads
 from pipeline.engine.cache import Cache
+from pipeline.engine.executors import executor_of
 from pipeline.engine.processes import Processes
-from pipeline.engine.resources import Means
+from pipeline.engine.progress import PlainLines
+from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
-from pipeline.engine.run import bring_up_to_date, over_settings
+from pipeline.engine.run import bring_up_to_date, run_variants
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError, WorkerLostError
 from pipeline.stages import COMPARE, REPLAY, STAGES
@@ -53,74 +56,114 @@ def fusing_with(function: str) -> tuple[Stage, ...]:
 
 def contents(result: Result) -> dict[str, dict[str, str]]:
     """The digest of every table."""
-    return {stage: {name: one.content for name, one in of.items()} for stage, of in result.entries.items()}
+    return {stage: {name: one.digest for name, one in of.items()} for stage, of in result.entries.items()}
 
 
 def test_processes_give_the_same_entries_as_this_process(study: Path, tmp_path: Path) -> None:
     found = []
     for where in ("inline", "process"):
         with executor_of(2, where) as executor:
-            found.append(bring_up_to_date(study, COMPARE, Means(Cache(tmp_path / where), executor, PlainLines())))
+            found.append(bring_up_to_date(study, COMPARE, Resources(Cache(tmp_path / where), executor, PlainLines())))
     assert contents(found[0]) == contents(found[1])
 
 
 def test_a_session_that_kills_its_process_is_set_aside_alone(study: Path, tmp_path: Path) -> None:
     with Processes(2) as executor:
-        means = Means(Cache(tmp_path / "cache"), executor, PlainLines())
-        result = bring_up_to_date(study, fusing_with("whenever"), means)
+        resources = Resources(Cache(tmp_path / "cache"), executor, PlainLines())
+        result = bring_up_to_date(study, fusing_with("whenever"), resources)
         ((session, reason),) = result.set_aside
         assert session.id == POISONED
-        assert "the process that computed fuse died twice (signal 9)" in reason
+        assert reason == 'the process computing stage "fuse" died twice (signal 9), possibly out of memory'
         assert set(result.entries["fuse"]) == set(SESSIONS)
-        again = bring_up_to_date(study, fusing_with("whenever"), means)
+        again = bring_up_to_date(study, fusing_with("whenever"), resources)
     assert again.computed == {"ingest": 0, "fuse": 1}  # it is tried again
 
 
 def test_a_process_that_was_killed_is_replaced(study: Path, tmp_path: Path) -> None:
     with Processes(2) as executor:
-        means = Means(Cache(tmp_path / "cache"), executor, PlainLines())
-        result = bring_up_to_date(study, fusing_with("once"), means)
+        resources = Resources(Cache(tmp_path / "cache"), executor, PlainLines())
+        result = bring_up_to_date(study, fusing_with("once"), resources)
         assert (study / "died").exists()
         assert result.set_aside == []
 
 
-def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(study: Path, tmp_path: Path) -> None:
     """Where there are many variants, a process computes those of a session in one go."""
-    monkeypatch.setattr("pipeline.engine.entries._ENOUGH", 1)
     settings = [
         parse(Study, {**read_yaml(study / "study.yaml"), "estimators": {name: {"type": "raw"}}}, study)
         for name in ("first", "held", "last")
     ]
     stage = replace(REPLAY, function="tests.pipeline.dying:of_one_variant")
     with Processes(2) as executor:
-        means = Means(Cache(tmp_path / "cache"), executor, PlainLines())
-        result = bring_up_to_date(study, COMPARE[:1], means)
-        found = over_settings(result, stage, settings, result.sessions, means)
-        again = over_settings(result, stage, settings, result.sessions, means)
-    bad = [(i, j) for i, entries in enumerate(found) for j, entry in enumerate(entries) if entry.said["set_aside"]]
+        resources = Resources(Cache(tmp_path / "cache"), executor, PlainLines(), fewest_groups=1)
+        result = bring_up_to_date(study, COMPARE[:1], resources)
+        found = run_variants(result, stage, settings, result.sessions, resources)
+        again = run_variants(result, stage, settings, result.sessions, resources)
+    bad = [(i, j) for i, entries in enumerate(found) for j, entry in enumerate(entries) if entry.outcome["set_aside"]]
     assert bad == [([session.id for session in result.sessions].index(POISONED), 1)]
-    assert [[entry.content for entry in entries] for entries in again] == [
-        [entry.content for entry in entries] for entries in found
+    assert [[entry.digest for entry in entries] for entries in again] == [
+        [entry.digest for entry in entries] for entries in found
     ]
     assert result.computed["replay"] == 1  # it is tried again
 
 
-def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """To the same bytes, report and all; what a process that died of it costs is said."""
+def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(study: Path, tmp_path: Path) -> None:
+    """To the same bytes, report and all, its figures drawn by others; if that process dies, the user is told."""
+    for session in SESSIONS:  # enough for figures to be drawn by other processes
+        shutil.copy(study / "data" / f"{session}.mcap", study / "data" / f"Q{session}.mcap")
     with executor_of(1, "inline") as executor:
-        here = bring_up_to_date(study, STAGES, Means(Cache(tmp_path / "here"), executor, PlainLines()))
-    monkeypatch.setattr("pipeline.engine.entries._ARCHIVE", 1)
-    with Processes(1) as executor:
-        means = Means(Cache(tmp_path / "apart"), executor, PlainLines())
-        apart = bring_up_to_date(study, STAGES, means)
+        here = bring_up_to_date(study, STAGES, Resources(Cache(tmp_path / "here"), executor, PlainLines()))
+    with Processes(2) as executor:
+        resources = Resources(Cache(tmp_path / "apart"), executor, PlainLines(), archive_sessions=1)
+        apart = bring_up_to_date(study, STAGES, resources)
         assert contents(apart) == contents(here)
         dying = replace(COMPARE[3], function="tests.pipeline.dying:of_a_study")
-        with pytest.raises(PipelineError, match=r"the process that computed measure died \(signal 9\); its memory"):
-            bring_up_to_date(study, (*COMPARE[:3], dying), means)
+        with pytest.raises(PipelineError, match=r'stage "measure" died \(signal 9\), possibly out of memory'):
+            bring_up_to_date(study, (*COMPARE[:3], dying), resources)
+
+
+def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: Path, tmp_path: Path) -> None:
+    """So that no more of them are there at once than the user allowed."""
+    noting = replace(COMPARE[3], function="tests.pipeline.dying:note_helper")
+    with Processes(1) as executor:
+        of_run = executor.submit(os.getpid).result()
+        apart = bring_up_to_date(
+            study,
+            (*COMPARE[:3], noting),
+            Resources(Cache(tmp_path / "apart"), executor, PlainLines(), archive_sessions=1),
+        )
+        with pytest.raises(ProcessLookupError):
+            os.kill(of_run, 0)
+        of_run = executor.submit(os.getpid).result()
+        here = bring_up_to_date(
+            study, (*COMPARE[:3], noting), Resources(Cache(tmp_path / "here"), executor, PlainLines())
+        )
+    computed_in, helped_by = (apart.entry("measure") / "processes").read_text().split()
+    assert len({computed_in, helped_by, str(os.getpid())}) == 3
+    assert (here.entry("measure") / "processes").read_text().split() == [str(os.getpid()), str(of_run)]
+
+
+@pytest.mark.parametrize("options", [("--jobs", "1"), ("--jobs", "2", "--executor", "inline")])
+def test_one_job_or_inline_starts_no_process(
+    options: tuple[str, ...],
+    study: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not for the figures of a report either."""
+    for session in SESSIONS:
+        shutil.copy(study / "data" / f"{session}.mcap", study / "data" / f"Q{session}.mcap")
+
+    def refuse(_process: object) -> None:
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(BaseProcess, "start", refuse)
+    monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
+    places = ("--out", tmp_path / "out", "--cache", tmp_path / "cache")
+    ran = run(capsys, monkeypatch, "report", study, *places, *options)
+    assert (ran.code, "assess 8" in ran.out) == (0, True)
+    assert (tmp_path / "out" / "report.pdf").is_file()
 
 
 @contextmanager
@@ -135,40 +178,40 @@ def test_dask_workers_give_the_same_entries_also_where_one_is_killed(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with executor_of(None, "inline") as executor:
-        here = bring_up_to_date(study, COMPARE[:2], Means(Cache(tmp_path / "here"), executor, PlainLines()))
+        here = bring_up_to_date(study, COMPARE[:2], Resources(Cache(tmp_path / "here"), executor, PlainLines()))
     with dask(2) as executor:
-        assert "Dask's dashboard: http://127.0.0.1:" in capsys.readouterr().err
-        means = Means(Cache(tmp_path / "there"), executor, PlainLines())
-        there = bring_up_to_date(study, fusing_with("once"), means)
+        assert "Dask dashboard: http://127.0.0.1:" in capsys.readouterr().err
+        resources = Resources(Cache(tmp_path / "there"), executor, PlainLines())
+        there = bring_up_to_date(study, fusing_with("once"), resources)
         assert executor.submit(os.getenv, "NUMBA_NUM_THREADS").result() == "1"
         assert executor.submit(os.getpid).result() != os.getpid()
         with pytest.raises(ZeroDivisionError):
             executor.submit(divmod, 1, 0).result()
-        with pytest.raises(PipelineError, match="does not see"):
+        with pytest.raises(PipelineError, match="a worker cannot see"):
             executor.submit(str, tmp_path / "elsewhere").result()
-        poisoned = bring_up_to_date(study, fusing_with("whenever"), replace(means, cache=Cache(tmp_path / "anew")))
+        poisoned = bring_up_to_date(study, fusing_with("whenever"), replace(resources, cache=Cache(tmp_path / "anew")))
     assert (study / "died").exists()
     assert there.set_aside == []
     assert contents(here) == contents(there)
     ((session, reason),) = poisoned.set_aside
     assert session.id == POISONED
-    assert "the process that computed fuse died twice (several workers died of it)" in reason
+    assert 'the process computing stage "fuse" died twice (several workers died)' in reason
 
 
 def test_workers_with_other_code_are_refused() -> None:
     pytest.importorskip("distributed")
-    from pipeline.engine.dask_cluster import _guarded
+    from pipeline.engine.dask_cluster import checked_call
 
     with pytest.raises(PipelineError, match="do not run the same Steadyhand as this command"):
-        _guarded("0" * 64, [], str, (1,), {})
+        checked_call("0" * 64, [], str, (1,), {})
 
 
-def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer_is_said() -> None:
     pytest.importorskip("distributed")
-    from pipeline.engine import dask_cluster
+    from pipeline.engine.dask_cluster import on_dask
 
-    monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.5)
-    with pytest.raises(PipelineError, match="no Dask scheduler answers there"), executor_of(1, "dask://127.0.0.1:1"):
+    answers = on_dask("127.0.0.1:1", 1, print, connect_s=0.5)
+    with pytest.raises(PipelineError, match="no Dask scheduler answers there"), answers:
         pass
 
 

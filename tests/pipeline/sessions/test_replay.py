@@ -295,7 +295,7 @@ def test_a_fault_of_ours_in_one_variant_leaves_the_others(
     monkeypatch.setattr(replay, "run", failing)
     ran = steadyhand("replay", study, "--set", "fusion.window=3")
     assert ran.code == 1
-    assert "session P1_a set aside: fusion[window=3]: a fault of Steadyhand's own in replay" in ran.err
+    assert 'session P1_a set aside: fusion[window=3]: internal error in stage "replay"; please report it' in ran.err
     assert len(steadyhand.results()["accuracy"]) == 3
     assert [row["variant"] for row in steadyhand.results()["replay_exclusions"]] == ["fusion[window=3]"]
     monkeypatch.setattr(replay, "run", original)
@@ -311,7 +311,7 @@ def test_what_cannot_be_replayed_is_an_error(study: Path, folder: Folder, steady
     before = (study / "study.yaml").read_bytes()
     steadyhand.out = study
     ran = steadyhand("replay", study)
-    assert (ran.code, "is a study, and its files are not changed" in ran.err) == (2, True)
+    assert (ran.code, "is the folder of a study; choose another folder for the report" in ran.err) == (2, True)
     assert (study / "study.yaml").read_bytes() == before
 
 

@@ -180,7 +180,7 @@ def test_fit_prints_what_the_recordings_say(
     block = yaml.safe_load(ran.out)
     assert block["streams"]["tracker"]["noise_sd_mm"] == pytest.approx(8, rel=0.1)
     assert block["streams"]["tracker"]["latency_s"] == pytest.approx(0.1, abs=0.006)
-    assert "# On the rest of each session, RMSE in mm as set -> as fitted:" in ran.out
+    assert "# RMSE in mm on the rest of each session, with study.yaml's values -> with the fitted ones:" in ran.out
     lines = [line for line in ran.out.splitlines() if "P1_a  fusion:" in line]
     before, after = (float(part) for part in lines[0].split(": ")[1].split(" -> "))
     assert after < before
@@ -195,4 +195,4 @@ def test_fit_without_logs_says_so(
     )
     ran = run(capsys, monkeypatch, "fit", root, "--cache", tmp_path / "cache", "--jobs", "1")
     assert ran.code == 2
-    assert "has no logs to fit to" in ran.err
+    assert "has no session to fit to" in ran.err

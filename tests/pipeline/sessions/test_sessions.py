@@ -378,7 +378,7 @@ def test_the_study_is_never_written_over(study: Path, steadyhand: Steadyhand) ->
     before = {path: path.read_bytes() for path in study.rglob("*") if path.is_file()}
     ran = steadyhand("report", study, "--out", str(study))
     assert ran.code == 2
-    assert "is a study, and its files are not changed" in ran.err
+    assert "is the folder of a study; choose another folder for the report" in ran.err
     assert {path: path.read_bytes() for path in before} == before
 
 

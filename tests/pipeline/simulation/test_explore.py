@@ -250,7 +250,7 @@ def test_what_pays_weighs_the_best_filter_against_the_best_tracker(
         (["--noise", "0"], "--noise: should lie between 0.01 and 1000, found 0"),
         (["--noise", "nan"], "--noise: should lie between"),
         (["--rate", "15,,30"], '--rate: a value is missing in "15,,30"'),
-        (["--rate", "30,30.0"], "--rate: a value is there twice"),
+        (["--rate", "30,30.0"], "--rate: a value is listed twice"),
         (["--rate", "1,2,3,4,5"], "--rate: takes up to 4 values at once, found 5"),
         (["--estimators", "fusoin"], 'has no estimator "fusoin"; did you mean "fusion"?'),
         (["--executor", "proces"], '--executor: there is no "proces"'),
@@ -290,5 +290,5 @@ def test_ctrl_c_writes_nothing(study: Path, command: Command, monkeypatch: pytes
     ran = command(study, *SMALL)
     assert ran.code == 130
     assert "interrupted; nothing was written" in ran.err
-    assert "run it again to go on" not in ran.err
+    assert "Finished work is cached" not in ran.err
     assert not (tmp_path / "out").exists()

@@ -84,7 +84,7 @@ def test_the_table_is_a_participants_table(plan: Plan, tmp_path: Path) -> None:
     ran = plan("laser", "cube, red", "Größe", "object", "-n", "8", "--out", path)
     assert ran.code == 0
     assert "Counterbalancing is complete." in ran.err
-    assert "in each period 2 times, and comes straight after each other one 2 times" in ran.err
+    assert "Each condition is in each period 2 times, and directly follows each other one 2 times" in ran.err
     table = read_participants(path)
     assert list(table) == ["participant", "sequence", "period_1", "period_2", "period_3", "period_4"]
     assert list(table["participant"]) == [f"P0{number}" for number in range(1, 9)]
@@ -96,9 +96,9 @@ def test_the_table_is_a_participants_table(plan: Plan, tmp_path: Path) -> None:
 def test_what_counterbalancing_lacks_is_said(plan: Plan) -> None:
     ran = plan("a", "b", "c", "-n", "9")
     assert ran.code == 0
-    assert "in each period 3 times, and comes straight after each other one 2 to 4 times" in ran.err
-    assert "3 conditions take 6 sequences, and 9 participants cannot share them evenly; 6 or 12 participants" in ran.err
-    assert "1 participant cannot share them evenly; 2 participants would" in plan("a", "b", "-n", "1").err
+    assert "Each condition is in each period 3 times, and directly follows each other one 2 to 4 times" in ran.err
+    assert "3 conditions take 6 sequences, which 9 participants cannot share evenly; 6 or 12 participants" in ran.err
+    assert "which 1 participant cannot share evenly; 2 participants could" in plan("a", "b", "-n", "1").err
 
 
 def test_chance_decides_within_a_square(plan: Plan) -> None:
@@ -120,7 +120,7 @@ def test_the_conditions_of_a_study(plan: Plan, folder: Callable[..., Path]) -> N
     assert rows(plan("--study", root, "-n", "2").out)[1]["sequence"] == "fusion > kinect"
     ran = plan("kinect", "--study", root, "-n", "2")
     assert ran.code == 2
-    assert "give one of them" in ran.err
+    assert "given both on the command line and by --study; give only one of them" in ran.err
 
 
 @pytest.mark.parametrize(
@@ -128,9 +128,9 @@ def test_the_conditions_of_a_study(plan: Plan, folder: Callable[..., Path]) -> N
     [
         (["a"], "needs two conditions or more, found 1"),
         ([], "needs two conditions or more, found 0"),
-        (["é", "e\u0301"], 'condition "é" stands there twice'),
+        (["é", "e\u0301"], 'condition "é" is listed twice'),
         (["a", " "], "a condition has no name"),
-        (["a", "b\x1b[2J"], "condition 'b\\x1b[2J' holds a character that cannot be printed; leave it out"),
+        (["a", "b\x1b[2J"], "condition 'b\\x1b[2J' contains a character that cannot be printed; leave it out"),
     ],
 )
 def test_names_that_cannot_be_conditions(plan: Plan, names: list[str], told: str) -> None:
@@ -145,5 +145,5 @@ def test_a_table_that_is_there_is_not_written_over(plan: Plan, tmp_path: Path) -
     path.write_text("participant,age\nP01,31\n")
     ran = plan("a", "b", "-n", "4", "--out", path)
     assert ran.code == 2
-    assert "is already there and is not written over; name a new file, or remove it" in ran.err
+    assert "already exists; choose another file, or remove this one" in ran.err
     assert path.read_text() == "participant,age\nP01,31\n"

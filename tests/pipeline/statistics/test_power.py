@@ -267,7 +267,7 @@ def test_the_answer_and_what_it_means(power: Power) -> None:
 def test_the_ways_to_state_an_effect(power: Power) -> None:
     stated = power("--difference", "12", "--sd", "24", "--correlation", "0.5", *QUICK)
     assert "A difference of 12 at an SD of 24 within each condition: d = 0.50" in stated.out
-    assert "r = .50: a participant's values in two conditions correlate\n" in stated.out
+    assert "r = .50: the correlation of a participant's values in two conditions\n" in stated.out
     assert "Closed form (noncentral t): 34 participants." in stated.out
     assumed = power("--difference", "12", "--sd", "24", *QUICK)
     assert "correlate (assumed; --correlation states it)" in assumed.out
@@ -319,12 +319,12 @@ def test_columns_of_the_files_do_not_vary(power: Power, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ((), "the effect to be found is missing; give --effect 0.5, or --difference and --sd"),
-        (("--difference", "3"), "the effect to be found is missing"),
-        (("--effect", "0.5", "--sd", "2"), "say the same thing; give one of them"),
-        (("--effect", "0"), "--effect: should be a size other than 0 and up to 100, found 0"),
-        (("--effect", "nan"), "--effect: should be a size other than 0"),
-        (("--difference", "0", "--sd", "2"), "--difference over --sd: should be a size other than 0"),
+        ((), "the effect is missing; give --effect 0.5, for example, or --difference and --sd"),
+        (("--difference", "3"), "the effect is missing"),
+        (("--effect", "0.5", "--sd", "2"), "--effect says the same as --difference with --sd; give only one of them"),
+        (("--effect", "0"), "--effect: should not be 0, and its size at most 100, found 0"),
+        (("--effect", "nan"), "--effect: should not be 0"),
+        (("--difference", "0", "--sd", "2"), "--difference over --sd: should not be 0"),
         (("--difference", "1", "--sd", "0"), "--sd: should lie between 0 and inf, found 0"),
         (("--effect", "0.5", "--correlation", "1"), "--correlation: should lie between -1 and 1, found 1"),
         (
@@ -354,5 +354,5 @@ def test_nothing_is_written_into_a_study(power: Power, folder: Callable[..., Pat
     root = folder("conditions: [a, b]\n")
     ran = power("--effect", "0.5", *QUICK, "--out", root)
     assert ran.code == 2
-    assert "is a study, and its files are not changed" in ran.err
+    assert "is the folder of a study; choose another folder for the report" in ran.err
     assert [path.name for path in root.iterdir()] == ["study.yaml"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,7 @@ def test_the_same_results_are_the_same(study: Path, diff: Diff) -> None:
     one, other = diff.compared(study, "one"), diff.compared(study, "other")
     ran = diff(one, other / "results.json")
     assert ran.code == 0
-    assert lines(ran.out)[0].startswith("No figure changed, of ")
+    assert re.fullmatch(r"None of \d+ figures changed\.", lines(ran.out)[0])
     assert lines(ran.out)[1] == "Settings, inputs, versions and code are the same."
     code, told = diff.told(one, other)
     assert code == 0
@@ -145,7 +146,7 @@ def test_what_differs_without_a_change_in_the_results(study: Path, diff: Diff) -
     ran = diff(one, diff.compared(study, "other"))
     assert ran.code == 0
     shown = lines(ran.out)
-    assert "What differs without a change in the results:" in shown
+    assert "Different, but without effect on the results:" in shown
     assert any(line.startswith('notes default "long long') and line.endswith("…") for line in shown)
     assert any(line.startswith("study.yaml ") for line in shown)
 
@@ -249,7 +250,7 @@ def test_results_of_replays_are_compared_by_study_and_variant(folder: Folder, di
     assert variant["b"]["estimator"] == "held"
     ran = diff(one, diff.compared(root, "third"))
     assert ran.code == 2
-    assert "one is of a study and one of a replay; give two of a kind" in ran.err
+    assert "cannot compare results of a study with those of a replay" in ran.err
 
 
 @pytest.mark.parametrize(
@@ -294,7 +295,7 @@ def test_places_without_results(study: Path, diff: Diff, tmp_path: Path) -> None
     assert "there is no such file or folder; name a results.json" in diff(one, tmp_path / "none").err
     ran = diff(one, study)
     assert ran.code == 2
-    assert f"{study}: holds no results.json; write one with: steadyhand compare {study} --out DIR" in ran.err
+    assert f"{study}: contains no results.json; write one with: steadyhand compare {study} --out DIR" in ran.err
 
 
 def test_what_another_version_added_is_said(study: Path, diff: Diff) -> None:
@@ -302,7 +303,7 @@ def test_what_another_version_added_is_said(study: Path, diff: Diff) -> None:
     edit(other, lambda content: content.update(further=[]))
     ran = diff(one, other)
     assert ran.code == 0
-    assert "further: not known to this Steadyhand, and not compared" in ran.err
+    assert "further: unknown to this version of Steadyhand, and not compared" in ran.err
 
 
 def test_hostile_names_are_data(folder: Folder, diff: Diff) -> None:

@@ -1,0 +1,57 @@
+"""What commands over one or many studies have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from pipeline.commands import console
+from pipeline.engine.executors import PROCESS, executor_of
+from pipeline.engine.folders import cache_in
+from pipeline.engine.messages import damage_messages
+from pipeline.engine.progress import show_progress
+from pipeline.engine.resources import Resources
+from pipeline.engine.result import Result
+from pipeline.engine.run import bring_up_to_date
+from pipeline.engine.stage import Stage
+from pipeline.errors import PipelineError
+
+
+def for_each_study(
+    studies: Sequence[Path],
+    stages: Sequence[Stage],
+    jobs: int | None,
+    cache: Path | None,
+    then: Callable[[Path, Result], int],
+    *,
+    failed: Callable[[Path, PipelineError], None] = lambda _folder, _error: None,
+    bring: Callable[[Path, Sequence[Stage], Resources], Result] = bring_up_to_date,
+    executor_name: str = PROCESS,
+) -> int:
+    """Bring each study up to date and call `then` with it; the highest of the exit codes that `then` returns.
+
+    The error of a study with which either cannot be done is printed and handed to `failed`; the others go on.
+    """
+    code = 0
+    with executor_of(jobs, executor_name, console.warn) as executor:
+        for folder in studies:
+            try:
+                with show_progress() as progress:
+                    result = bring(folder, stages, Resources(cache_in(cache), executor, progress))
+                for line in damage_messages(result):
+                    console.warn(line)
+                code = max(code, then(folder, result))
+            except PipelineError as error:
+                console.warn(f"steadyhand: {error}")
+                failed(folder, error)
+                code = max(code, error.exit_code)
+    return code
+
+
+def refuse_same_names(studies: Sequence[Path]) -> list[str]:
+    """The studies' names; PipelineError where two are the same."""
+    names = [study.resolve().name for study in studies]
+    for name in names:
+        if names.count(name) > 1:
+            raise PipelineError(f'two studies are called "{name}", so their reports would collide; rename a folder')
+    return names

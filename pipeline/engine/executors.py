@@ -1,0 +1,52 @@
+"""The executor that the user chose by name: `--executor` and `--jobs`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+
+from pipeline.engine.processes import InThisProcess, Processes
+from pipeline.errors import PipelineError, did_you_mean
+
+PROCESS, INLINE, DASK = "process", "inline", "dask"
+
+
+def _print(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)  # noqa: T201 - beside the output, which may go into a file
+
+
+@contextmanager
+def executor_of(jobs: int | None, name: str = PROCESS, say: Callable[[str], None] = _print) -> Iterator[Executor]:
+    """The executor of that name, with `jobs` processes (None: as many as there are processors).
+
+    No process of this machine starts before there is work for it; one job is done in this process. `say` is told
+    where to watch a Dask cluster. Raises PipelineError where no executor has that name, or Dask is not installed or
+    does not answer.
+    """
+    count = jobs or os.cpu_count() or 1
+    if name == INLINE or (name == PROCESS and count == 1):
+        yield InThisProcess()
+    elif name == PROCESS:
+        with Processes(count) as processes:
+            yield processes
+    elif name == DASK or (name.startswith(f"{DASK}://") and name != f"{DASK}://"):
+        _require_dask(name)
+        from pipeline.engine.dask_cluster import on_dask
+
+        with on_dask(name.partition("://")[2] or None, count, say) as cluster:
+            yield cluster
+    else:
+        known = (PROCESS, INLINE, DASK, f"{DASK}://host:port")
+        raise PipelineError(f'--executor: there is no "{name}"{did_you_mean(name, known)}')
+
+
+def _require_dask(name: str) -> None:
+    try:
+        import distributed  # noqa: F401 - is it installed?
+    except ImportError:
+        raise PipelineError(
+            f'--executor {name}: Dask is not installed here; install it with: pip install "steadyhand[dask]"'
+        ) from None

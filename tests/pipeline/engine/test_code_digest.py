@@ -1,0 +1,97 @@
+"""Which edits reach which stages: a digest follows code, the files beside it, and nothing else."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pipeline.engine.code_digest import code_digest, code_digest_in
+from pipeline.stages import STAGES
+from tests.conftest import CLONE
+
+PACKAGES = ("pipeline", "fusion_core")
+
+
+def listed_by_git() -> list[str]:
+    """The files of our packages that git lists, committed or new."""
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", *PACKAGES]
+    done = subprocess.run(command, cwd=CLONE, capture_output=True, text=True, check=True)
+    return [name for name in done.stdout.splitlines() if (CLONE / name).is_file()]
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The packages as a wheel installs them: what git lists, without git. Each test leaves them as they were."""
+    root = tmp_path_factory.mktemp("installed")
+    for name in listed_by_git():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(CLONE / name, root / name)
+    return root
+
+
+def digests(root: Path) -> dict[str, str]:
+    return {stage.name: code_digest_in(root, stage.module) for stage in STAGES}
+
+
+def reached_by(root: Path, path: str, content: bytes | None = None, before: dict[str, str] | None = None) -> set[str]:
+    """The stages whose digest another content of a file changes; the file is put back."""
+    before, target = before or digests(root), root / path
+    original = target.read_bytes() if target.exists() else None
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(content if content is not None else (original or b"") + b"\n# edited\n")
+    after = digests(root)
+    if original is None:
+        target.unlink()
+    else:
+        target.write_bytes(original)
+    return {name for name in before if before[name] != after[name]}
+
+
+def test_a_module_reaches_the_stages_that_import_it(copied: Path) -> None:
+    """However indirectly, and also where it is named as text."""
+    assert reached_by(copied, "fusion_core/window/gp.py") == {"fuse", "assess", "compare", "report"}
+    assert reached_by(copied, "pipeline/sessions/logs/mcap/container.py") == {"ingest"}
+    assert reached_by(copied, "pipeline/sessions/logs/mcap/protobuf_template.py") == {"ingest"}
+    assert reached_by(copied, "pipeline/statistics/rank.py") == {"compare"}
+    assert reached_by(copied, "pipeline/words.py") >= {"compare", "report"}
+
+
+def test_a_new_import_is_followed(copied: Path) -> None:
+    path = "pipeline/sessions/ingest.py"
+    importing = (copied / path).read_bytes() + b"\nimport pipeline.statistics.rank\n"
+    original = (copied / path).read_bytes()
+    (copied / path).write_bytes(importing)
+    assert reached_by(copied, "pipeline/statistics/rank.py") == {"ingest", "compare"}
+    (copied / path).write_bytes(original)
+
+
+def test_every_file_that_is_no_python_reaches_the_stages_of_its_folder(copied: Path) -> None:
+    """Templates, scripts, styles, references: whatever git lists below the packages."""
+    others = [name for name in listed_by_git() if not name.endswith(".py")]
+    assert {Path(name).suffix for name in others} >= {".js", ".css", ".jinja", ".typ", ".bib"}
+    before = digests(copied)
+    for name in others:
+        reached = reached_by(copied, name, before=before)
+        assert reached >= ({"report"} if name.startswith("pipeline/report/") else {"fuse"}), name
+        assert not name.startswith("pipeline/report/") or reached == {"report"}, name
+
+
+def test_a_kind_of_file_that_nobody_has_thought_of_counts(copied: Path) -> None:
+    assert reached_by(copied, "pipeline/report/document/icons.woff2") == {"report"}
+    assert reached_by(copied, "pipeline/report/document/fonts/sans.ttf") == {"report"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["__pycache__/html.cpython-311.pyc", ".style.css.swp", "style.css~", "#style.css#", ".DS_Store", "html.pyc"],
+)
+def test_what_python_and_editors_leave_does_not_count(copied: Path, name: str) -> None:
+    assert reached_by(copied, f"pipeline/report/document/{name}", b"left behind") == set()
+
+
+def test_installed_packages_have_the_digests_of_the_clone(copied: Path) -> None:
+    """So that workers of a cluster may be installed from a wheel."""
+    assert digests(copied) == {stage.name: code_digest(stage.module) for stage in STAGES}
