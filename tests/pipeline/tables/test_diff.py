@@ -223,7 +223,7 @@ def test_compare_into_a_reports_folder_leaves_no_old_provenance(study: Path, dif
     assert diff.compared(study, "one") == out
     made = json.loads((out / "provenance.json").read_text())
     assert made["settings"]["alpha"] == 0.01
-    assert explanation.made(out / "results.json").unknown is None
+    assert explanation.read_with_provenance(out / "results.json").unused_because is None
     (study / "study.yaml").write_text("conditions: [a, b]\nmeasures: measures.csv\n")
     (study / "measures.csv").write_text(MEASURES.replace(",m,", ",other,"))
     diff.compared(study, "one", "report")
