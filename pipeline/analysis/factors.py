@@ -80,7 +80,9 @@ def factors_of(rows: pd.DataFrame) -> Factors:
         for who in had.values():
             for person in who:
                 of_person[person] = of_person.get(person, 0) + 1
-        if len(had) > 1 and max(of_person.values()) == 1:
+        if len(had) < 2:
+            continue  # says the same of everybody, and divides nothing
+        if max(of_person.values()) == 1:
             between.append(name)
             continue
         odd = _rare_levels(name, had, len(of_person))

@@ -34,7 +34,7 @@ BOUND = 1e-5  # R finds the bounds of noncentral distributions by a search that 
 RANGE = 5e-9  # R's ptukey misses the p of a Welch test of two groups by 2e-9; SciPy's has it
 
 
-@pytest.mark.parametrize("case", with_key("welch"))
+@pytest.mark.parametrize("case", [case for case in with_key("welch") if case.startswith("groups")])
 def test_welch_against_r(case: str) -> None:
     wanted = expected(case)
     first, second = groups(case).values()

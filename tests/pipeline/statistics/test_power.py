@@ -336,7 +336,7 @@ def test_columns_of_the_files_do_not_vary(power: Power, tmp_path: Path) -> None:
         (("--effect", "0.5", "--alpha", "0"), "--alpha: should lie between 0 and 1, found 0"),
         (("--effect", "0.5", "--test", "t_pared"), '--test: "t_pared" is not known; did you mean "t_paired"?'),
         (("--effect", "0.5", "--conditions", "3"), "t_paired compares two conditions; take --test rm_anova"),
-        (("--effect", "0.1", "--max-n", "100"), "power: 100 participants reach a power of .168, not 0.8"),
+        (("--effect", "0.1", "--max-n", "100"), "power: 100 participants reach a power of .168 only, not 0.8; raise --max-n"),
         (
             ("--effect", "0.1", "--max-n", "50", "--test", "wilcoxon", *QUICK),
             "power: 50 participants reach a power of .1",
