@@ -126,8 +126,8 @@ def test_the_conditions_of_a_study(plan: Plan, folder: Callable[..., Path]) -> N
 @pytest.mark.parametrize(
     ("names", "told"),
     [
-        (["a"], "an order needs at least two conditions, found 1"),
-        ([], "an order needs at least two conditions, found 0"),
+        (["a"], "needs at least two conditions, found 1"),
+        ([], "needs at least two conditions, found 0"),
         (["é", "e\u0301"], 'condition "é" is listed twice'),
         (["a", " "], "a condition has no name"),
         (["a", "b\x1b[2J"], "condition 'b\\x1b[2J' contains a character that cannot be printed; leave it out"),
