@@ -13,8 +13,16 @@ from pipeline.commands.studies import for_each_study
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.sessions import recording
+from pipeline.sessions.checks.agreement import LAG
 from pipeline.sessions.fitting import Fit, Parameter, fit
 from pipeline.stages import INGEST
+from pipeline.statistics.arrays import FloatArray
+from pipeline.study.settings import Study
+from pipeline.study.streams import AccelerationStream
+from pipeline.tables import table as tables
+from pipeline.tables.table import Row
+
+_GRAVITY_OFF_MM_S2 = 500.0  # 3° of tilt
 
 
 def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache: Path | None) -> None:
@@ -31,22 +39,30 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
             fitted = fit(result.study, recordings, first_s)
         except PipelineError as error:
             raise PipelineError(f"{folder}: {error}") from None
-        for line in _lines(result.name, fitted, first_s, recordings):
+        folders = [result.entries["ingest"][session.id].folder for session in result.sessions]
+        checks = list(tables.records("checks", tables.read("checks", folders)))
+        for line in (*_lines(result.study, result.name, fitted, first_s, recordings), *_of_checks(checks)):
             console.say(line)
         return result.exit_code
 
     sys.exit(for_each_study(studies, INGEST, jobs, cache, then))
 
 
-def _lines(name: str, fitted: Fit, first_s: float, recordings: dict[str, recording.Recording]) -> Iterator[str]:
+def _lines(
+    study: Study, name: str, fitted: Fit, first_s: float, recordings: dict[str, recording.Recording]
+) -> Iterator[str]:
     yield f"# {name}: fitted on the first {first_s:g} s of {len(recordings)} sessions; copy what you trust."
     yield from _block(fitted.parameters)
     for stream, (mean, half) in fitted.gravity_mm_s2.items():
-        values = ", ".join(f"{value:.0f}" for value in mean)
-        yield f"# streams.{stream}.gravity_mm_s2 by the mean specific force: [{values}] ± {float(np.max(half)):.0f}"
+        yield from _gravity(study, stream, mean, float(np.max(half)))
     yield from _mountings(recordings)
     for row in fitted.parameters:
-        if not row.fitted.told:
+        if row.at_bound:
+            yield (
+                f"# {row.where}.{row.key} ran off to {_short(row.fitted.value)}, which is no figure of it but a sign"
+                f" that the data contradict the rest of study.yaml; {_short(row.stated)} was kept."
+            )
+        elif not row.fitted.told:
             yield (
                 f"# {row.where}.{row.key} cannot be fitted from these data: anything from {_short(row.fitted.low)} to"
                 f" {_short(row.fitted.high)} fits; {_short(row.stated)} was kept."
@@ -57,9 +73,35 @@ def _lines(name: str, fitted: Fit, first_s: float, recordings: dict[str, recordi
         yield f"#   {score.session}  {score.estimator}: {score.stated_rmse_mm:.1f} -> {score.fitted_rmse_mm:.1f}"
 
 
+def _gravity(study: Study, stream: str, mean: FloatArray, half: float) -> Iterator[str]:
+    """Gravity by the mean specific force, and whether study.yaml has the same."""
+    stated = study.streams[stream]
+    assert isinstance(stated, AccelerationStream)  # noqa: S101 - only phones have a gravity
+    off = float(np.linalg.norm(mean - np.array(stated.gravity_mm_s2)))
+    values, has = (", ".join(f"{value:.0f}" for value in one) for one in (mean, stated.gravity_mm_s2))
+    yield f"# streams.{stream}.gravity_mm_s2 by the mean specific force: [{values}] ± {half:.0f}"
+    if off <= max(_GRAVITY_OFF_MM_S2, 3 * half):
+        yield f"#   which agrees with [{has}] in study.yaml, {off:.0f} mm/s² off"
+    else:
+        yield f"#   and study.yaml has [{has}], {off:.0f} mm/s² off: gravity, orientation or accelerometer is wrong"
+
+
+def _of_checks(rows: Sequence[Row]) -> Iterator[str]:
+    """The lag of each session with what it means for either kind of stamp, and what contradicts what."""
+    lags = [row for row in rows if row["check"] == LAG]
+    if lags:
+        yield "# How much later the tracker's stamps are than the phone's, by their movement, with the 95 % interval."
+        yield "# With stamp: arrival this is latency_s; with stamp: measurement it should be 0, or the clocks differ."
+    for row in lags:
+        yield f"#   {row['session']}  {row['found']}; {row['expected']}"
+    for row in rows:
+        if row["status"] != "green":
+            yield f"# {row['session']}: {row['status']}, {row['check']}: {row['message']}"
+
+
 def _block(parameters: Sequence[Parameter]) -> Iterator[str]:
     """YAML, section by section, each value with its interval."""
-    fitted = [row for row in parameters if row.fitted.told]
+    fitted = [row for row in parameters if row.taken]
     for section in dict.fromkeys(row.where.split(".", 1)[0] for row in fitted):
         yield f"{section}:"
         for where in dict.fromkeys(row.where for row in fitted if row.where.startswith(f"{section}.")):

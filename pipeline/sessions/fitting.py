@@ -19,6 +19,7 @@ from pipeline.study.settings import Study
 
 _IMU_PRIOR = 0.7  # SD of the logarithm: a factor of two. Smooth motion alone cannot tell an accelerometer's noise
 _FREE = float("inf")
+_FARTHEST = 100.0  # times what is stated, or a hundredth of it
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,17 @@ class Parameter:
     key: str
     stated: float
     fitted: Fitted
+
+    @property
+    def at_bound(self) -> bool:
+        """Has the search run off, so that it says nothing but that the data are not as the model has them?"""
+        farthest = _FARTHEST if self.where.startswith("streams.") else _FARTHEST**2  # variances among them
+        return not 1 / farthest < self.fitted.value / self.stated < farthest
+
+    @property
+    def taken(self) -> bool:
+        """Is it to be believed?"""
+        return self.fitted.told and not self.at_bound
 
 
 @dataclass(frozen=True)
@@ -63,7 +75,7 @@ def fit(study: Study, recordings: Mapping[str, Recording], first_s: float) -> Fi
         raise PipelineError(f"no session has positions in its first {first_s:g} s")
     fitted = _sensors(study, parts)
     known = _with(sensors(study), fitted)
-    latency = next((p.fitted.value for p in fitted if p.key == "latency_s"), None)
+    latency = next((p.fitted.value for p in fitted if p.key == "latency_s" and not p.at_bound), None)
     shifted = [_late(study, part, latency) for part in parts]
     estimators: dict[str, Estimator] = {}
     for name in study.estimators:
@@ -140,7 +152,7 @@ def _with(stated: Mapping[str, Sensor], fitted: Sequence[Parameter]) -> dict[str
     found = dict(stated)
     for row in fitted:
         name = row.where.removeprefix("streams.")
-        if row.key.startswith("noise") and row.fitted.told:
+        if row.key.startswith("noise") and row.taken:
             found[name] = replace(found[name], noise_sd=row.fitted.value)
     return found
 
@@ -166,8 +178,8 @@ def _estimator(
         return np.concatenate([score(tried, part) for part in parts])
 
     found = maximise(blocks, start, [_FREE] * len(keys))
-    told = {key: one.value for key, one in zip(keys, found, strict=True) if one.told}
     rows = [Parameter(where, key, value, one) for key, value, one in zip(keys, start, found, strict=True)]
+    told = {row.key: row.fitted.value for row in rows if row.taken}
     return rows, replace(stated, sensors=used, **told)  # type: ignore[arg-type]
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
+from fusion_core.likelihood import Fitted
+from pipeline.sessions.fitting import Parameter
 from pipeline.sessions.logs.mcap import Message
 from tests.conftest import EPOCH_NS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand, run
@@ -184,6 +186,23 @@ def test_fit_prints_what_the_recordings_say(
     lines = [line for line in ran.out.splitlines() if "P1_a  fusion:" in line]
     before, after = (float(part) for part in lines[0].split(": ")[1].split(" -> "))
     assert after < before
+    assert "which agrees with [" in ran.out
+    assert "With stamp: arrival this is latency_s; with stamp: measurement it should be 0" in ran.out
+
+
+def test_fit_holds_gravity_against_study_yaml_and_takes_no_bound(
+    folder: Folder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    wrong = SWAYING.replace("[0, -9806.65, 0]", "[0, 9806.65, 0]")
+    assert wrong != SWAYING
+    root = folder(wrong)
+    write_session(root / "data" / "P1_a.mcap", swaying(20.0, (0.0, 0.0, 0.0)))
+    ran = run(capsys, monkeypatch, "fit", root, "--first", "15", "--cache", tmp_path / "cache", "--jobs", "1")
+    assert "gravity, orientation or accelerometer is wrong" in ran.out
+    assert "# P1_a: red, mean acceleration: imu: " in ran.out
+    off = Parameter("streams.tracker", "noise_sd_mm", 8.0, Fitted(0.001, 0.0009, 0.0011, True))
+    assert off.at_bound
+    assert not off.taken
 
 
 def test_fit_without_logs_says_so(
