@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fusion_core.live import Live, Readings, show
 from pipeline.simulation.compilation import compiled
 from pipeline.simulation.hand_steps import (
     DONE,
@@ -20,7 +21,6 @@ from pipeline.simulation.hand_steps import (
     Sway,
     advance,
 )
-from pipeline.simulation.live import Live, Readings, show
 from pipeline.statistics.arrays import FloatArray
 
 STEP_NS = round(STEP_S * 1e9)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fusion_core import Estimator, Samples, Sensor, accuracy
+from fusion_core.live import Readings, live
 from fusion_core.phone.orientation import rotate, rotations
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
@@ -16,7 +17,6 @@ from pipeline.sessions.recording import seeded
 from pipeline.simulation import layout as layouts
 from pipeline.simulation import loop_steps, people, sensing
 from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, Sway, hand_at
-from pipeline.simulation.live import Readings, live
 from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
 from pipeline.simulation.motion import minimum_jerk
 from pipeline.statistics.arrays import FloatArray

@@ -104,9 +104,7 @@ def test_the_sentence_of_three_conditions_prints_the_correction_of_r(folder: Fol
     assert f"F(2, 28) = {f['F']:.2f}, {p_of(f['p'])}" in anova
     assert f"Greenhouse-Geisser ε = {apa(ball['gg_eps'], 3)}, {p_of(ball['p_gg'])}" in anova
     assert anova.startswith(f"M did not differ significantly between {', '.join(reference['conditions'][:2])} and ")
-    assert (
-        f"χ²(2) = {chi['friedman']['chi2']:.2f}, {p_of(exact)}, W = {apa(chi['kendall_W'], 2)}" in ranked
-    )
+    assert f"χ²(2) = {chi['friedman']['chi2']:.2f}, {p_of(exact)}, W = {apa(chi['kendall_W'], 2)}" in ranked
     for condition, of in reference["descriptives_complete_cases"].items():
         assert f"{condition}: M = {of['mean']:.2f}, SD = {of['sd']:.2f}" in anova
 

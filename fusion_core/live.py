@@ -1,7 +1,15 @@
-"""Estimators as they run inside the loop, compiled: what each shows at an instant, from what has arrived by then.
+"""The door for a loop that runs: what an estimator shows at an instant, from what has arrived by then, compiled.
 
-The steps are fusion_core's own, so that a replay of the log gives what was displayed. An estimator that has no
-compiled form here runs through its `update` and `predict`, slower.
+Who runs a loop, a simulation or a live study, needs none of the estimators' compiled steps:
+
+- `live(estimator, names, readings, rotation, instants)` makes an estimator ready, once the times of all readings are
+  known, as they are in a simulation; `show` then writes what is displayed at an instant and may be called from compiled
+  code. It calls the very steps that `replay` calls, so a replay of the log gives what was displayed to the last bits.
+- Where readings come one by one, as in a live study, `start`, `update` and `predict` of the estimator do the same, a
+  reading at a time (`fusion_core.estimator.Estimator`). So does an estimator that has no compiled form here.
+
+What may change: `Live` and its parts are the door's own, and nobody else looks into them. What must not: `show` takes
+readings in by arrival and none that arrives after the instant, or a display would know the future.
 """
 
 from __future__ import annotations
@@ -11,16 +19,19 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fusion_core import Estimator, FusionKalman, PositionKalman, Raw, Samples, WindowGP
+from fusion_core.compilation import compiled
+from fusion_core.estimator import Estimator
+from fusion_core.filters import Raw
 from fusion_core.kalman import position_steps
 from fusion_core.kalman.event_replay import arrive
 from fusion_core.kalman.event_steps import History, Model, expect
 from fusion_core.kalman.event_time import EventTime
+from fusion_core.kalman.fusion import FusionKalman
+from fusion_core.kalman.position import PositionKalman
+from fusion_core.samples import FloatArray, Samples
 from fusion_core.window import weights as window_weights
-from fusion_core.window.gp import Schedule
-from pipeline.simulation.compilation import compiled
-from pipeline.simulation.hand_steps import IntArray
-from pipeline.statistics.arrays import FloatArray
+from fusion_core.window.gp import Schedule, WindowGP
+from fusion_core.window.kernels import IntArray
 
 _RAW, _POSITION_KALMAN, _WINDOW, _EVENT_TIME = 0, 1, 2, 3
 _UPCOMING, _OLDEST, _COUNT = 0, 1, 2
