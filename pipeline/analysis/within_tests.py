@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import groupby
 
+import numpy as np
+
 from pipeline.analysis import complete_cases, model_rows
 from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of
 from pipeline.analysis.complete_cases import Request
 from pipeline.statistics import pairs
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.art import art_anova
+from pipeline.statistics.art import art_anova, art_contrasts
 from pipeline.statistics.crossover import crossover
-from pipeline.statistics.mixed import mixed_model
+from pipeline.statistics.mixed import Factor, cells_of, mixed_model
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.rank import friedman
-from pipeline.statistics.result import Result
+from pipeline.statistics.result import IntArray, Result
+from pipeline.statistics.shape import cell_shape
 from pipeline.tables.table import Row
 
 
@@ -35,8 +38,16 @@ def anova(request: Request) -> Answer:
 
 
 def art(request: Request) -> Answer:
+    """A row an effect, with the shape of the cells; the pairs by ART-C, where follow_up is stated."""
     cases = complete_cases.by_factors_of(request)
-    return [row_of(request, result) for result in art_anova(cases.values, request.entry.within)], cases.left_out
+    shape = cell_shape(cases.values)
+    rows = [row_of(request, result) for result in art_anova(cases.values, request.entry.within)]
+    rows = [{**row, "details": {**row["details"], **shape}} for row in rows]
+    if "follow_up" in request.entry.model_fields_set and request.entry.follow_up != "none":
+        for one in art_contrasts(cases.values, request.entry.within, cases.levels):
+            row = pair_row(request, one.result, one.pair, cases)
+            rows.append({**row, "adjust": request.entry.follow_up})
+    return rows, cases.left_out
 
 
 def friedman_test(request: Request) -> Answer:
@@ -61,9 +72,8 @@ def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Calla
 def mixed_models(request: Request) -> Answer:
     """A row a term, and the pairs of levels of those that have more than two."""
     model = model_rows.of_model(request)
-    rows = [
-        row_of(request, result) for result in mixed_model(model.values, model.participants, model.columns, model.terms)
-    ]
+    results = mixed_model(model.values, model.participants, model.columns, model.terms, _random_intercepts(model))
+    rows = [row_of(request, result) for result in results]
     if model_rows.CARRY_OVER in model.columns:
         rows = [{**row, "method": f"{row['method']}; without first periods, before which nothing came"} for row in rows]
     kept: list[Row] = []
@@ -73,6 +83,19 @@ def mixed_models(request: Request) -> Answer:
         if request.entry.follow_up != "none":
             kept += [{**row, "adjust": request.entry.follow_up} for row in levels]
     return kept, model.left_out
+
+
+def _random_intercepts(model: model_rows.ModelRows) -> dict[str, IntArray]:
+    """What intercepts a model needs beside those of participants.
+
+    Where participants have several rows in a condition, each of their conditions has one: without it the rows count as
+    if each had met the condition anew, and small differences look certain.
+    """
+    condition = model.columns.get("condition")
+    if not isinstance(condition, Factor):
+        return {}
+    cells = cells_of(model.participants, condition)
+    return {"participant:condition": cells} if len(np.unique(cells)) < len(cells) else {}
 
 
 def crossover_design(request: Request) -> Answer:

@@ -31,6 +31,7 @@ class StatisticalTest:
     options: tuple[str, ...] = ()
     assumes_normality: bool = False
     assumes_sphericity: bool = False
+    ranks_aligned: bool = False
     complete_cases: bool = True
     symbol_tells: bool = False
     question: Question = "difference"
@@ -87,7 +88,8 @@ TESTS: Mapping[str, StatisticalTest] = {
             "ART ANOVA",
             "aligned rank transform",
             "ANOVA on aligned ranks (ART; partial η²)",
-            options=("within",),
+            options=("within", "follow_up"),
+            ranks_aligned=True,
             cite=("wobbrock2011",),
         ),
         StatisticalTest(

@@ -66,6 +66,7 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         text = f"by Shapiro and Wilk's test, for {_named(skewed)}: see whether a rank test says the same."
         yield (Strong("Differences are not normally distributed "), text)
     yield from _far_out(resting)
+    yield from _aligned_ranks(rows)
     singular = [row for row in rows if (row["details"] or {}).get("singular")]
     if singular:
         text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so that it"
@@ -79,6 +80,16 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
     if narrow:
         text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals hold the"
         yield (Strong("Stated uncertainty too small "), f"{text} reference in less than 90 % of instants.")
+
+
+def _aligned_ranks(rows: list[Row]) -> Iterator[Text]:
+    """Aligned ranks of skewed data: an effect leaks into the others, and there are far too many false alarms."""
+    found = [row for row in rows if TESTS[row["test"]].ranks_aligned and (row["details"] or {}).get("skewed")]
+    if found:
+        text = (
+            f"of skewed data ({_named(found)}) can find effects that are not there, where another factor has a strong"
+        )
+        yield (Strong("Aligned ranks "), f"{text} one; an analysis of variance of the logarithms holds its level.")
 
 
 def _far_out(rows: list[Row]) -> Iterator[Text]:
