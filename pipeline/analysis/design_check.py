@@ -28,6 +28,7 @@ from pipeline.words import counted, listing, p_phrase, statistic
 
 Order = tuple[str, ...]
 _NAMED = 5
+_WHOLE = 1e-9  # a count of yes is whole, but for round-off
 
 
 def findings(
@@ -53,7 +54,7 @@ def findings(
     if known:
         rows += _balance(study.conditions, list(known.values()))
         rows += [row for one in one_each for row in _order_effects(one)]
-    rows += [*_complete_people(study, one_each), *_trials(trials, one_each)]
+    rows += [*_complete_people(study, one_each), *_trials(trials, one_each), *_yes_or_no(requests)]
     return [*rows, *_sessions(requests[0].observations, sessions)]
 
 
@@ -239,6 +240,21 @@ def _trials(trials: pd.DataFrame, requests: Sequence[Request]) -> Iterator[Row]:
         rows = one.observations[one.observations["measure"] == one.measure]
         if (rows["n"] > 1).any():
             yield _per_cell("values in each cell", one.measure, rows.groupby(["participant", "condition"])["n"].sum())
+
+
+def _yes_or_no(requests: Sequence[Request]) -> Iterator[Row]:
+    """Measures whose values are all 0 or 1, in tests that take them for measurements."""
+    for measure in dict.fromkeys(one.measure for one in requests):
+        mine = [one for one in requests if one.measure == measure]
+        rows = mine[0].observations[mine[0].observations["measure"] == measure]
+        ones = (rows["value"] * rows["n"].astype("float64")).to_numpy("float64")
+        whole = len(ones) > 0 and bool((abs(ones - ones.round()) < _WHOLE).all())
+        if not (whole and rows["value"].between(0, 1).all() and rows["value"].nunique() > 1):
+            continue
+        tests = listing(list(dict.fromkeys(TESTS[one.entry.test].label for one in mine)))
+        suited = "McNemar's or Cochran's test, or a logistic model, suits such data"
+        row = {"what": "kind of values", "measure": measure, "found": "0 or 1 in every trial"}
+        yield {**row, "expected": "measurements", "remark": f"{tests} take yes and no for measurements; {suited}"}
 
 
 def _per_cell(what: str, measure: str | None, counts: pd.Series) -> Row:

@@ -82,13 +82,17 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         yield (Strong("Stated uncertainty too small "), f"{text} reference in less than 90 % of instants.")
 
 
+def _misshapen(row: Row) -> bool:
+    """Are its values skewed, or do its cells spread unlike?"""
+    details = row["details"] or {}
+    return bool(details.get("skewed") or details.get("spreads_differ"))
+
+
 def _aligned_ranks(rows: list[Row]) -> Iterator[Text]:
     """Aligned ranks of skewed data: an effect leaks into the others, and there are far too many false alarms."""
-    found = [row for row in rows if TESTS[row["test"]].ranks_aligned and (row["details"] or {}).get("skewed")]
+    found = [row for row in rows if TESTS[row["test"]].ranks_aligned and _misshapen(row)]
     if found:
-        text = (
-            f"of skewed data ({_named(found)}) can find effects that are not there, where another factor has a strong"
-        )
+        text = f"of data that are skewed or spread unlike ({_named(found)}) can find effects that are not there, where another factor has a strong"
         yield (Strong("Aligned ranks "), f"{text} one; an analysis of variance of the logarithms holds its level.")
 
 

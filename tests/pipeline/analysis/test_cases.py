@@ -222,3 +222,48 @@ def test_a_rule_of_ones_own_turns_its_reversed_items(tmp_path: Path, steadyhand:
     ran = steadyhand("compare", questionnaire(tmp_path / "b", wrong + ask, rows))
     assert ran.code == 2
     assert 'scoring.mine.reversed: there is no item "q3"' in ran.err
+
+
+def test_rows_of_one_condition_do_not_count_as_if_it_had_been_met_anew(results: Results) -> None:
+    """lmerTest, (1 | participant) + (1 | participant:condition): F(1, 11) = 0.73, p = .41."""
+    found = results("mm_slope")
+    model = rows(found, "mixed_model")[0]
+    assert (round(model["statistic"] ** 2, 2), round(model["df2"], 3), round(model["p"], 2)) == (0.73, 11, 0.41)
+    assert model["p"] == pytest.approx(rows(found, "rm_anova")[0]["p"], rel=1e-6)
+
+
+def test_aligned_ranks_of_cells_that_spread_unlike_are_cautioned_of(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    shutil.copytree(CASES / "art", tmp_path / "art")
+    assert steadyhand("report", tmp_path / "art").code == 0
+    page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
+    assert "can find effects that are not there" in page
+
+
+def test_friedmans_p_of_two_conditions_is_exact(results: Results) -> None:
+    """Five people of one mind: 2 · 2⁻⁵."""
+    assert rows(results("friedman2"), "friedman")[0]["p"] == 0.0625
+
+
+def test_digits_count_by_each_pairs_own_size(results: Results) -> None:
+    epoch = results("epoch_us")
+    (paired,), (anova,) = rows(epoch, "t_paired"), rows(epoch, "rm_anova")
+    assert paired["statistic"] == pytest.approx(13.387, abs=5e-4)
+    assert anova["statistic"] == pytest.approx(paired["statistic"] ** 2, rel=1e-9)
+
+
+def test_one_giant_value_does_not_level_the_others(results: Results) -> None:
+    assert rows(results("giant_outlier"), "wilcoxon")[0]["p"] == 0.03125
+
+
+@pytest.mark.parametrize("case", ["huge", "n2big"])
+def test_extreme_values_have_figures_or_a_reason(results: Results, case: str) -> None:
+    for row in results(case)["comparisons"]:
+        assert row["status"] != "ok" or row["statistic"] is not None
+        if row["test"] == "t_paired":
+            assert (row["ci_low"] is None) == (row["ci_high"] is None)
+
+
+def test_outcomes_of_0_and_1_are_named(results: Results) -> None:
+    remarks = [row["remark"] for row in results("errors")["design_check"] if row["what"] == "kind of values"]
+    assert len(remarks) == 1
+    assert "McNemar's or Cochran's test, or a logistic model" in remarks[0]
