@@ -244,7 +244,7 @@ def comparison_sentence(row: Row, with_change: bool = True) -> str:
     if TESTS[row["test"]].question == "evidence":
         named = f"{test_label(row)} (JZS, prior scale {row['details']['prior_scale']:g}): "
     parts = [f"{named}{head}{evidence(row)}", f"n = {row['n']}"]
-    if (row["details"] or {}).get("singular"):
+    if finds_no_variance_between_people(row):
         parts.append("singular fit: no variance between participants is found")
     if row["mean_difference"] is not None and with_change:
         parts.append(change_phrase(row))
@@ -306,6 +306,12 @@ def direction(row: Row) -> str:
     side = "lower" if row["mean_difference"] > 0 else "higher"
     better = measure(row["measure"]).better
     return side if better == "unknown" else f"{side} ({'better' if side == better else 'worse'})"
+
+
+def finds_no_variance_between_people(row: Row) -> bool:
+    """Is a mixed model's variance of participants estimated as zero? A smaller intercept may be without being told."""
+    details = row["details"] or {}
+    return bool(details.get("singular")) and not details.get("variance_participant")
 
 
 def change_phrase(row: Row) -> str:

@@ -1,8 +1,31 @@
 """What the search for a lag computes most often, compiled: costs of blocks at each shift, and the best of resamples.
 
-A resample's cost at a shift is the sum of its blocks' costs there. Shifts stand in groups of eight: a sum of the
-blocks' lowest costs within a group is below any of that group's costs, so that a group whose bound is above a cost
-already found is left out. What is found is what all costs would give.
+Theory of operation
+===================
+
+The lag of an estimate is the shift s that minimises Σ‖estimate(t) − reference(t − s)‖² over the instants t; its
+interval comes from resampling blocks of instants that follow each other (a moving-block bootstrap), hundreds of
+times. Computed as it stands that is instants × shifts × resamples distances. Two facts make it cheap:
+
+- The reference is a straight line between its readings, so an instant's squared distance is, within each piece, a
+  quadratic of the shift: three numbers a piece instead of a distance a shift (`_squared_distances`).
+- A resample's cost is the sum of its blocks' costs. So the costs of every block at every shift are computed once
+  (`block_costs`), and a resample only adds rows.
+
+And most shifts cannot be the best. Shifts stand in groups of eight, a line of memory:
+
+    shifts          | 0 … 7 | 8 … 15 | 16 … 23 | …
+    lowest a block  |   4   |    1   |     6   | …        a bound for each block and group
+
+The sum of a resample's blocks' lowest costs within a group is below each of the group's costs. A group whose bound is
+above a cost already found is left out (`best_of_resamples`), which is most of them.
+
+What must stay true. What is found is what all costs would give, to the last bit of round-off: the tests compare with
+the sum over all shifts. A stretch of shifts that fit equally well (a hand that stands still) counts by its first; a
+resample is still only where each of its blocks is (`_STILL`).
+
+What may change. The size of a group, and how blocks are picked. The cost must stay a sum over instants, or nothing of
+this holds.
 """
 
 from __future__ import annotations

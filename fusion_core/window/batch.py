@@ -1,10 +1,32 @@
 """Estimates of many windows one after the other, compiled: what a window has in common with the one before is kept.
 
-Covariances of readings among themselves do not depend on "now": each is computed once, when the later of the two comes
-into the window. A window that only gained readings at its end goes on with the Cholesky factor it has; where its first
-readings changed the factor is begun again. With the factor L, of covariances k with "now", of c, what each reads of a
-constant, and of values v, the estimate is (L⁻¹k)·(L⁻¹v), so that weights are never needed: eqs. (19) to (24) as in
-`weights`.
+Theory of operation
+===================
+
+Each estimate is a Gaussian process over its own window: the last L positions and every acceleration since the first
+of them. Solving each window anew costs the cube of its readings; but the next window is nearly the last one.
+
+    window at t      p1  a1 a2 p2 a3 a4 p3 a5
+    window at t'         a2 p2 a3 a4 p3 a5 a6        one reading fewer at the begin, one more at the end
+
+Three things are kept from window to window:
+
+- Covariances of readings among themselves do not depend on "now": each pair is computed once, when the later of the
+  two comes into the window, and stands in a table whose rows take turns (`_place`), so nothing is moved.
+- Cholesky's factor L. A window that only gained readings at its end goes on with the rows it has (`_factor`); where
+  its first readings changed, the factor is begun again (`_factor_anew`).
+- What follows from the factor for the values: L⁻¹v and L⁻¹c, with c what each reading reads of a constant mean.
+
+With k the covariances of the readings with the position now, the estimate is (L⁻¹k)·(L⁻¹v): weights are never needed,
+eqs. (19) to (24) of the paper as in `weights`. Its variance is the prior's less ‖L⁻¹k‖².
+
+What must stay true. (1) The result is that of `weights` for every window, whatever came before; the tests hold each
+window against a dense solve. (2) Where times go back, or readings say the same but for round-off so that no factor
+exists, the window is solved by itself, by least squares (`_by_weights`). (3) Rows of the factor are used only as far
+as they were computed from the readings that stand there now (`_goes_on`).
+
+What may change. The covariance function: it is a polynomial times one exponential (`kernels`), and only `kernels`
+knows it.
 """
 
 from __future__ import annotations

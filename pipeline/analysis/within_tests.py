@@ -22,6 +22,9 @@ from pipeline.statistics.result import IntArray, Result
 from pipeline.statistics.shape import cell_shape
 from pipeline.tables.table import Row
 
+_ROWS_A_CELL = 1.5
+"""From how many rows a participant's condition on, on average, its own variance can be told from that within it."""
+
 
 def anova(request: Request) -> Answer:
     """A row an effect, and the pairs that follow up those of more than two levels."""
@@ -95,7 +98,8 @@ def _random_intercepts(model: model_rows.ModelRows) -> dict[str, IntArray]:
     if not isinstance(condition, Factor):
         return {}
     cells = cells_of(model.participants, condition)
-    return {"participant:condition": cells} if len(np.unique(cells)) < len(cells) else {}
+    repeated = len(cells) >= _ROWS_A_CELL * len(np.unique(cells))
+    return {"participant:condition": cells} if repeated else {}
 
 
 def crossover_design(request: Request) -> Answer:

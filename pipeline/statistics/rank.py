@@ -1,4 +1,30 @@
-"""Rank tests: Wilcoxon signed-rank and Friedman, both exact with ties and zeros."""
+"""Rank tests: Wilcoxon signed-rank and Friedman, both exact with ties and zeros.
+
+Theory of operation
+===================
+
+Under the null hypothesis each difference is as likely to have the other sign. So the distribution of W₊, the sum of
+the ranks of positive differences, is that of a sum in which each rank is in or out by a fair coin, whatever the ranks
+are, tied or not: no table and no approximation is needed, only the number of ways to reach each sum.
+
+    ranks 1, 2.5, 2.5     doubled 2, 5, 5      ways to reach 0, 2, 5, 7, 10, 12:  1 1 2 2 1 1
+
+Midranks are halves, so doubled they are whole numbers, and the ways are a product of polynomials (1 + x^w),
+multiplied out one rank after the other (`_convolved`): sums of positive terms, so that small probabilities are as
+exact as large ones. Beyond some hundred ranks blocks are multiplied by Fourier transforms, whose error is absolute.
+There the coins are tilted so that W is expected where the tail begins (Esscher 1932), and the tilt is taken out
+again: the tail is computed where its probabilities are large.
+
+Before anything is ranked, differences that only round-off parts are made equal, and those within it zero
+(`result.rounded_differences`): 0.3 − 0.2 and 0.2 − 0.1 tie. scipy, pingouin and R do not do that, and each then
+breaks ties one way or the other.
+
+Friedman's statistic is exact in the same spirit, over the orders of each person's ranks (`friedman_exact`).
+
+What must stay true. p is the share of sign patterns with a W as far from its mean or farther: the tests enumerate all
+patterns for small n. The doubled ranks are whole numbers; anything else would need another lattice. Above
+`EXACT_UP_TO` pairs the normal approximation is taken, and `method` says so.
+"""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from pipeline.words import (
     decisive_p,
     effect_size,
     evidence,
+    finds_no_variance_between_people,
     interval,
     listing,
     number,
@@ -153,7 +154,7 @@ def _evidence(row: Row, told: Told) -> str:
     elif not TESTS[row["test"]].symbol_tells:
         named = f"{_test(row)}, "
     figures = evidence(row, _digits(row, told.alpha), _BEFORE_INTERVAL)
-    singular = ", singular fit" if (row["details"] or {}).get("singular") else ""
+    singular = ", singular fit" if finds_no_variance_between_people(row) else ""
     return f"{named}{figures}, n = {row['n']}{singular}"
 
 

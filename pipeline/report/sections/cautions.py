@@ -10,7 +10,7 @@ from pipeline.report.sections import checks
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import counted, listing, measure_label
+from pipeline.words import counted, finds_no_variance_between_people, listing, measure_label
 
 _REMARKS_MAX = 3
 _FEW = 8  # participants
@@ -67,7 +67,7 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         yield (Strong("Differences are not normally distributed "), text)
     yield from _far_out(resting)
     yield from _aligned_ranks(rows)
-    singular = [row for row in rows if (row["details"] or {}).get("singular")]
+    singular = [row for row in rows if finds_no_variance_between_people(row)]
     if singular:
         text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so that it"
         yield (Strong("Singular fit "), f"{text} treats their rows as if of different people.")
@@ -92,8 +92,9 @@ def _aligned_ranks(rows: list[Row]) -> Iterator[Text]:
     """Aligned ranks of skewed data: an effect leaks into the others, and there are far too many false alarms."""
     found = [row for row in rows if TESTS[row["test"]].ranks_aligned and _misshapen(row)]
     if found:
-        text = f"of data that are skewed or spread unlike ({_named(found)}) can find effects that are not there, where another factor has a strong"
-        yield (Strong("Aligned ranks "), f"{text} one; an analysis of variance of the logarithms holds its level.")
+        named = _named(found)
+        text = f"of data that are skewed or spread unlike ({named}) can find effects that are not there, where another"
+        yield (Strong("Aligned ranks "), f"{text} factor has a strong one; an ANOVA of the logarithms holds its level.")
 
 
 def _far_out(rows: list[Row]) -> Iterator[Text]:

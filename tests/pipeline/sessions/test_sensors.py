@@ -193,7 +193,7 @@ def test_fit_prints_what_the_recordings_say(
 def test_fit_holds_gravity_against_study_yaml_and_takes_no_bound(
     folder: Folder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    wrong = SWAYING.replace("[0, -9806.65, 0]", "[0, 9806.65, 0]")
+    wrong = SWAYING.replace("[0, 0, -9806.65]", "[0, 0, 9806.65]")
     assert wrong != SWAYING
     root = folder(wrong)
     write_session(root / "data" / "P1_a.mcap", swaying(20.0, (0.0, 0.0, 0.0)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -48,7 +49,6 @@ MODELS = {
     "lmm_condition_period": "fixed: [condition, period]",
     "lmm_condition_period_factor": "fixed: [condition, factor(period)]",
     "lmm_condition_period_carryover": "fixed: [condition, factor(period), carry_over]",
-    "lmm_two_way": "fixed: [condition, task, 'condition:task']",
 }
 TERMS = {"period_f": "period", "carry": "carry_over"}
 """What R's formulas call our terms."""
@@ -88,8 +88,34 @@ def test_mixed_models_against_lmertest(
         same(row["statistic"] ** (2 if row["statistic_name"] == "t" else 1), test["F"], MODEL)
         same(row["df2"], test["df2"], SATTERTHWAITE)
         same(row["p"], test["p"], SATTERTHWAITE)
-    if model != "lmm_two_way":
-        _treatment_contrasts(rows, wanted["fixed"], conditions[0])
+    _treatment_contrasts(rows, wanted["fixed"], conditions[0])
+
+
+TWO_WAY = [case for case in with_key("tasks") if "lmm_two_way" in of_models(case, "mean_over_tasks")]
+
+
+@pytest.mark.parametrize("case", TWO_WAY)
+def test_a_two_way_model_with_one_random_intercept_against_lmertest(case: str) -> None:
+    """R's model has (1 | participant) alone; a study's has (1 | participant:condition) too, with cases of its own."""
+    wanted = of_models(case, "mean_over_tasks")["lmm_two_way"]
+    data = list(csv.DictReader((CASES / case / "data.csv").read_text().splitlines()))
+    values = np.array([float(row["value"]) for row in data])
+
+    def factor(name: str) -> Factor:
+        levels = tuple(expected(case)["levels_order"][name])
+        return Factor(levels, np.array([levels.index(row[name]) for row in data], dtype=np.int64))
+
+    columns = {name: factor(name) for name in ("condition", "task")}
+    people = [row["participant"] for row in data]
+    found = mixed_model(values, people, columns, ["condition", "task", "condition:task"])
+    same(found[0].details["variance_participant"], wanted["var_participant"], MODEL)
+    assert found[0].details["singular"] == wanted["singular"]
+    for term, test in wanted["anova_type3_satterthwaite"].items():
+        row = next(one for one in found if one.effect == term)
+        assert row.statistic is not None
+        same(row.statistic ** (2 if row.statistic_name == "t" else 1), test["F"], MODEL)
+        same(row.df2, test["df2"], SATTERTHWAITE)
+        same(row.p, test["p"], SATTERTHWAITE)
 
 
 @pytest.mark.parametrize("case", with_key("lmm_condition_period"))

@@ -267,7 +267,7 @@ def test_the_answer_and_what_it_means(power: Power) -> None:
 def test_the_ways_to_state_an_effect(power: Power) -> None:
     stated = power("--difference", "12", "--sd", "24", "--correlation", "0.5", *QUICK)
     assert "A difference of 12 at an SD of 24 within each condition: d = 0.50" in stated.out
-    assert "r = .50: the correlation of a participant's values in two conditions\n" in stated.out
+    assert "r = .50: correlation of a participant's values in two conditions\n" in stated.out
     assert "Closed form (noncentral t): 34 participants." in stated.out
     assumed = power("--difference", "12", "--sd", "24", *QUICK)
     assert "in two conditions (assumed; --correlation states it)" in assumed.out
