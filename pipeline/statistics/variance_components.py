@@ -32,6 +32,8 @@ from pipeline.statistics.satterthwaite import Fit
 
 _STARTS = (0.01, 0.1, 0.5, 2.0, 10.0)  # of τ
 _SINGULAR = 1e-8  # a τ so small is zero, as in lme4
+_TRACE = 1e-3  # so small a τ may be what the search stopped at on its way to zero
+_SAME_DEVIANCE = 1e-8
 _LARGEST = 1e12
 _DISTINCT = 1e-8  # of the least eigenvalue of the variances' correlations: below, two of them are one
 _STEPS = 50
@@ -209,8 +211,16 @@ def _highest(matrices: _Matrices) -> FloatArray:
         if not np.any(rising):
             break
         roots = np.where(rising, 0.01, roots)
-    result: FloatArray = roots**2
-    return result
+    return _without_traces(matrices, roots**2)
+
+
+def _without_traces(matrices: _Matrices, ratios: FloatArray) -> FloatArray:
+    """Zero for a τ that the search left just above it, where the deviance is no higher there but for round-off."""
+    for place in np.flatnonzero((ratios > _SINGULAR) & (ratios < _TRACE)):
+        at_zero = np.where(np.arange(len(ratios)) == place, 0.0, ratios)
+        if _Solved(matrices, at_zero).deviance <= _Solved(matrices, ratios).deviance + _SAME_DEVIANCE:
+            ratios = at_zero
+    return ratios
 
 
 def _polished(matrices: _Matrices, ratios: FloatArray) -> FloatArray | None:
