@@ -1,6 +1,7 @@
 """What a table is: its record, its columns, and the columns that several tables share.
 
-The records stand in `session_tables`, `study_tables` and `command_tables`; `catalogue` has all of them by name.
+The records stand in `session_tables`, `recording_tables`, `study_tables` and `command_tables`; `catalogue` has all of
+them by name.
 """
 
 from __future__ import annotations
