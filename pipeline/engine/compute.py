@@ -23,10 +23,16 @@ def compute_all(stage: Stage, pieces: Sequence[Piece], cache_root: Path) -> list
     return [compute(stage, work, key, cache_root) for work, key in pieces]
 
 
-def compute_with_processes(stage: Stage, work: Work, key: str, cache_root: Path, count: int) -> Entry:
-    """A piece of work whose jobs are done by `count` processes of its own."""
-    with Processes(count) as executor:
+def compute_with_helpers(stage: Stage, work: Work, key: str, cache_root: Path, processes: Processes) -> Entry:
+    """A piece of work in this process, whose jobs all but one of the processes may do: this one is at work too."""
+    with processes.all_but_one() as executor:
         return compute(stage, replace(work, executor=executor), key, cache_root)
+
+
+def compute_with_own_helpers(stage: Stage, work: Work, key: str, cache_root: Path, count: int) -> Entry:
+    """The same, of `count` processes that are started for it."""
+    with Processes(count) as processes:
+        return compute_with_helpers(stage, work, key, cache_root, processes)
 
 
 def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import replace
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Any
 
 from pipeline.engine.cache import Cache, Entry
-from pipeline.engine.compute import Piece, compute, compute_all, compute_with_processes, keep_unusable
+from pipeline.engine.compute import (
+    Piece,
+    compute,
+    compute_all,
+    compute_with_helpers,
+    compute_with_own_helpers,
+    keep_unusable,
+)
 from pipeline.engine.processes import InThisProcess, Processes, in_a_process_of_its_own
 from pipeline.engine.resources import Resources
 from pipeline.engine.result import Damaged, Result
@@ -64,29 +70,23 @@ def _compute_study(stage: Stage, work: Work, key: str, resources: Resources) -> 
 
     Joining the tables of an archive takes memory that Python hardly gives back; a process that ends does.
     """
-    cache_root, helpers = resources.cache.root, _helpers(resources.executor)
-    if len(work.sessions) < resources.archive_sessions or isinstance(resources.executor, InThisProcess):
-        return compute(stage, replace(work, executor=helpers), key, cache_root)
-    if helpers is None:
-        return _compute_apart(stage, compute, stage, work, key, cache_root)
-    # Its jobs cannot come back through the pipe to the processes of this run, so that process has as many of its own.
-    # Those of the run end before, with all they hold: never are there more of them at once than the user allowed.
-    helpers.end_idle()
-    return _compute_apart(stage, compute_with_processes, stage, work, key, cache_root, helpers.count)
+    cache_root, executor = resources.cache.root, resources.executor
+    apart = len(work.sessions) >= resources.archive_sessions and not isinstance(executor, InThisProcess)
+    if not isinstance(executor, Processes):
+        # Also with Dask a stage does its jobs itself. They write files into a folder of the cache; what a worker on
+        # another machine writes there may be seen here late, and sending it tables costs more than drawing them.
+        return _compute_apart(compute, stage, work, key, cache_root) if apart else compute(stage, work, key, cache_root)
+    if not apart:
+        return compute_with_helpers(stage, work, key, cache_root, executor)
+    # Its jobs cannot come back through the pipe to the processes of this run, so that process has some of its own.
+    # Those of the run end before, with all they hold: no more are at work at once than the user allowed.
+    executor.end_idle()
+    return _compute_apart(compute_with_own_helpers, stage, work, key, cache_root, executor.count)
 
 
-def _helpers(executor: Executor) -> Processes | None:
-    """Processes for a stage's small jobs; None: the stage does them itself.
-
-    The jobs write files into a folder of the cache. Workers of a Dask cluster see that folder too, where it is shared,
-    but what another machine writes may be seen here late, and tables travel further than the drawing of them is worth.
-    """
-    return executor if isinstance(executor, Processes) else None
-
-
-def _compute_apart(stage: Stage, function: Callable[..., Entry], *arguments: Any) -> Entry:
+def _compute_apart(function: Callable[..., Entry], stage: Stage, *arguments: Any) -> Entry:
     try:
-        entry: Entry = in_a_process_of_its_own(function, *arguments)
+        entry: Entry = in_a_process_of_its_own(function, stage, *arguments)
     except WorkerLostError as error:
         raise PipelineError(
             f'the process computing stage "{stage.name}" died ({error}), possibly out of memory. {RUN_AGAIN}'

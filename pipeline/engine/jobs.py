@@ -15,8 +15,9 @@ class Jobs:
     """Jobs that an executor does meanwhile; at the end of the `with` block all of them are done.
 
     A job is a function of a module, with arguments that can be pickled, that writes a file of its own. So it does not
-    matter which process does it or when, and a job whose process died is done here once more. Without an executor
-    each is done here, when it is added.
+    matter which process does it or when. The executor begins with the first; at the end of the block this process
+    helps, beginning with the last, and does once more what a process was at that died. Without an executor each job
+    is done here, when it is added.
     """
 
     def __init__(self, executor: Executor | None = None) -> None:
@@ -42,7 +43,12 @@ class Jobs:
             wait([future for future, _ in self._added])
 
     def _finish(self) -> None:
+        for future, do_here in reversed(self._added):
+            if future.cancel():  # nobody has begun it
+                do_here()
         for future, do_here in self._added:
+            if future.cancelled():
+                continue
             try:
                 future.result()
             except WorkerLostError:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import sys
-import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -29,7 +28,7 @@ class InThisProcess(Executor):
 
 
 class Processes(Executor):
-    """Up to `count` processes of this machine, each with a thread here that hands it one call at a time.
+    """Up to `count` processes of this machine. Each computes one call at a time, for which a thread waits here.
 
     Python's own ProcessPoolExecutor is not used because it breaks as a whole when one of its processes dies, and
     does not say which call killed it. Here a process that dies takes one call with it, whose future raises
@@ -39,28 +38,44 @@ class Processes(Executor):
     def __init__(self, count: int) -> None:
         self.count = count
         self._threads = ThreadPoolExecutor(count)
-        self._own = threading.local()
         self._started: list[_Process] = []
+        self._idle: list[_Process] = []
         self._stopping = False
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Compute in the next process that is free; none is started before there is work."""
-        return self._threads.submit(self._call, fn, args, kwargs)
+        return self._threads.submit(self.call, fn, args, kwargs)
 
-    def _call(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        process: _Process | None = getattr(self._own, "process", None)
-        if process is None or not process.alive:
-            process = self._own.process = _Process()
+    def call(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+        """Compute in some process, and wait for it."""
+        try:
+            process = self._idle.pop()  # the last one used, so that few calls at once need few processes
+        except IndexError:
+            process = _Process()
             self._started.append(process)
         if self._stopping:  # `shutdown` may have gone through the list before this one was in it
             process.stop()
-        return process.call(fn, args, kwargs)
+        try:
+            return process.call(fn, args, kwargs)
+        finally:
+            if process.alive:
+                self._idle.append(process)
+
+    @contextmanager
+    def all_but_one(self) -> Iterator[Executor | None]:
+        """An executor over these processes that leaves one out, for a caller that is at work itself; None of one."""
+        if self.count == 1:
+            yield None
+            return
+        with _Fewer(self, self.count - 1) as fewer:
+            yield fewer
 
     def end_idle(self) -> None:
         """End the processes, which gives their memory back; later calls start others. Only between calls."""
         for process in self._started:
             process.stop()
         self._started.clear()
+        self._idle.clear()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Stop the processes, also those at work; a call they were at raises WorkerLostError."""
@@ -69,6 +84,22 @@ class Processes(Executor):
         for process in self._started:
             process.stop()
         self._threads.shutdown(wait=wait, cancel_futures=True)
+
+
+class _Fewer(Executor):
+    """Some of the processes of an executor."""
+
+    def __init__(self, processes: Processes, count: int) -> None:
+        self._processes = processes
+        self._threads = ThreadPoolExecutor(count)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute in one of them."""
+        return self._threads.submit(self._processes.call, fn, args, kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Wait for calls; the processes go on."""
+        self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
 
 
 def in_a_process_of_its_own(fn: Callable[..., Any], *args: Any) -> Any:

@@ -21,11 +21,12 @@ def run(work: Work) -> Outcome:
         (work.out / folder).mkdir()
     with Jobs(work.executor if len(work.sessions) >= _MANY else None) as jobs:
         material = _material(work, jobs)
-        for name in AS_CSV:
-            tables.write_csv(name, material.table(name), work.out / "tables")
         sections = tuple(section for make in SECTIONS if (section := make(material)) is not None)
         sections += glossary.of(sections)
-        traces.write(material, work.out / traces.PAGE)  # here, for other processes would have to be sent all of it
+        # The rest is done here meanwhile: other processes would have to be sent most of the tables for it.
+        for name in AS_CSV:
+            tables.write_csv(name, material.table(name), work.out / "tables")
+        traces.write(material, work.out / traces.PAGE)
         participants.write(material, work.out / participants.FOLDER)
         (work.out / paste.BIBLIOGRAPHY).write_text(paste.bibtex(material), encoding="utf-8")
     # Both renderings hold the figures, which are all drawn now.

@@ -125,7 +125,7 @@ def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(study: Path, tm
 def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: Path, tmp_path: Path) -> None:
     """So that no more of them are there at once than the user allowed."""
     noting = replace(COMPARE[3], function="tests.pipeline.dying:note_helper")
-    with Processes(1) as executor:
+    with Processes(2) as executor:
         of_run = executor.submit(os.getpid).result()
         apart = bring_up_to_date(
             study,
@@ -134,13 +134,13 @@ def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: P
         )
         with pytest.raises(ProcessLookupError):
             os.kill(of_run, 0)
-        of_run = executor.submit(os.getpid).result()
         here = bring_up_to_date(
             study, (*COMPARE[:3], noting), Resources(Cache(tmp_path / "here"), executor, PlainLines())
         )
     computed_in, helped_by = (apart.entry("measure") / "processes").read_text().split()
     assert len({computed_in, helped_by, str(os.getpid())}) == 3
-    assert (here.entry("measure") / "processes").read_text().split() == [str(os.getpid()), str(of_run)]
+    computed_in, helped_by = (here.entry("measure") / "processes").read_text().split()
+    assert computed_in == str(os.getpid()) != helped_by
 
 
 @pytest.mark.parametrize("options", [("--jobs", "1"), ("--jobs", "2", "--executor", "inline")])

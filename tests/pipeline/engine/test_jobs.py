@@ -62,15 +62,23 @@ def test_every_job_is_done_once(tmp_path: Path, count: int, executor: Executor |
     assert read(tmp_path) == [str(number) for number in range(count)]
 
 
-def test_jobs_are_done_by_the_processes_of_the_executor_and_without_one_here(
-    tmp_path: Path, executor: Executor | None, processes: Processes
-) -> None:
+def test_the_executor_does_jobs_while_more_are_added(tmp_path: Path, executor: Executor | None) -> None:
     with Jobs(executor) as jobs:
-        for number in range(10):
+        jobs.add(note_process, tmp_path, 0)
+        end = time.monotonic() + 60
+        while not read(tmp_path) or not read(tmp_path)[0]:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+    assert (read(tmp_path) == [str(os.getpid())]) == (not isinstance(executor, Processes))
+
+
+def test_what_the_executor_has_not_begun_is_done_here(tmp_path: Path) -> None:
+    with Processes(1) as executor, Jobs(executor) as jobs:
+        jobs.add(time.sleep, 1)
+        for number in range(20):
             jobs.add(note_process, tmp_path, number)
-    done_here = {str(os.getpid())}
-    assert (set(read(tmp_path)) == done_here) == (executor is not processes)
-    assert set(read(tmp_path)).isdisjoint(done_here) == (executor is processes)
+    assert len(read(tmp_path)) == 20
+    assert read(tmp_path)[-1] == str(os.getpid())
 
 
 def test_what_a_dying_process_leaves_is_done_here(tmp_path: Path, processes: Processes) -> None:
@@ -101,6 +109,21 @@ def test_an_error_beside_the_jobs_ends_them(tmp_path: Path, processes: Processes
     assert len(written) < 50
     time.sleep(0.5)
     assert read(tmp_path) == written
+
+
+def test_all_but_one_process_help_and_the_fewest_are_started(tmp_path: Path) -> None:
+    with Processes(3) as executor:
+        first = executor.submit(os.getpid).result()
+        with executor.all_but_one() as helpers:
+            assert helpers is not None
+            assert [helpers.submit(os.getpid).result() for _ in range(5)] == [first] * 5
+            asleep = [helpers.submit(time.sleep, 0.3) for _ in range(3)]
+            while not all(future.running() for future in asleep[:2]):
+                time.sleep(0.01)
+            assert not asleep[2].running()
+        assert executor.submit(os.getpid).result()
+    with Processes(1) as executor, executor.all_but_one() as helpers:
+        assert helpers is None
 
 
 def test_processes_that_end_while_idle_are_replaced(tmp_path: Path) -> None:
