@@ -37,6 +37,7 @@ from scipy import optimize, signal, special, stats
 from pipeline.statistics import ALL_ZERO
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.friedman_exact import friedman_p
+from pipeline.statistics.rank_biserial import rank_biserial, rank_biserial_interval
 from pipeline.statistics.result import (
     IntArray,
     Result,
@@ -51,6 +52,8 @@ from pipeline.statistics.result import (
 EXACT_UP_TO = 3000  # pairs: beyond, the Walsh averages alone would fill the memory
 _BLOCK = 256
 _SHARPEST = -50.0
+NO_SPREAD = "no interval: leaving out one participant after the other shows no spread to judge by"
+TWO_PEOPLE = "no interval: it needs three participants"
 _BY_CHI2 = "Friedman, chi-squared approximation, ties corrected"
 _BY_ORDERS = "Friedman, exact over all orders of each participant's ranks, ties corrected"
 _BY_SIGNS = "Friedman of two conditions, exact: the sign test"
@@ -65,7 +68,7 @@ def wilcoxon(
     """Signed-rank test of first − second, two-sided, by the exact distribution of W₊ over all signs of the midranks.
 
     Zeros are dropped (Wilcoxon) or ranked and then dropped (Pratt 1959). Effect size: matched-pairs rank-biserial
-    correlation (Kerby 2014) with an interval by Fisher's z.
+    correlation with an interval by the jackknife, which leaves out 0 where p is below .05 and nowhere else.
     """
     n = len(first)
     treatment = "zeros dropped" if zeros == "dropped" else "zeros by Pratt"
@@ -75,17 +78,13 @@ def wilcoxon(
     status = too_few(n) or (None if np.any(differences) else ALL_ZERO)
     if status is not None:
         return replace(blank, status=status)
-    nonzero = differences != 0
+    sizes, nonzero = np.abs(differences), differences != 0
+    ranks = stats.rankdata(sizes)
     if zeros == "dropped":
-        ranks = stats.rankdata(np.abs(differences[nonzero]))
-        all_ranks = float(ranks.sum())
-    else:
-        every = stats.rankdata(np.abs(differences))
-        ranks, all_ranks = every[nonzero], float(every.sum())
-    w_plus = float(ranks[differences[nonzero] > 0].sum())
-    w_minus = float(ranks[differences[nonzero] < 0].sum())
-    biserial = (w_plus - w_minus) / all_ranks
-    low, high = _biserial_interval(biserial, n)
+        ranks = np.where(nonzero, ranks - np.count_nonzero(~nonzero), 0.0)
+    w_plus, w_minus = (float(ranks[side].sum()) for side in (differences > 0, differences < 0))
+    p = signed_rank_p(ranks[nonzero], w_plus)
+    low, high = rank_biserial_interval(differences, ranks, p)
     location, interval = hodges_lehmann(differences) if n <= EXACT_UP_TO else (None, None)
     details = {
         "w_plus": w_plus,
@@ -98,8 +97,8 @@ def wilcoxon(
     return replace(
         blank,
         statistic=w_plus,
-        p=signed_rank_p(ranks, w_plus),
-        effect_size=biserial,
+        p=p,
+        effect_size=rank_biserial(differences, ranks),
         ci_low=low,
         ci_high=high,
         details=details,
@@ -164,16 +163,6 @@ def _convolved(weights: IntArray, chances: FloatArray) -> FloatArray:
     return probability
 
 
-def _biserial_interval(correlation: float, n: int, level: float = 0.95) -> tuple[float | None, float | None]:
-    """By Fisher's z with the variance of the signed-rank statistic; None at ±1, where z is infinite."""
-    if abs(correlation) >= 1:
-        return None, None
-    error = np.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / ((n**2 + n) / 2)
-    margin = float(stats.norm.ppf((1 + level) / 2)) * error
-    z = np.arctanh(correlation)
-    return float(np.tanh(z - margin)), float(np.tanh(z + margin))
-
-
 def hodges_lehmann(differences: FloatArray, level: float = 0.95) -> tuple[float, tuple[float, float] | None]:
     """Median of all Walsh averages, and its exact interval; None where n is too small for the level."""
     n = len(differences)
@@ -217,6 +206,7 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
             "chi2_p": by_chi2,
             "iman_davenport_f": f,
             "iman_davenport_p": None if f is None else float(stats.f.sf(f, k - 1, (k - 1) * (n - 1))),
+            **({"no_interval": NO_SPREAD if n > 2 else TWO_PEOPLE} if low is None else {}),
         },
     )
 

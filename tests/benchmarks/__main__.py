@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fusion_core import ESTIMATORS, Estimator, FusionKalman, Samples, Sensor, WindowGP, replay_loop
-from tests.benchmarks import archive, peers
+from tests.benchmarks import archive, coverage, peers
 from tests.benchmarks.error_rates import error_rates
 from tests.benchmarks.people import people
 from tests.benchmarks.reading import reading
@@ -145,5 +145,6 @@ if __name__ == "__main__":
     reading(SESSION_S)
     starting()
     people()
+    coverage.rank_biserial()
     archive.measure(archive.SMALL)
     error_rates()
