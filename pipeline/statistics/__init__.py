@@ -18,6 +18,13 @@ EMPTY_GROUP = "undefined: a group has no participant"
 ONE_IN_GROUP = "undefined: a group has only one participant"
 EQUAL_IN_GROUP = "undefined: all values of one group are equal, so its mean has no standard error"
 EQUAL_IN_GROUPS = "undefined: no value varies within its group, so there is no error to test against"
+NOT_BINARY = "undefined: there are values other than 0 and 1"
+NOT_COUNTS = "undefined: there are values that are no counts, or an exposure that is not above 0"
+ONE_LEVEL = "undefined: a condition has no value"
+SEPARATED = (
+    "undefined: in one condition all answers are the same, or no event was counted, so its odds or rate has no log"
+)
+NOT_CONVERGED = "undefined: the estimation did not converge"
 ONE_ITEM = "undefined: a scale of one item has no internal consistency"
 NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
 NO_RESIDUAL = "undefined: no value varies within its cell, so the model has no residual"
@@ -40,6 +47,11 @@ STATUSES = (
     ONE_IN_GROUP,
     EQUAL_IN_GROUP,
     EQUAL_IN_GROUPS,
+    NOT_BINARY,
+    NOT_COUNTS,
+    ONE_LEVEL,
+    SEPARATED,
+    NOT_CONVERGED,
     ONE_ITEM,
     NO_TOTAL_VARIES,
     NO_RESIDUAL,

@@ -1,0 +1,152 @@
+"""Errors and counts of many trials a person: generalized estimating equations, participants being the clusters.
+
+Each condition has a mean on the scale of the link (log odds of an error, log rate of events), and differences between
+conditions are ratios. How a person's trials depend on each other is not modelled but allowed for: standard errors come
+from how much the participants' own residuals add up (Liang and Zeger 1986), corrected for few participants (Mancl and
+DeRouen 2001), and t has as many degrees of freedom as there are participants less conditions. Counts may so vary more
+than Poisson's law has it, as a negative binomial law would allow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from pipeline.statistics import (
+    NO_ERROR,
+    NO_VARIATION,
+    NOT_BINARY,
+    NOT_CONVERGED,
+    NOT_COUNTS,
+    ONE_LEVEL,
+    SEPARATED,
+    TOO_FEW_VALUES,
+    with_statsmodels,
+)
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.result import IntArray, Result, too_few
+from pipeline.statistics.with_statsmodels import Estimated
+
+Family = Literal["logit", "poisson"]
+_METHODS = {
+    "logit": "logistic GEE, participants as clusters, Mancl-DeRouen standard errors, t",
+    "poisson": "Poisson GEE (log rate), participants as clusters, Mancl-DeRouen standard errors, t",
+}
+_RATIOS = {"logit": "odds ratio", "poisson": "rate ratio"}
+_NO_SPREAD = 1e-18  # of a log ratio's variance: everybody's trials came out alike
+EACH_PAIR = "no effect size of more than two conditions: each pair has its own"
+
+
+@dataclass(frozen=True)
+class Trials:
+    """One row a trial (N,): what came of it, whose, in which condition; of counts also the time or chances it had."""
+
+    outcome: FloatArray
+    participants: Sequence[str]
+    conditions: IntArray
+    exposure: FloatArray | None = None
+
+
+def gee(trials: Trials, levels: Sequence[str], family: Family, effect: str = "condition") -> list[Result]:
+    """Test a condition's effect on errors (0 or 1, `logit`) or counts (`poisson`) of all trials that there are.
+
+    Of two conditions one row, t; of more first their F, then the t of every two. Effect size: the odds ratio or rate
+    ratio, first over second condition, with its interval.
+    """
+    people = {name: index for index, name in enumerate(dict.fromkeys(trials.participants))}
+    clusters = np.array([people[name] for name in trials.participants], dtype=np.int64)
+    blank = Result(effect, "t", _METHODS[family], _RATIOS[family], len(people))
+    pairs = [f"{one} - {other}" for one, other in combinations(levels, 2)]
+    found = _undefined(trials, len(levels), len(people), family) or _estimated(trials, clusters, len(levels), family)
+    if isinstance(found, str):
+        rows = [replace(blank, contrast=pair, status=found) for pair in pairs]
+        return rows if len(levels) == 2 else [replace(blank, statistic_name="F", status=found), *rows]
+    df = float(len(people) - len(levels))
+    told = {"n_observations": len(clusters), "dispersion": found.dispersion, "means": found.means.tolist()}
+    whole = [] if len(levels) == 2 else [_f_row(replace(blank, details=told), found, df)]
+    return [*whole, *_pair_rows(replace(blank, details=told), found, df, pairs)]
+
+
+def _undefined(trials: Trials, k: int, people: int, family: Family) -> str | None:
+    """Why nothing can be estimated, or None."""
+    if status := too_few(people):
+        return status
+    seen = np.bincount(trials.conditions, minlength=k)
+    if k < 2 or not seen.all():
+        return ONE_LEVEL
+    if not _fits(trials, family):
+        return NOT_BINARY if family == "logit" else NOT_COUNTS
+    means = np.bincount(trials.conditions, trials.outcome, k) / seen
+    at_end = (means == 0) | ((means == 1) & (family == "logit"))
+    if at_end.any():
+        return NO_VARIATION if np.ptp(means) == 0 else SEPARATED
+    return TOO_FEW_VALUES if people <= k else None
+
+
+def _fits(trials: Trials, family: Family) -> bool:
+    """Are the outcomes what the family is of?"""
+    if family == "logit":
+        return bool(np.isin(trials.outcome, (0.0, 1.0)).all())
+    exposed = trials.exposure is None or (trials.exposure > 0).all()
+    return bool(exposed and ((trials.outcome >= 0) & (trials.outcome % 1 == 0)).all())
+
+
+def _estimated(trials: Trials, clusters: IntArray, k: int, family: Family) -> Estimated | str:
+    """The conditions' log odds or log rates and their covariances, or why there are none."""
+    found = with_statsmodels.gee(trials.outcome, clusters, trials.conditions, k, family, trials.exposure)
+    if found is None or not (np.isfinite(found.covariance).all() and np.isfinite(found.estimates).all()):
+        return NOT_CONVERGED
+    return found
+
+
+def _f_row(blank: Result, found: Estimated, df: float) -> Result:
+    """Are all conditions alike? Wald's W of q contrasts, scaled as Hotelling's T² is: F = W · (df − q + 1)/(q · df)."""
+    blank = replace(blank, statistic_name="F", effect_size_name="")
+    q = len(found.estimates) - 1
+    contrasts = np.hstack([np.ones((q, 1)), -np.eye(q)])
+    covariance = contrasts @ found.covariance @ contrasts.T
+    df2 = df - q + 1
+    if df2 < 1:
+        return replace(blank, status=TOO_FEW_VALUES)
+    if np.linalg.matrix_rank(covariance) < q or float(np.trace(covariance)) < _NO_SPREAD:
+        return replace(blank, status=NO_ERROR)
+    difference = contrasts @ found.estimates
+    statistic = float(difference @ np.linalg.solve(covariance, difference)) * df2 / (q * df)
+    details = {**blank.details, "no_effect_size": EACH_PAIR}
+    p = float(stats.f.sf(statistic, q, df2))
+    return replace(blank, statistic=statistic, df1=float(q), df2=df2, p=p, details=details)
+
+
+def _pair_rows(blank: Result, found: Estimated, df: float, pairs: Sequence[str]) -> Iterator[Result]:
+    k = len(found.estimates)
+    for (i, j), pair in zip(combinations(range(k), 2), pairs, strict=True):
+        weights = np.eye(k)[i] - np.eye(k)[j]
+        log_ratio, variance = float(weights @ found.estimates), float(weights @ found.covariance @ weights)
+        if variance < _NO_SPREAD:
+            yield replace(blank, contrast=pair, status=NO_ERROR)
+            continue
+        error = float(np.sqrt(variance))
+        uncorrected = float(np.sqrt(weights @ found.uncorrected @ weights))
+        margin = float(stats.t.ppf(0.975, df)) * error
+        yield replace(
+            blank,
+            contrast=pair,
+            statistic=log_ratio / error,
+            df2=df,
+            p=float(2 * stats.t.sf(abs(log_ratio) / error, df)),
+            effect_size=float(np.exp(log_ratio)),
+            ci_low=float(np.exp(log_ratio - margin)),
+            ci_high=float(np.exp(log_ratio + margin)),
+            details={
+                **blank.details,
+                "log_ratio": log_ratio,
+                "se": error,
+                "se_uncorrected": uncorrected,
+                "z_p": float(2 * stats.norm.sf(abs(log_ratio) / uncorrected)),
+            },
+        )
