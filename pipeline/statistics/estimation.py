@@ -1,0 +1,121 @@
+"""Estimates beside a test of two conditions: bootstrap intervals, a permutation p, intervals within participants."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from pipeline.statistics.arrays import FloatArray, at_unit_scale
+from pipeline.statistics.result import rounded_differences
+
+RESAMPLES = 9_999
+PERMUTATIONS = 99_999
+EXACT_UP_TO = 20  # participants: a million signs
+_FROM = 5  # participants: of fewer, too many resamples are one person alone
+_AT_ONCE = 2**14
+TOO_FEW_TO_RESAMPLE = f"no bootstrap: it needs {_FROM} participants"
+ALL_EQUAL = "no bootstrap: all differences are equal"
+UNBOUNDED = "no bootstrap interval: too many resamples have no spread"
+
+
+def bootstrap(first: FloatArray, second: FloatArray, seed: int, level: float = 0.95) -> dict[str, Any]:
+    """For `details`: BCa intervals (Efron 1987) of the mean of first − second and of d_z, participants resampled.
+
+    `bootstrap_ci_difference` and `bootstrap_ci_dz`, each [low, high] or None with `no_bootstrap` saying why, and
+    `bootstrap_resamples`, `bootstrap_seed`. The same for the same seed.
+    """
+    (values,), exponent = at_unit_scale([rounded_differences(first, second)])
+    told: dict[str, Any] = {"bootstrap_resamples": RESAMPLES, "bootstrap_seed": seed}
+    reason = TOO_FEW_TO_RESAMPLE if len(values) < _FROM else ALL_EQUAL if np.ptp(values) == 0 else None
+    if reason is not None:
+        return {"bootstrap_ci_difference": None, "bootstrap_ci_dz": None, **told, "no_bootstrap": reason}
+    mean, dz = _bca(values, _mean, seed, level), _bca(values, _dz, seed, level)
+    if mean is None or dz is None:
+        told["no_bootstrap"] = UNBOUNDED
+    return {
+        "bootstrap_ci_difference": None if mean is None else [float(np.ldexp(bound, exponent)) for bound in mean],
+        "bootstrap_ci_dz": dz,
+        **told,
+    }
+
+
+def _mean(values: FloatArray, axis: int = -1) -> FloatArray:
+    mean: FloatArray = np.mean(values, axis=axis)
+    return mean
+
+
+def _dz(values: FloatArray, axis: int = -1) -> FloatArray:
+    """Infinite where all values are equal, as those of a resample can be; 0 where they are zero."""
+    mean, sd = np.mean(values, axis=axis), np.std(values, axis=axis, ddof=1)
+    flat = np.ptp(values, axis=axis) == 0
+    ratio: FloatArray = mean / np.where(flat, 1.0, sd)
+    return np.where(flat & (mean != 0), np.copysign(np.inf, mean), ratio)
+
+
+def _bca(values: FloatArray, statistic: Any, seed: int, level: float) -> list[float] | None:
+    random = np.random.default_rng(seed)
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        found = stats.bootstrap(
+            (values,), statistic, n_resamples=RESAMPLES, confidence_level=level, method="BCa", rng=random
+        )
+    bounds = [float(found.confidence_interval.low), float(found.confidence_interval.high)]
+    return bounds if np.isfinite(bounds).all() else None
+
+
+def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, Any]:
+    """For `details`: p when each participant's two values may as well be exchanged, of the mean difference, two-sided.
+
+    `permutation_p`; `permutation_exact`: are all 2ⁿ exchanges gone through, as up to 20 participants? Else of 99,999
+    drawn at random, the one found counted among them (Phipson and Smyth 2010), and `permutation_p_error` is the
+    standard error of that. `permutation_count` is how many.
+    """
+    (values,), _ = at_unit_scale([rounded_differences(first, second)])
+    n = len(values)
+    exact = n <= EXACT_UP_TO
+    count = 2**n if exact else PERMUTATIONS
+    if n < 2:
+        p = None if n == 0 else 1.0
+    else:
+        found = stats.permutation_test(
+            (values,),
+            _mean,
+            permutation_type="samples",
+            vectorized=True,
+            n_resamples=count if exact else PERMUTATIONS,
+            batch=_AT_ONCE,
+            rng=np.random.default_rng(seed),
+        )
+        p = float(found.pvalue)
+    error = None if exact or p is None else float(np.sqrt(p * (1 - p) / count))
+    return {
+        "permutation_p": p,
+        "permutation_exact": exact,
+        "permutation_count": count,
+        "permutation_p_error": error,
+        **({} if exact else {"permutation_seed": seed}),
+    }
+
+
+def within_intervals(values: FloatArray, level: float = 0.95) -> list[tuple[float, float] | None]:
+    """Of each condition's mean, of values (n, k): without the differences between participants, for figures.
+
+    Cousineau's (2005) normalization with Morey's (2008) correction √(k/(k − 1)): t intervals of the values less their
+    participant's mean. They show what a paired test rests on and are no intervals of the conditions' own means. None
+    for fewer than two participants or conditions.
+    """
+    n, k = values.shape
+    if n < 2 or k < 2:
+        return [None] * k
+    (scaled,), exponent = at_unit_scale([values])
+    normalized = scaled - scaled.mean(axis=1, keepdims=True)
+    error = np.std(normalized, axis=0, ddof=1) * np.sqrt(k / (k - 1) / n)
+    margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * error
+    means = scaled.mean(axis=0)
+    return [
+        (float(low), float(high))
+        for low, high in zip(np.ldexp(means - margin, exponent), np.ldexp(means + margin, exponent), strict=True)
+    ]
