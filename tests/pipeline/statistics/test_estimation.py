@@ -84,9 +84,20 @@ def test_permutation_by_writing_out_every_sign(differences: list[int]) -> None:
         assert found["permutation_p"] == pytest.approx(share)
 
 
+def test_where_drawing_takes_over_the_two_agree() -> None:
+    """SciPy's own way, on the most participants whose signs are counted."""
+    values = np.round(np.random.default_rng(2).normal(0.3, 1, 40), 2)
+    exact = permutation(values, np.zeros(40), seed=0)
+    drawn = stats.permutation_test(
+        (values,), np.mean, permutation_type="samples", vectorized=True, n_resamples=50_000, batch=10_000, rng=1
+    )
+    assert exact["permutation_exact"]
+    assert drawn.pvalue == pytest.approx(exact["permutation_p"], abs=0.005)
+
+
 def test_many_participants_are_drawn_from_and_the_error_is_said() -> None:
     random = np.random.default_rng(5)
-    first, second = random.normal(0.35, 1, 40), np.zeros(40)
+    first, second = random.normal(0.3, 1, 60), np.zeros(60)
     found = permutation(first, second, seed=3)
     assert not found["permutation_exact"]
     assert found["permutation_count"] == 99_999
