@@ -1,0 +1,72 @@
+"""Do people become faster, trial by trial? The power law of practice, participant by participant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from pipeline.statistics import NOT_POSITIVE
+from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.paired import t_paired
+from pipeline.statistics.result import IntArray, Result
+
+EFFECT = "trial order"
+_METHOD = "power law of practice: slope of log value on log trial number of each participant, t test"
+
+
+def learning(
+    values: FloatArray, orders: FloatArray, participants: Sequence[str], conditions: IntArray, levels: Sequence[str]
+) -> list[Result]:
+    """The slopes of log value on log order (Newell and Rosenbloom 1981), against zero and between conditions.
+
+    A row a trial (N,): its value, such as a time, which must be above 0; its number in the condition from 1 on; whose
+    it is; its condition. First a row a condition, its slopes against zero (contrast: the condition), then one of every
+    two (contrast `a - b`), of the participants who have a slope in both. A slope needs two orders. Effect size: d_z of
+    the slopes, or of their differences; the mean slope and what it makes of a value when trials double are in the
+    details.
+    """
+    slopes = _slopes(values, orders, participants, conditions, len(levels))
+    if isinstance(slopes, str):
+        names = [*levels, *(f"{one} - {other}" for one, other in combinations(levels, 2))]
+        people = len(set(participants))
+        return [Result(EFFECT, "t", _METHOD, "Cohen's d_z", people, contrast=name, status=slopes) for name in names]
+    rows = []
+    for slope, name in zip(slopes.T, levels, strict=True):
+        known = slope[np.isfinite(slope)]
+        rows.append(_row(known, np.zeros(len(known)), name, len(slope)))
+    for (i, one), (j, other) in combinations(enumerate(levels), 2):
+        both = np.isfinite(slopes[:, i]) & np.isfinite(slopes[:, j])
+        rows.append(_row(slopes[both, i], slopes[both, j], f"{one} - {other}", len(slopes)))
+    return rows
+
+
+def _slopes(
+    values: FloatArray, orders: FloatArray, participants: Sequence[str], conditions: IntArray, k: int
+) -> FloatArray | str:
+    """Of each participant in each condition (n, k), NaN where there are not two orders; or why there are none."""
+    if not ((values > 0).all() and (orders > 0).all()):
+        return NOT_POSITIVE
+    people = list(dict.fromkeys(participants))
+    person = np.array([people.index(name) for name in participants], dtype=np.int64)
+    slopes = np.full((len(people), k), np.nan)
+    for at in {(int(p), int(c)) for p, c in zip(person, conditions, strict=True)}:
+        rows = (person == at[0]) & (conditions == at[1])
+        x, y = np.log(orders[rows]), np.log(values[rows])
+        if np.ptp(x) > 0:
+            slopes[at] = np.sum((x - x.mean()) * (y - y.mean())) / np.sum((x - x.mean()) ** 2)
+    return slopes
+
+
+def _row(first: FloatArray, second: FloatArray, contrast: str, people: int) -> Result:
+    found = t_paired(first, second, EFFECT)
+    told = {"slope": None, "ratio_when_trials_double": None, "ci_slope": None, "n_without_slope": people - len(first)}
+    if len(first):
+        slope = float(np.mean(first - second))
+        told |= {"slope": slope, "ratio_when_trials_double": float(2**slope)}
+    if "ci_difference" in found.details:
+        told["ci_slope"] = found.details["ci_difference"]
+    kept = {name: value for name, value in found.details.items() if name not in ("ci_difference", "d_av")}
+    return replace(found, method=_METHOD, contrast=contrast, details={**told, **kept})
