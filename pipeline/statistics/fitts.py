@@ -82,7 +82,8 @@ def effective(moved: FloatArray, deviations: FloatArray, time_s: FloatArray, blo
         if width > _ROUND_OFF * amplitude > 0 and time > 0:
             rows.append((amplitude, width, np.log2(amplitude / width + 1), time, own.sum()))
     table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-    return Blocks(*table[:, :4].T, table[:, 4].astype(np.int64))
+    amplitudes, widths, difficulties, times, counts = table.T
+    return Blocks(amplitudes, widths, difficulties, times, counts.astype(np.int64))
 
 
 def fitted(blocks: Blocks) -> Fitted:

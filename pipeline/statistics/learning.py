@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,12 @@ def _slopes(
 
 def _row(first: FloatArray, second: FloatArray, contrast: str, people: int) -> Result:
     found = t_paired(first, second, EFFECT)
-    told = {"slope": None, "ratio_when_trials_double": None, "ci_slope": None, "n_without_slope": people - len(first)}
+    told: dict[str, Any] = {
+        "slope": None,
+        "ratio_when_trials_double": None,
+        "ci_slope": None,
+        "n_without_slope": people - len(first),
+    }
     if len(first):
         slope = float(np.mean(first - second))
         told |= {"slope": slope, "ratio_when_trials_double": float(2**slope)}

@@ -60,7 +60,7 @@ def test_cousineau_morey_written_out_in_r(case: str) -> None:
 
 def test_of_two_conditions_the_intervals_show_what_the_paired_t_test_rests_on() -> None:
     """Their half-width is 1/√2 of that of the difference, whatever participants differ in (Morey 2008)."""
-    data = values("normal_n12") + 100 * np.arange(12)[:, None]
+    data = values("normal_n12") + 100 * np.arange(12.0)[:, None]
     (low, high), _ = (interval for interval in within_intervals(data) if interval is not None)
     of_difference = t_paired(*data.T).details["ci_difference"]
     assert (high - low) * np.sqrt(2) == pytest.approx(of_difference[1] - of_difference[0])
