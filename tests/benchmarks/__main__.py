@@ -146,5 +146,6 @@ if __name__ == "__main__":
     starting()
     people()
     coverage.rank_biserial()
+    coverage.errors_and_counts()
     archive.measure(archive.SMALL)
     error_rates()

@@ -1,4 +1,4 @@
-"""How often the interval of the rank-biserial correlation holds it, and contradicts p, in simulated studies.
+"""Simulated studies: does the rank-biserial's interval hold it, and how often do errors and counts differ by chance?
 
 `python -m tests.benchmarks.coverage` alone, or as a part of `make bench`.
 """
@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import product
 
 import numpy as np
 from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.clustered import Family, Trials, gee
 from pipeline.statistics.rank import wilcoxon
 
 STUDIES, LARGE = 1000, 20_000
@@ -63,5 +65,29 @@ def rank_biserial(n: int = 12) -> None:
     print(f"  least {least:.3f}; intervals that contradict p: {contradicting}")
 
 
+def errors_and_counts() -> None:
+    """p below .05 where conditions are alike and people are not, each in each condition a little otherwise too."""
+    print(f"Errors and counts by GEE, {STUDIES} studies each without an effect: share with p below .05")
+    families: tuple[Family, ...] = ("logit", "poisson")
+    for family, people, conditions in product(families, (8, 12, 20), (2, 3)):
+        random = np.random.default_rng([people, conditions])
+        shape = (people, conditions, 10)
+        owners = [str(person) for person in np.repeat(range(people), conditions * 10)]
+        codes = np.tile(np.repeat(range(conditions), 10), people).astype(np.int64)
+        p_values = []
+        for _ in range(STUDIES):
+            person = random.normal(0, 1, people)[:, None, None] + random.normal(0, 0.4, shape[:2])[:, :, None]
+            if family == "logit":
+                outcome = random.random(shape) < 1 / (1 + np.exp(1 - person))
+            else:
+                outcome = random.negative_binomial(2, 1 / (1 + np.exp(person / 2) / 2), shape)
+            trials = Trials(outcome.astype(np.float64).ravel(), owners, codes)
+            p_values.append(gee(trials, [str(level) for level in range(conditions)], family)[0].p)
+        known = [p for p in p_values if p is not None]
+        share = np.mean([p < 0.05 for p in known])
+        print(f"  {family:<8} {people:>3} people, {conditions} conditions: {share:.3f} ({len(known)} studies)")
+
+
 if __name__ == "__main__":
     rank_biserial()
+    errors_and_counts()
