@@ -24,8 +24,6 @@ ONE_LEVEL = "undefined: a condition has no value"
 SEPARATED = (
     "undefined: in one condition all answers are the same, or no event was counted, so its odds or rate has no log"
 )
-NOT_POSITIVE = "undefined: a logarithm needs values and trial numbers above 0"
-NOT_CONVERGED = "undefined: the estimation did not converge"
 ONE_ITEM = "undefined: a scale of one item has no internal consistency"
 NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
 NO_RESIDUAL = "undefined: no value varies within its cell, so the model has no residual"
@@ -52,8 +50,6 @@ STATUSES = (
     NOT_COUNTS,
     ONE_LEVEL,
     SEPARATED,
-    NOT_POSITIVE,
-    NOT_CONVERGED,
     ONE_ITEM,
     NO_TOTAL_VARIES,
     NO_RESIDUAL,

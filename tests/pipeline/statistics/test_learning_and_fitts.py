@@ -59,8 +59,8 @@ def test_a_power_law_has_its_own_exponent_in_any_unit(slopes: list[float], unit:
 @pytest.mark.parametrize(
     ("values", "orders", "status"),
     [
-        ([2.0, 0.0, 3.0, 4.0], [1, 2, 1, 2], "undefined: a logarithm needs values and trial numbers above 0"),
-        ([2.0, 1.0, 3.0, 4.0], [0, 1, 0, 1], "undefined: a logarithm needs values and trial numbers above 0"),
+        ([2.0, 0.0, 3.0, 4.0], [1, 2, 1, 2], "undefined: a logarithm needs values above zero"),
+        ([2.0, 1.0, 3.0, 4.0], [0, 1, 0, 1], "undefined: a logarithm needs values above zero"),
         ([2.0, 1.0, 3.0, 4.0], [1, 1, 1, 1], "undefined: no participant is complete"),
         ([2.0, 1.0, 3.0, 4.0], [1, 2, 3, 3], "undefined: only one participant is complete"),
         ([2.0, 2.0, 3.0, 3.0], [1, 2, 1, 2], "undefined: all differences are zero"),
