@@ -22,10 +22,10 @@ from pipeline.study.fields import Frozen, Id, known, unique
 from pipeline.study.rounded import Rounded, Rounding
 from pipeline.study.yaml_text import parse, read_yaml
 
-Symbol = Literal["t", "F", "chi2", "z", "r"]
-DEGREES_OF_FREEDOM: Mapping[Symbol, int] = {"t": 1, "F": 2, "chi2": 1, "z": 0, "r": 1}
+Symbol = Literal["t", "F", "chi2", "H", "z", "r"]
+DEGREES_OF_FREEDOM: Mapping[Symbol, int] = {"t": 1, "F": 2, "chi2": 1, "H": 1, "z": 0, "r": 1}
 
-BETWEEN = ("t_independent", "welch", "anova")
+BETWEEN = ("t_independent", "welch", "anova", "mann_whitney", "kruskal")
 """Tests of groups: each has participants of its own."""
 
 
@@ -56,6 +56,21 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Names = Annotated[tuple[Id, ...], BeforeValidator(_listed), Field(min_length=1)]
 
 
+_KNOWN_SCALES: Mapping[str, Mapping[str, str]] = {
+    "sus": {"step": "2.5", "min": "0", "max": "100"},
+    "raw_tlx": {"step": "5", "min": "0", "max": "100", "items": "6"},
+}
+"""Scores by name: what their makers' rules and sheets allow (Brooke 1996; Hart and Staveland 1988, 21 gradations)."""
+
+
+def _scale(value: object) -> object:
+    """A scale by its name, or as it is."""
+    if isinstance(value, str):
+        known("scale", value, _KNOWN_SCALES)
+        return dict(_KNOWN_SCALES[value])
+    return value
+
+
 class Scale(Frozen):
     """What a participant's score can be: from `min` to `max` in steps; a mean of `items` such ratings."""
 
@@ -84,6 +99,8 @@ class Cell(Frozen):
     sd: Number | None = None
     median: Number | None = None
     rmse: Number | None = None
+    ci: tuple[Number, Number] | None = None
+    ci_level: Number = Rounded.read("95")
 
 
 class Reduction(Frozen):
@@ -97,6 +114,9 @@ class Reduction(Frozen):
     of: Literal["mean", "median", "sd", "rmse", "participants"] = "mean"
 
 
+_OF_ONE_TEST = {"W": "wilcoxon", "U": "mann_whitney", "H": "kruskal", "discordant": "mcnemar"}
+
+
 class PrintedTest(Frozen):
     """A printed test: its statistic, degrees of freedom, p, and what the text says of it."""
 
@@ -107,10 +127,14 @@ class PrintedTest(Frozen):
             "wilcoxon",
             "friedman",
             "art_anova",
+            "mixed_anova",
             "mixed_model",
+            "mcnemar",
             "t_independent",
             "welch",
             "anova",
+            "mann_whitney",
+            "kruskal",
             "correlation",
         ]
         | None
@@ -124,7 +148,14 @@ class PrintedTest(Frozen):
     chi2: Number | None = None
     z: Number | None = None
     r: Number | None = None
+    H: Number | None = None
     W: Number | None = None
+    U: Number | None = None
+    discordant: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    partial_eta_squared: Number | None = None
+    d: Number | None = None
+    d_z: Number | None = None
+    effect_r: Number | None = None
     df: Annotated[tuple[Number, ...], BeforeValidator(_listed)] = ()
     epsilon: Number | None = None
     p: PValue | None = None
@@ -143,15 +174,18 @@ class PrintedTest(Frozen):
             needed = DEGREES_OF_FREEDOM[symbol]
             if len(self.df) not in (0, needed):
                 raise ValueError(f"the statistic {symbol} has {needed} degrees of freedom, and df lists {len(self.df)}")
-        if self.W is not None and self.test != "wilcoxon":
-            raise ValueError("only test: wilcoxon has a W")
+        for key, owner in _OF_ONE_TEST.items():
+            if getattr(self, key) is not None and self.test != owner:
+                raise ValueError(f"only test: {owner} has {'an' if key in 'HU' else 'a'} {key}")
         return self
 
     @property
     def statistic(self) -> tuple[Symbol, Rounded] | None:
         """The printed statistic that p follows from, if there is one."""
-        symbols: tuple[Symbol, ...] = ("t", "F", "chi2", "z", "r")
-        return next(((symbol, getattr(self, symbol)) for symbol in symbols if getattr(self, symbol) is not None), None)
+        return next(
+            ((symbol, getattr(self, symbol)) for symbol in DEGREES_OF_FREEDOM if getattr(self, symbol) is not None),
+            None,
+        )
 
 
 class Measure(Frozen):
@@ -160,7 +194,7 @@ class Measure(Frozen):
     name: Id
     measure: Id | None = None
     n: Count | None = None
-    scale: Scale | None = None
+    scale: Annotated[Scale | None, BeforeValidator(_scale)] = None
     cells: Mapping[Id, Cell] = {}
     reductions: tuple[Reduction, ...] = ()
     tests: tuple[PrintedTest, ...] = ()
@@ -239,6 +273,7 @@ class Publication(Frozen):
     alpha: Number = Rounded.read("0.05")
     rounding: Literal["nearest", "cut_off"] = "nearest"
     sd: Literal["sample", "population"] = "sample"
+    intervals: Literal["t", "any"] = "any"
     measures: tuple[Measure, ...]
     totals: tuple[Total, ...] = ()
     shares: tuple[Share, ...] = ()

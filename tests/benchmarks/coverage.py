@@ -65,6 +65,15 @@ def rank_biserial(n: int = 12) -> None:
     print(f"  least {least:.3f}; intervals that contradict p: {contradicting}")
 
 
+def _outcomes(
+    random: np.random.Generator, person: FloatArray, shape: tuple[int, int, int], family: Family
+) -> FloatArray:
+    """Errors, or counts that vary more than Poisson's law has it."""
+    if family == "logit":
+        return (random.random(shape) < 1 / (1 + np.exp(1 - person))).astype(np.float64)
+    return random.negative_binomial(2, 1 / (1 + np.exp(person / 2) / 2), shape).astype(np.float64)
+
+
 def errors_and_counts() -> None:
     """p below .05 where conditions are alike and people are not, each in each condition a little otherwise too."""
     print(f"Errors and counts by GEE, {STUDIES} studies each without an effect: share with p below .05")
@@ -77,11 +86,7 @@ def errors_and_counts() -> None:
         p_values = []
         for _ in range(STUDIES):
             person = random.normal(0, 1, people)[:, None, None] + random.normal(0, 0.4, shape[:2])[:, :, None]
-            if family == "logit":
-                outcome = random.random(shape) < 1 / (1 + np.exp(1 - person))
-            else:
-                outcome = random.negative_binomial(2, 1 / (1 + np.exp(person / 2) / 2), shape)
-            trials = Trials(outcome.astype(np.float64).ravel(), owners, codes)
+            trials = Trials(_outcomes(random, person, shape, family).ravel(), owners, codes)
             p_values.append(gee(trials, [str(level) for level in range(conditions)], family)[0].p)
         known = [p for p in p_values if p is not None]
         share = np.mean([p < 0.05 for p in known])

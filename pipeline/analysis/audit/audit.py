@@ -8,9 +8,12 @@ from dataclasses import replace
 from pipeline.analysis.audit.arithmetic import count_finding, reduction_findings, share_finding, total_finding
 from pipeline.analysis.audit.cells import cell_findings
 from pipeline.analysis.audit.claims import claim_findings, family_findings
+from pipeline.analysis.audit.effect_sizes import effect_size_findings
 from pipeline.analysis.audit.finding import CONTRADICTION, Finding, Statement
 from pipeline.analysis.audit.freedom import freedom_findings
 from pipeline.analysis.audit.from_means import statistic_findings
+from pipeline.analysis.audit.group_ranks import group_rank_findings
+from pipeline.analysis.audit.mcnemar import mcnemar_finding
 from pipeline.analysis.audit.phrases import label, written_p
 from pipeline.analysis.audit.recomputed import p_finding
 from pipeline.analysis.audit.wilcoxon import wilcoxon_finding
@@ -68,10 +71,11 @@ def _of_test(publication: Publication, measure: Measure, test: PrintedTest) -> I
         yield checked
     yield from freedom_findings(publication, measure, test)
     yield from statistic_findings(publication, measure, test)
-    if test.test == "wilcoxon":
-        ranked = wilcoxon_finding(publication, measure, test)
-        if ranked is not None:
-            yield ranked
+    yield from effect_size_findings(publication, measure, test)
+    yield from group_rank_findings(measure, test)
+    for found in (wilcoxon_finding(publication, measure, test), mcnemar_finding(publication, measure, test)):
+        if found is not None:
+            yield found
     if test.p is not None and test.p_adjusted is not None:
         statement = Statement(
             "adjusted p", label(measure, test), f"{written_p(test.p)}, adjusted {test.p_adjusted.text}"
@@ -82,8 +86,14 @@ def _of_test(publication: Publication, measure: Measure, test: PrintedTest) -> I
 
 def _out_of_range(measure: Measure, test: PrintedTest) -> Iterator[Finding]:
     """Figures that no data can give, whatever the others are."""
-    bounded = [("p", test.p, 0, 1), ("adjusted p", test.p_adjusted, 0, 1), ("r", test.r, -1, 1)]
-    unbounded = [("F", test.F), ("χ²", test.chi2), ("W", test.W)]
+    bounded = [
+        ("p", test.p, 0, 1),
+        ("adjusted p", test.p_adjusted, 0, 1),
+        ("r", test.r, -1, 1),
+        ("η²p", test.partial_eta_squared, 0, 1),
+        ("effect r", test.effect_r, -1, 1),
+    ]
+    unbounded = [("F", test.F), ("χ²", test.chi2), ("H", test.H), ("W", test.W), ("U", test.U)]
     for name, figure, low, high in [*bounded, *((name, figure, 0, None) for name, figure in unbounded)]:
         if figure is None:
             continue

@@ -9,6 +9,7 @@ from math import ceil, floor, sqrt
 
 from pipeline.analysis.audit.finding import Finding, Statement
 from pipeline.analysis.audit.granularity import Steps, possible_sample
+from pipeline.analysis.audit.intervals import interval_finding
 from pipeline.study.printed import Cell, Measure, Publication, Scale
 from pipeline.study.rounded import Rounded
 
@@ -54,6 +55,10 @@ def cell_findings(publication: Publication, measure: Measure) -> Iterator[Findin
             yield from _spread(cell)
         if cell.cell.rmse is not None and cell.cell.mean is not None:
             yield _rmse(cell, cell.cell.rmse, cell.cell.mean)
+        if cell.cell.ci is not None:
+            yield interval_finding(
+                cell.what, cell.cell.ci, cell.cell, cell.n, cell.population, by_t=publication.intervals == "t"
+            )
 
 
 def _out_of_range(cell: Described) -> Iterator[Finding]:

@@ -46,10 +46,11 @@ def freedom(test: PrintedTest, n: int | None) -> list[Interval] | None:
 
 def rounded_after_correction(test: PrintedTest, n: int | None) -> list[Interval] | None:
     """Those of a test within participants, were they corrected for sphericity and then printed whole."""
-    if test.test not in (*WITHIN, None) or test.F is None or len(test.df) != 2 or not all(map(is_whole, test.df)):
+    tests = (*WITHIN, "mixed_anova", None)
+    if test.test not in tests or test.F is None or len(test.df) != 2 or not all(map(is_whole, test.df)):
         return None
     first, second = test.df
-    if first.value <= 1 if n is None else second.value == first.value * (n - 1):
+    if first.value <= 1 if n is None or test.test == "mixed_anova" else second.value == first.value * (n - 1):
         return None
     return [part.interval.at_least(1) for part in test.df]
 
@@ -62,10 +63,12 @@ def freedom_findings(publication: Publication, measure: Measure, test: PrintedTe
     n = publication.n_of(measure, test)
     if test.test in WITHIN and test.F is not None:
         yield statement.unchecked("n is not given") if n is None else _within(statement, test, n)
+    elif test.test == "mixed_anova" and test.F is not None:
+        yield statement.unchecked("n is not given") if n is None else _mixed(statement, test, n)
     elif test.test in _LESS_THAN_N:
         less = _LESS_THAN_N[test.test]
         yield statement.unchecked("n is not given") if n is None else _as_n_gives(statement, test, n - less)
-    elif test.test == "friedman" and len(measure.cells) > 1:
+    elif test.test in ("friedman", "kruskal") and len(measure.cells) > 1:
         yield _levels(statement, measure, test)
     elif test.test in ("t_independent", "anova"):
         yield _between(statement, measure, test)
@@ -97,6 +100,23 @@ def _within(statement: Statement, test: PrintedTest, n: int) -> Finding:
     if ratio.high < n - 1 and test.n is None:
         return statement.remark(follows, f"{explanation}; these are fewer: was someone left out?")
     return statement.held(False, follows, explanation)
+
+
+def _mixed(statement: Statement, test: PrintedTest, n: int) -> Finding:
+    """Of n participants in g groups a within-effect's error has n − g times its own, others have fewer.
+
+    Corrections for sphericity keep that ratio. How many groups and between-factors there were is not said.
+    """
+    first, second = test.df
+    follows, explanation = f"the second at most {n - 2} times the first", f"{n} participants in two groups or more"
+    if first.interval.low <= 0:
+        return statement.held(False, follows, "they are more than 0")
+    fits = second.interval.low / first.interval.high <= n - 2
+    if fits and is_whole(first) and is_whole(second) and second.value > first.value * (n - 2):
+        if first.value > 1:
+            return statement.remark(follows, f"{explanation}, only if both are rounded after a correction")
+        fits = False
+    return statement.held(fits, follows, explanation)
 
 
 def _levels(statement: Statement, measure: Measure, test: PrintedTest) -> Finding:

@@ -19,12 +19,12 @@ _ROUND_OFF = 1e-9  # relative: of the distributions' own arithmetic
 
 
 def p_two_sided(symbol: Symbol, statistic: float, df: Sequence[float | FloatArray]) -> FloatArray:
-    """p of both tails for t, z and Pearson's r (df = n − 2), of the upper tail for F and χ²; one for each df."""
+    """p of both tails for t, z and Pearson's r (df = n − 2), of the upper tail for F, χ² and H; one for each df."""
     from scipy import stats
 
     if symbol == "F":
         p = stats.f.sf(statistic, *df)
-    elif symbol == "chi2":
+    elif symbol in ("chi2", "H"):
         p = stats.chi2.sf(statistic, *df)
     elif symbol == "z":
         p = 2 * stats.norm.sf(abs(statistic))
@@ -60,7 +60,7 @@ def _bounds(symbol: Symbol, statistic: Interval, df: Sequence[FloatArray]) -> Bo
     So these are walked through, and the bounds widened by the walk's largest step: what lies between two points is
     no further off than that.
     """
-    size = statistic.at_least(0) if symbol in ("F", "chi2") else statistic.size()
+    size = statistic.at_least(0) if symbol in ("F", "chi2", "H") else statistic.size()
     smallest, largest = (p_two_sided(symbol, float(end), df) for end in (size.high, size.low))
     steps = [np.abs(np.diff(p, axis=axis)) for p in (smallest, largest) for axis in range(p.ndim)]
     room = max((float(step.max()) for step in steps if step.size), default=0.0)

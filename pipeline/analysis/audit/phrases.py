@@ -24,3 +24,8 @@ def written(symbol: Symbol, statistic: Rounded, test: PrintedTest) -> str:
     """`F(1, 11) = 10.86`."""
     df = f"({', '.join(part.text for part in test.df)})" if test.df else ""
     return f"{'χ²' if symbol == 'chi2' else symbol}{df} = {statistic.text}"
+
+
+def measure_of_effect(test: PrintedTest, figure: Rounded, name: str) -> str:
+    """`F(1, 11) = 10.86, η²p = .50`."""
+    return f"{written(*test.statistic, test)}, {name} = {figure.text}" if test.statistic else f"{name} = {figure.text}"

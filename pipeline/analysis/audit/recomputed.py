@@ -15,8 +15,10 @@ from pipeline.study.rounded import Interval, Rounded
 Reading = tuple[str, Bounds]
 """What p may be meant as, and what it then is; the plain ones are named ""."""
 
-_WITH_OTHER_P = ("friedman", "wilcoxon")
+_WITH_OTHER_P = ("friedman", "wilcoxon", "mann_whitney", "kruskal", "mcnemar")
 """Tests whose statistic is often printed beside an exact p."""
+
+_BY_COUNTING = ("wilcoxon", "mann_whitney", "mcnemar")
 
 
 def p_left_open(test: PrintedTest, n: int | None) -> Bounds | None:
@@ -28,9 +30,9 @@ def p_left_open(test: PrintedTest, n: int | None) -> Bounds | None:
 
 
 def p_finding(publication: Publication, measure: Measure, test: PrintedTest) -> Finding | None:
-    """p against the statistic; None where there is neither, or only a p of Wilcoxon's test, which n is held against."""
+    """p against the statistic; None where there is neither, or only a p that n or counts are held against."""
     if test.statistic is None:
-        if test.p is None or test.test == "wilcoxon":
+        if test.p is None or test.test in _BY_COUNTING:
             return None
         statement = Statement("recomputed p", label(measure, test), written_p(test.p))
         return statement.unchecked("no statistic is given that p follows from")
@@ -88,7 +90,7 @@ def _other_freedom(
     rounded = rounded_after_correction(test, n)
     if rounded is not None:
         yield "its degrees of freedom are rounded after a correction", p_bounds("F", statistic, rounded)
-    if symbol == "F" and test.test in (*WITHIN, None) and df[0].low > 1 and test.epsilon is None:
+    if symbol == "F" and test.test in (*WITHIN, "mixed_anova", None) and df[0].low > 1 and test.epsilon is None:
         bounds = p_bounds_corrected(statistic, df, Interval(1 / df[0].high, Fraction(1)))
         yield "it is corrected for sphericity, and its degrees of freedom are not", bounds
     if not test.df and test.n is None and df and df[0].high > 1:

@@ -14,7 +14,9 @@ _METHODS = {None: "exact p or normal approximation", "exact": "exact p", "normal
 
 
 def wilcoxon_finding(publication: Publication, measure: Measure, test: PrintedTest) -> Finding | None:
-    """W and p against n; None where neither is printed."""
+    """W and p against n; None of another test, and where neither is printed."""
+    if test.test != "wilcoxon":
+        return None
     printed = [f"W = {test.W.text}"] if test.W is not None else []
     printed += [written_p(test.p)] if test.p is not None else []
     if not printed:
