@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate explore power plan test mutants test-browser test-pdf lint docs bench lock clean
+.PHONY: help report check replay simulate explore power plan test compiled mutants test-browser test-pdf lint docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -37,8 +37,13 @@ power: .venv/installed ## how many participants? ARGS="--effect 0.5"
 plan: .venv/installed ## counterbalanced orders: ARGS="kinect fusion --participants 12"
 	@$(steadyhand) plan $(ARGS)
 
-test: lint ## lint, then every test
-	@$(python) -m pytest -n auto $(ARGS)
+test: .venv/installed ## lint, then every test; ARGS=-mfast leaves out the slow ones
+	@$(MAKE) --no-print-directory -j2 lint compiled
+	@$(python) -m pytest -n auto --dist worksteal $(ARGS)
+
+# Once, beside lint; else each of the tests' processes would compile for itself.
+compiled: .venv/installed
+	@$(python) -m tests.compiled
 
 mutants: .venv/installed ## small faults put into accuracy, statistics and analysis: which does no test notice? (half an hour)
 	@$(python) -m tests.mutants $(ARGS)

@@ -34,6 +34,14 @@ events: {topic: /events}
 """
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever is not marked as slow is fast, so that `-m fast` chooses it."""
+    for item in items:
+        if item.get_closest_marker("slow") is None:
+            item.add_marker("fast")
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Callable[..., Path]:
     """Write a study folder: `folder(study_yaml, **{"trials.csv": text})`."""

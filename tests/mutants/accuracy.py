@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from tests.fusion_core.accuracy import test_accuracy
 from tests.mutants.mutant import Mutant
-from tests.pipeline.sessions import test_movements, test_sensors
+from tests.pipeline.sessions import test_movements
 
 _ACCURACY = (test_accuracy,)
-_NOISE = (test_accuracy, test_sensors)
 _MOVEMENTS = (test_movements,)
 
 MUTANTS = (
@@ -50,14 +49,14 @@ MUTANTS = (
     Mutant("freedom += len(inside) - 1", "freedom += len(inside)", _ACCURACY),
     Mutant("np.sum((inside - inside.mean(axis=0)) ** 2)", "np.sum((inside - inside.mean()) ** 2)", _ACCURACY),
     # A sensor's noise.
-    Mutant("np.sqrt(len(value) / (len(value) - 3))", "np.sqrt(len(value) / (len(value) - 1))", _NOISE),
-    Mutant("_EDGE_S = 0.1  #", "_EDGE_S = 0.0  #", _NOISE),
-    Mutant("np.ones_like(unit), unit, unit**2]", "np.ones_like(unit), unit]", _NOISE),
-    Mutant("if len(value) < 10:", "if len(value) < 11:", _NOISE),
-    Mutant("spread < 2 * np.percentile(spread, 5)", "spread < 50 * np.percentile(spread, 5)", _NOISE),
-    Mutant("key=lambda stretch: stretch[1] - stretch[0]", "key=lambda stretch: stretch[0]", _NOISE),
-    Mutant("- first[:-span]) / span", "- first[:-span]) / (span - 1)", _NOISE),
-    Mutant("middle = time[span // 2 : span // 2 + len(spread)]", "middle = time[: len(spread)]", _NOISE),
+    Mutant("np.sqrt(len(value) / (len(value) - 3))", "np.sqrt(len(value) / (len(value) - 1))", _ACCURACY),
+    Mutant("_EDGE_S = 0.1  #", "_EDGE_S = 0.0  #", _ACCURACY),
+    Mutant("np.ones_like(unit), unit, unit**2]", "np.ones_like(unit), unit]", _ACCURACY),
+    Mutant("if len(value) < 10:", "if len(value) < 11:", _ACCURACY),
+    Mutant("spread < 2 * np.percentile(spread, 5)", "spread < 50 * np.percentile(spread, 5)", _ACCURACY),
+    Mutant("key=lambda stretch: stretch[1] - stretch[0]", "key=lambda stretch: stretch[0]", _ACCURACY),
+    Mutant("- first[:-span]) / span", "- first[:-span]) / (span - 1)", _ACCURACY),
+    Mutant("middle = time[span // 2 : span // 2 + len(spread)]", "middle = time[: len(spread)]", _ACCURACY),
     # How people moved.
     Mutant("_PROMINENCE_MIN = 0.1  #", "_PROMINENCE_MIN = 0.05  #", _MOVEMENTS),
     Mutant("4.133 * float(np.std(along, ddof=1))", "4.133 * float(np.std(along))", _MOVEMENTS),

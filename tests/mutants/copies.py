@@ -22,7 +22,7 @@ _FAILED, _PASSED = 1, 0  # pytest's exit codes
 
 @dataclass(frozen=True)
 class Copy:
-    """A folder with all files of the clone, and where Numba keeps what it compiles there."""
+    """A folder with all files of the clone."""
 
     folder: Path
 
@@ -31,29 +31,29 @@ class Copy:
         path = place(mutant, sources_in(self.folder))
         assert isinstance(path, Path)
         original, times = path.read_bytes(), path.stat()
-        # Numba looks at a function's own file only, and would go on with callers into which the original is compiled.
-        compiled = self.folder / ("compiled-mutant" if b"@njit" in original else "compiled")
         path.write_text(original.decode().replace(mutant.old, mutant.new), encoding="utf-8")
         try:
-            code, _ = self._run(mutant.tests, compiled)
+            code, _ = self._run(mutant.tests)
         finally:
             path.write_bytes(original)
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-            shutil.rmtree(self.folder / "compiled-mutant", ignore_errors=True)
         return {_FAILED: KILLED, _PASSED: SURVIVED, None: TIMED_OUT}.get(code, BROKEN)
 
     def failure_of(self, tests: Iterable[ModuleType]) -> str | None:
         """What pytest prints where the tests do not all pass; None where they do."""
-        code, printed = self._run(tests, self.folder / "compiled", longest_s=None)
+        code, printed = self._run(tests, longest_s=None)
         return None if code == _PASSED else printed
 
-    def _run(
-        self, tests: Iterable[ModuleType], compiled: Path, longest_s: float | None = _LONGEST_S
-    ) -> tuple[int | None, str]:
+    def _run(self, tests: Iterable[ModuleType], longest_s: float | None = _LONGEST_S) -> tuple[int | None, str]:
         """Pytest's exit code and output; None for a code where it takes too long, as an endless loop does."""
         paths = sorted(str(Path(str(test.__file__)).relative_to(CLONE)) for test in tests)
         words = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
-        environment = {**os.environ, "PYTHONPATH": str(self.folder), "NUMBA_CACHE_DIR": str(compiled)}
+        # Compiled code goes into a folder from which that of the unchanged sources is not removed.
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(self.folder),
+            "NUMBA_CACHE_DIR": str(self.folder / "compiled"),
+        }
         try:
             ran = subprocess.run(
                 [*words, "--hypothesis-seed=0", *paths],

@@ -3,24 +3,48 @@
 from __future__ import annotations
 
 from tests.mutants.mutant import Mutant
-from tests.pipeline.statistics import test_counterbalancing, test_models, test_power, test_statistics
+from tests.pipeline.statistics import (
+    test_counterbalancing,
+    test_friedman,
+    test_groups,
+    test_logarithms,
+    test_mixed_anova,
+    test_mixed_models,
+    test_models,
+    test_power,
+    test_power_designs,
+    test_round_off,
+    test_scoring,
+    test_statistics,
+)
 
 _TESTS = (test_statistics,)
 _MODELS = (test_models,)
 _POWER = (test_power,)
 _ORDERS = (test_counterbalancing,)
+_FRIEDMAN = (test_friedman, test_statistics)
+_GROUPS = (test_groups,)
+_MIXED_ANOVA = (test_mixed_anova,)
+_INTERCEPTS = (test_mixed_models,)
+_SCORING = (test_scoring,)
+_LOGARITHMS = (test_logarithms,)
+_DESIGNS = (test_power_designs,)
+_ROUND_OFF = (test_round_off, test_statistics)
 
 MUTANTS = (
     # Analysis of variance.
-    Mutant("float(contrasts), float(contrasts * (n - 1))", "float(contrasts), float(contrasts * n)", _TESTS),
-    Mutant("explained / (explained + other_variation)", "explained / (explained + error)", _TESTS),
+    Mutant("return len(self.errors) * self.error_df", "return len(self.errors) * (self.error_df + 1)", _TESTS),
+    Mutant("d, apart.T @ apart, n - 1)", "d, apart.T @ apart, n)", _TESTS),
+    Mutant("effect_size=explained / (explained + variation)", "effect_size=explained / (explained + error)", _TESTS),
+    Mutant("- apart.mean(axis=1, keepdims=True) + apart.mean()", "", _TESTS),
+    Mutant("gg = 1 / (d * float(np.sum(relative**2)))", "gg = 1 / float(np.sum(relative**2))", _TESTS),
+    Mutant("((error_df + 1) * d * gg - 2) / (d * room)", "((error_df + 1) * d * gg - 1) / (d * room)", _TESTS),
+    Mutant(
+        "min(1.0, ((error_df + 1) * d * gg - 2) / (d * room))", "((error_df + 1) * d * gg - 2) / (d * room)", _TESTS
+    ),
+    Mutant("if error_df >= d:", "if error_df > d:", _TESTS),
     Mutant("float(np.prod(levels) * np.sum(", "float(np.sum(", _TESTS),
     Mutant("explained / (explained + error),", "explained / (explained + df2 * error),", _TESTS),
-    Mutant("- flat.mean(axis=1, keepdims=True) + flat.mean()", "", _TESTS),
-    Mutant("trace**2 / (d * float(np.sum(covariance**2)))", "trace**2 / float(np.sum(covariance**2))", _TESTS),
-    Mutant("min(1.0, (n * d * gg - 2) / (d * room))", "min(1.0, (n * d * gg - 1) / (d * room))", _TESTS),
-    Mutant("min(1.0, (n * d * gg - 2) / (d * room))", "(n * d * gg - 2) / (d * room)", _TESTS),
-    Mutant("if n - 1 >= d:", "if n - 1 > d:", _TESTS),
     Mutant("-df * rho * np.log(w), d * (d + 1) / 2 - 1", "-df * rho * np.log(w), d * (d + 1) / 2", _TESTS),
     Mutant("first + second * (stats.chi2.sf(statistic, freedom + 4) - first)", "first", _TESTS),
     Mutant("stats.f.sf(statistic, gg * df1, gg * df2)", "stats.f.sf(statistic, gg * df1, df2)", _TESTS),
@@ -47,8 +71,13 @@ MUTANTS = (
     Mutant("np.abs(_NORMAL_QUARTILE * apart / spread)", "_NORMAL_QUARTILE * apart / spread", _MODELS),
     Mutant("if 3 <= len(values) <= _SHAPIRO_UP_TO", "if 4 <= len(values) <= _SHAPIRO_UP_TO", _MODELS),
     # Effect sizes.
+    Mutant(
+        "standardized_interval(float(dz * np.sqrt(n)), n - 1,",
+        "standardized_interval(float(dz * np.sqrt(n)), n,",
+        _TESTS,
+    ),
+    Mutant("return bound(1 - tail), bound(tail)", "return bound(1 - 2 * tail), bound(2 * tail)", _TESTS),
     Mutant("np.mean(differences) / np.std(differences, ddof=1)", "np.mean(differences) / np.std(differences)", _TESTS),
-    Mutant("noncentral_t_cdf(t, n - 1, shift) - target", "noncentral_t_cdf(t, n, shift) - target", _TESTS),
     Mutant(
         "special.gammaln((df - 1) / 2)) / np.sqrt(df / 2)",
         "special.gammaln((df - 1) / 2)) / np.sqrt((df + 1) / 2)",
@@ -67,18 +96,35 @@ MUTANTS = (
     ),
     Mutant("float(stats.t.ppf(0.95, df)) * error", "float(stats.t.ppf(0.975, df)) * error", _MODELS),
     # Mixed models.
+    Mutant(
+        "np.sum(np.log(stretch)) + 2 * np.sum(np.log(np.abs(np.diag(triangle))))", "np.sum(np.log(stretch))", _MODELS
+    ),
+    Mutant(
+        "df2=df2,\n        p=float(stats.f.sf(statistic, df1, df2)),\n        effect_size_name=",
+        "df2=df2,\n        p=float(stats.f.sf(statistic, df1, df2 + 1)),\n        effect_size_name=",
+        _MODELS,
+    ),
+    Mutant("uncertainty=np.linalg.inv(second / 2)", "uncertainty=np.linalg.inv(second)", _INTERCEPTS),
+    Mutant(
+        "log_likelihood=float(-(solved.deviance + constant) / 2)",
+        "log_likelihood=float(-solved.deviance / 2)",
+        _INTERCEPTS,
+    ),
+    Mutant("second[i, j] += 2 * (self.scores[one] @ block @ self.scores[other]) / residual**3", "pass", _INTERCEPTS),
+    Mutant(
+        "second[0, 0] += 2 * (self.residuals @ moved) / residual**3",
+        "second[0, 0] += (self.residuals @ moved) / residual**3",
+        _INTERCEPTS,
+    ),
     Mutant("single <= 2", "single <= 0", _MODELS),
     Mutant("2 * expected / (expected - q)", "float(single.mean())", _MODELS),
     Mutant("np.sum(single / (single - 2))", "np.sum(single / (single - 1))", _MODELS),
     Mutant("derivatives, 2 * np.linalg.inv(solved.curvature)", "derivatives, np.linalg.inv(solved.curvature)", _MODELS),
     Mutant("np.array([[2 * solved.residual**2 / rows.free]])", "np.array([[solved.residual**2 / rows.free]])", _MODELS),
-    Mutant("+ 2 * np.sum(np.log(np.abs(np.diag(triangle))))", "", _MODELS),
-    Mutant("return len(self.values) - int(self.design.shape[1])", "return len(self.values)", _MODELS),
     Mutant("total**-2.0 + (sizes - 1) / self.residual**2", "total**-2.0 + sizes / self.residual**2", _MODELS),
     Mutant("others = np.full((1, count), 1 / count)", "others = np.eye(count)[:1]", _MODELS),
     Mutant("np.eye(count)[0] - np.eye(count)[1:] if", "np.eye(count)[1:] - np.eye(count)[0] if", _MODELS),
     Mutant("np.zeros(hypotheses.shape[1]), -hypotheses", "np.zeros(hypotheses.shape[1]), hypotheses", _MODELS),
-    Mutant("statistic * df1 / (statistic * df1 + df2)", "statistic / (statistic + df2)", _MODELS),
     Mutant("people + inside - terms < 1", "people + inside - terms < 0", _MODELS),
     # Multiplicity.
     Mutant("np.maximum.accumulate((m - np.arange(m)) * p[order])", "(m - np.arange(m)) * p[order]", _TESTS),
@@ -92,12 +138,12 @@ MUTANTS = (
         _TESTS,
     ),
     # Paired differences.
-    Mutant("float(np.std(values, ddof=1)) / np.sqrt(n)", "float(np.std(values)) / np.sqrt(n)", _TESTS),
-    Mutant("p=float(2 * stats.t.sf(abs(statistic), df))", "p=float(stats.t.sf(abs(statistic), df))", _TESTS),
+    Mutant("np.std(values, ddof=1) / np.sqrt(n))", "np.std(values) / np.sqrt(n))", _TESTS),
+    Mutant("df = found.n - 1\n    statistic, margin", "df = found.n\n    statistic, margin", _TESTS),
     Mutant(
-        "(np.var(first, ddof=1) + np.var(second, ddof=1)) / 2", "np.var(first, ddof=1) + np.var(second, ddof=1)", _TESTS
+        "(np.var(one, ddof=1) + np.var(other, ddof=1)) / 2)", "np.var(one, ddof=1) + np.var(other, ddof=1))", _TESTS
     ),
-    Mutant("len(levels[effect[0]]) < 3", "len(levels[effect[0]]) < 2", _MODELS),
+    Mutant("len(effect) > 1 or len(levels[effect[0]]) > 2", "len(effect) > 1 or len(levels[effect[0]]) > 1", _MODELS),
     Mutant('if factors[index] == "condition"), effect[0])', 'if factors[index] == ""), effect[0])', _MODELS),
     # Power.
     Mutant("stats.t.isf(alpha / 2, n - 1)), dz * np.sqrt(n)", "stats.t.isf(alpha, n - 1)), dz * np.sqrt(n)", _POWER),
@@ -135,7 +181,6 @@ MUTANTS = (
     # Rank tests.
     Mutant("min(w_plus, float(ranks.sum()) - w_plus)", "w_plus", _TESTS),
     Mutant("min(1.0, 2 * _lower_tail(", "min(1.0, _lower_tail(", _TESTS),
-    Mutant("np.rint(2 * ranks).astype(np.int64)", "2 * ranks.astype(np.int64)", _TESTS),
     Mutant(
         "ranks, all_ranks = every[nonzero], float(every.sum())",
         "ranks, all_ranks = every[nonzero], float(every[nonzero].sum())",
@@ -153,10 +198,74 @@ MUTANTS = (
     Mutant("n * whole - (n - 1) * without", "n * whole - n * without", _TESTS),
     Mutant("np.sqrt(np.sum(ranks**2) / 4)", "np.sqrt(np.sum(ranks**2) / 2)", _TESTS),
     Mutant("np.tanh(z - margin)), float(np.tanh(z + margin))", "z - margin), float(z + margin)", _TESTS),
+    # Friedman's exact p.
+    Mutant("np.sum(chances @ (squares >= found))", "np.sum(chances @ (squares > found))", _FRIEDMAN),
+    Mutant("np.repeat(chances / len(orders), len(orders))", "np.repeat(chances, len(orders))", _FRIEDMAN),
+    Mutant("sorted(set(permutations(row.tolist())))", "sorted(permutations(row.tolist()))[::2]", _FRIEDMAN),
     # Round-off.
-    Mutant("np.floor(np.log10(largest)) - 11", "np.floor(np.log10(largest)) - 17", _TESTS),
+    Mutant("sizes = np.where(sizes <= room, 0.0, sizes)", "", _ROUND_OFF),
+    Mutant("_ROUND_OFF_STEPS = 64", "_ROUND_OFF_STEPS = 0", _ROUND_OFF),
+    Mutant("np.where(told_apart, np.minimum(room, step / 2), room)", "room", _ROUND_OFF),
+    Mutant("_KNOWN_TO = 1e-6", "_KNOWN_TO = 1.0", _ROUND_OFF),
     Mutant("(_ROUND_OFF * float(np.max(np.abs(values), initial=0.0))) ** 2", "0.0", _TESTS),
-    Mutant("return rounded(first - second, first, second)", "return first - second", _TESTS),
+    # Groups of participants.
+    Mutant(
+        "shares.sum() ** 2 / np.sum(shares**2 / (sizes - 1)))\n    statistic",
+        "shares.sum() ** 2 / np.sum(shares**2 / sizes))\n    statistic",
+        _GROUPS,
+    ),
+    Mutant("pooled_df = float(sizes.sum() - 2)", "pooled_df = float(sizes.sum() - 1)", _GROUPS),
+    Mutant("float(np.sqrt(variances.mean())), error, df", "float(np.sqrt(variances.sum())), error, df", _GROUPS),
+    Mutant(
+        "stats.studentized_range.ppf(0.95, len(groups), df)",
+        "stats.studentized_range.ppf(0.975, len(groups), df)",
+        _GROUPS,
+    ),
+    Mutant('"levene": "mean", "brown_forsythe": "median"', '"levene": "median", "brown_forsythe": "mean"', _GROUPS),
+    Mutant("explained = min(1.0, statistic / (n - 1))", "explained = min(1.0, statistic / n)", _GROUPS),
+    Mutant("(statistic - k + 1) / (n - k)", "(statistic - k + 1) / (n - 1)", _GROUPS),
+    Mutant("float(ranks[:n].sum()) - n * (n + 1) / 2", "float(ranks[:n].sum()) - n * (n - 1) / 2", _GROUPS),
+    Mutant("far = apart >= abs(", "far = apart > abs(", _GROUPS),
+    Mutant("effect_size=2 * u / (n * m) - 1", "effect_size=u / (n * m)", _GROUPS),
+    Mutant(
+        "float(differences[outside - 1]), float(differences[-outside])",
+        "float(differences[outside]), float(differences[-outside - 1])",
+        _GROUPS,
+    ),
+    Mutant("0.025 * (1 - 1e-12)", "0.05 * (1 - 1e-12)", _GROUPS),
+    Mutant("(np.cumsum(counts) - (counts - 1) / 2)[tie]", "np.cumsum(counts)[tie]", _GROUPS),
+    Mutant("ties = 1 - float(", "ties = 1 - 0.0 * float(", _GROUPS),
+    # Mixed analysis of variance.
+    Mutant(
+        "np.sum(means.mean(axis=0) ** 2) / np.mean(1 / sizes) * len(groups)",
+        "np.sum(scores.mean(axis=0) ** 2) * len(scores)",
+        _MIXED_ANOVA,
+    ),
+    Mutant("apart.T @ apart, len(scores) - len(groups)", "apart.T @ apart, len(scores) - 1", _MIXED_ANOVA),
+    Mutant("Stratum(float(differ), d * (len(groups) - 1)", "Stratum(float(differ), d * len(groups)", _MIXED_ANOVA),
+    Mutant(
+        "float(np.sqrt(np.sum([1 / len(rows) for rows in groups]))) / len(groups)",
+        "float(np.sqrt(1 / len(first)))",
+        _MIXED_ANOVA,
+    ),
+    Mutant("float(np.mean([differences[rows].mean() for rows in groups]))", "float(differences.mean())", _MIXED_ANOVA),
+    Mutant("df = len(first) - len(groups)", "df = len(first) - 1", _MIXED_ANOVA),
+    # Questionnaires and ratios.
+    Mutant("sum(limits) - value if item in reversed_items", "limits[1] - value if item in reversed_items", _SCORING),
+    Mutant("100 * (mean - low) / (high - low)", "100 * mean / (high - low)", _SCORING),
+    Mutant("mean - (low + high) / 2", "mean - (high - low) / 2", _SCORING),
+    Mutant("float(np.average(values, weights=weigh))", "float(np.average(values))", _SCORING),
+    Mutant("all(total >= comb(count, 2)", "all(total >= 0", _SCORING),
+    Mutant("df1, df2 = n - 1, (n - 1) * (k - 1)", "df1, df2 = n - 1, (n - 1) * k", _SCORING),
+    Mutant("np.any(values <= 0)", "np.any(values < 0)", _LOGARITHMS),
+    Mutant("logs = [(low + high) / 2, low, high]", "logs = [high - low, low, high]", _LOGARITHMS),
+    # Power of further designs.
+    Mutant("variances / variances.mean() / sizes", "variances / sizes", _DESIGNS),
+    Mutant("(k**2 - 1) / (3 * float(np.sum((1 - weights", "(k**2 - 1) / (2 * float(np.sum((1 - weights", _DESIGNS),
+    Mutant("1 + (cells - 1) * self.correlation", "1 + cells * self.correlation", _DESIGNS),
+    Mutant("epsilon * contrasts * (people - self.groups)", "epsilon * contrasts * (people - 1)", _DESIGNS),
+    Mutant("df = 2 * (n - 1) if self.groups else n - 1", "df = 2 * n - 1 if self.groups else n - 1", _DESIGNS),
+    Mutant("np.sqrt((2 if self.groups else 1) / n)", "np.sqrt(1 / n)", _DESIGNS),
     # Orders.
     Mutant("return square if conditions % 2 == 0 else", "return square if conditions else", _ORDERS),
     Mutant("[order[::-1] for order in square]", "square", _ORDERS),

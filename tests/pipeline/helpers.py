@@ -21,16 +21,22 @@ class Ran:
     err: str
 
 
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *words: str | Path) -> Ran:
-    """`steadyhand WORDS`, its exit code and output."""
+def exit_code(monkeypatch: pytest.MonkeyPatch, *words: str | Path) -> int:
+    """That of `steadyhand WORDS`."""
     monkeypatch.setattr("sys.argv", ["steadyhand", *map(str, words)])
     code: Any = 0
     try:
         main()
     except SystemExit as stop:
         code = stop.code
+    return int(code or 0)
+
+
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *words: str | Path) -> Ran:
+    """`steadyhand WORDS`, its exit code and output."""
+    code = exit_code(monkeypatch, *words)
     captured = capsys.readouterr()
-    return Ran(int(code or 0), captured.out, captured.err)
+    return Ran(code, captured.out, captured.err)
 
 
 class Steadyhand:

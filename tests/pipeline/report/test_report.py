@@ -9,10 +9,12 @@ import io
 import json
 import math
 import re
+import shutil
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -35,8 +37,9 @@ from pipeline.report.document.model import (
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words import interval, number, p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
-from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.helpers import Steadyhand, exit_code
 from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study
+from tests.pipeline.made_once import made_once
 from tests.pipeline.reference import study_of
 
 Folder = Callable[..., Path]
@@ -214,31 +217,52 @@ def _is_text_in_the_traces(path: Path) -> None:
         assert banned not in code
 
 
-@pytest.fixture
-def report(folder: Folder, steadyhand: Steadyhand) -> Path:
-    root = folder(
-        "title: Two conditions\ndata_origin: simulated\nconditions: [a, b]\nsessions:"
-        " '{participant}_{condition}.mcap'\ndisplay: {px_per_mm: 10}\nquestionnaires: q.csv\nestimators: {raw: {type:"
-        " raw}, gp: {type: window_gp, use: [tracker]}, fusion: {type: window_gp}}\ncomparisons: [{measure:"
-        " selection_mse_px2, test: rm_anova}, {measure: nasa_tlx/*, test: wilcoxon, adjust: holm}]\n" + STREAMS,
-        **{
-            "q.csv": (
-                "participant,condition,questionnaire,scale,rating\n"
-                + "".join(
-                    f"P{p},{c},nasa_tlx,{s},{(p * 3 + len(s) + (c == 'b') * p) % 20}\n"
-                    for p in (1, 2, 3)
-                    for c in "ab"
-                    for s in ("mental", "effort")
-                )
-            )
-        },
+SETTINGS = (
+    "title: Two conditions\ndata_origin: simulated\nconditions: [a, b]\nsessions: '{participant}_{condition}.mcap'\n"
+    "display: {px_per_mm: 10}\nquestionnaires: q.csv\n"
+    "estimators: {raw: {type: raw}, gp: {type: window_gp, use: [tracker]}, fusion: {type: window_gp}}\n"
+    "comparisons: [{measure: selection_mse_px2, test: rm_anova}, {measure: nasa_tlx/*, test: wilcoxon, adjust: holm}]\n"
+)
+
+
+def _write_study(root: Path) -> None:
+    """Three people in two conditions, with logs and two scales of a questionnaire."""
+    root.mkdir()
+    (root / "study.yaml").write_text(SETTINGS + STREAMS, encoding="utf-8")
+    ratings = "".join(
+        f"P{p},{c},nasa_tlx,{s},{(p * 3 + len(s) + (c == 'b') * p) % 20}\n"
+        for p in (1, 2, 3)
+        for c in "ab"
+        for s in ("mental", "effort")
     )
+    (root / "q.csv").write_text(f"participant,condition,questionnaire,scale,rating\n{ratings}", encoding="utf-8")
     for participant in (1, 2, 3):
         for condition in "ab":
             messages = session_messages(4.0, seed=participant, bias_mm=participant * (condition == "b"))
             write_session(root / f"P{participant}_{condition}.mcap", messages)
-    assert steadyhand("report", root).code == 0
-    return steadyhand.out
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A study, its report in `out` and its cache in `cache`, to be read only."""
+
+    def make(folder: Path) -> None:
+        _write_study(folder / "study")
+        places = ("--out", folder / "out", "--cache", folder / "cache", "--jobs", "1")
+        with pytest.MonkeyPatch.context() as patch:
+            assert exit_code(patch, "report", folder / "study", *places) == 0
+
+    yield from made_once(tmp_path_factory, "report", make)
+
+
+@pytest.fixture
+def report(finished: Path) -> Path:
+    return finished / "out"
+
+
+def results_of(report: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((report / "results.json").read_text(encoding="utf-8"))
+    return content
 
 
 def test_the_page_is_whole_without_network_and_runs_nothing_but_its_own_script(report: Path) -> None:
@@ -292,21 +316,20 @@ def test_the_pdf_is_tagged_named_and_says_the_origin_on_every_page(report: Path)
         assert "Simulated data" in page.extract_text()
 
 
-def test_the_same_input_gives_the_same_bytes(report: Path, folder: Folder, steadyhand: Steadyhand) -> None:
-    import shutil
+def test_the_same_input_gives_the_same_bytes(finished: Path, steadyhand: Steadyhand) -> None:
+    """In another folder, and without a cache."""
+    assert steadyhand("report", finished / "study").code == 0
+    report, again = finished / "out", steadyhand.out
+    names = sorted(path.relative_to(report) for path in report.rglob("*") if path.is_file())
+    assert names == sorted(path.relative_to(again) for path in again.rglob("*") if path.is_file())
+    for name in names:
+        assert (again / name).read_bytes() == (report / name).read_bytes(), name
 
-    before = {p.relative_to(report): p.read_bytes() for p in report.rglob("*") if p.is_file()}
-    shutil.rmtree(steadyhand.out)
-    shutil.rmtree(steadyhand.cache)
-    assert steadyhand("report", report.parent / "study").code == 0
-    for name, content in before.items():
-        assert (report / name).read_bytes() == content, name
 
-
-def test_the_first_page_answers_with_means_intervals_and_a_figure(report: Path, steadyhand: Steadyhand) -> None:
+def test_the_first_page_answers_with_means_intervals_and_a_figure(report: Path) -> None:
     page = (report / "report.html").read_text(encoding="utf-8")
     text = " ".join("".join(checked(page.partition("Back to the contents")[0]).text).split())
-    results = steadyhand.results()
+    results = results_of(report)
     row = next(row for row in results["comparisons"] if row["measure"] == "selection_mse_px2")
     means = {
         one["condition"]: f"{number(one['mean'])} px² {interval(one['ci_low'], one['ci_high'])}"
@@ -325,18 +348,20 @@ def test_the_first_page_answers_with_means_intervals_and_a_figure(report: Path, 
         assert caution in text
 
 
-def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report: Path, steadyhand: Steadyhand) -> None:
+def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report: Path) -> None:
     page = (report / "report.html").read_text(encoding="utf-8")
-    for row in steadyhand.results()["comparisons"]:
+    for row in results_of(report)["comparisons"]:
         ranks = row["statistic_name"] == "W+"  # a sum of ranks is whole or a half
         assert (f"= {row['statistic']:g}" if ranks else f"{row['statistic']:.2f}") in page
 
 
 def test_files_of_an_earlier_report_that_are_no_more_are_removed(
-    report: Path, steadyhand: Steadyhand, folder: Folder
+    finished: Path, steadyhand: Steadyhand, tmp_path: Path
 ) -> None:
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    report, study = steadyhand.out, tmp_path / "study"
+    assert (report / "figures" / "lead.svg").exists()
     (report / "mine.txt").write_text("a file of the user's")
-    study = report.parent / "study"
     path = study / "study.yaml"
     path.write_text(path.read_text().replace("estimators: {raw", "# estimators: {raw"))
     assert steadyhand("report", study).code == 0
