@@ -131,7 +131,6 @@ def _pair_rows(blank: Result, found: Estimated, df: float, pairs: Sequence[str])
             yield replace(blank, contrast=pair, status=NO_ERROR)
             continue
         error = float(np.sqrt(variance))
-        uncorrected = float(np.sqrt(weights @ found.uncorrected @ weights))
         margin = float(stats.t.ppf(0.975, df)) * error
         yield replace(
             blank,
@@ -146,7 +145,14 @@ def _pair_rows(blank: Result, found: Estimated, df: float, pairs: Sequence[str])
                 **blank.details,
                 "log_ratio": log_ratio,
                 "se": error,
-                "se_uncorrected": uncorrected,
-                "z_p": float(2 * stats.norm.sf(abs(log_ratio) / uncorrected)),
+                **_uncorrected(log_ratio, float(weights @ found.uncorrected @ weights)),
             },
         )
+
+
+def _uncorrected(log_ratio: float, variance: float) -> dict[str, float]:
+    """What most programs print: the standard error without correction for few participants, and p by z."""
+    if variance < _NO_SPREAD:  # the few participants of a pair all came out alike
+        return {}
+    error = float(np.sqrt(variance))
+    return {"se_uncorrected": error, "z_p": float(2 * stats.norm.sf(abs(log_ratio) / error))}
