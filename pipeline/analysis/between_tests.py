@@ -15,7 +15,7 @@ from pipeline.statistics.result import Result
 
 
 def pairs_of_groups(test: Callable[[FloatArray, FloatArray, str], Result]) -> Callable[[Request], Answer]:
-    """What gives a row a pair of groups."""
+    """A test of every pair of groups: one row per pair."""
 
     def answer(request: Request) -> Answer:
         cases = groups.by_group(request)
@@ -35,7 +35,7 @@ def all_groups(
     follow_up: Callable[[Sequence[FloatArray], Sequence[str], str], list[Result]],
     adjusts_itself: bool,
 ) -> Callable[[Request], Answer]:
-    """What gives a row of all groups, and of three or more the pairs that follow it up."""
+    """A test of all groups: one row, followed by the pairs where there are three groups or more."""
 
     def answer(request: Request) -> Answer:
         cases = groups.by_group(request)
@@ -60,7 +60,7 @@ def mixed_design(request: Request) -> Answer:
     ]
     if request.entry.follow_up != "none" and len(cases.values):
         between = (cases.factor, cases.names)
-        for one in mixed_anova.follow_ups(cases.values, cases.codes, between, within, cases.levels):
-            row = group_pair_row(request, one.result, one.pair)
+        for follow_up in mixed_anova.follow_ups(cases.values, cases.codes, between, within, cases.levels):
+            row = group_pair_row(request, follow_up.result, follow_up.pair)
             rows.append({**row, "adjust": request.entry.follow_up})
     return rows, cases.left_out

@@ -28,59 +28,59 @@ from pipeline.tables.table import Row
 
 
 def run(work: Work) -> Outcome:
-    """The study's descriptives, comparisons, all exclusions, and results.json."""
+    """Write the study's descriptives, comparisons, exclusions and other tables, and results.json."""
     study = work.study
     for name in study.estimators:
-        build_estimator(study, name)  # a misspelt one is an error also where there is no log to run it on
+        build_estimator(study, name)  # so that a misspelt estimator is an error even where there is no log to run it on
     measured = work.entry("measure")
     measures = tables.read("measures", measured)
-    found: dict[str, pd.DataFrame] = {
+    frames: dict[str, pd.DataFrame] = {
         "trials": tables.read("trials", measured),
         "measures": measures,
         "reliability": tables.read("reliability", measured),
         "descriptives": tables.frame("descriptives", descriptives(study, measures)),
     }
     observations = tables.read("observations", measured)
-    people = _columns_of_people(work)
+    people = _participant_columns(work)
     rows, left_out = compared(study, measures, observations, people)
-    found["comparisons"] = tables.frame("comparisons", rows)
-    rows, uncomparable = _of_all_data(study, measured / ALL_DATA, people)
-    found["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
+    frames["comparisons"] = tables.frame("comparisons", rows)
+    rows, uncomparable = _comparisons_of_all_data(study, measured / ALL_DATA, people)
+    frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
-    requests = [one for entry in all_requests(study, measures, observations, people) for one in entry]
-    checked = findings(study, requests, tables.read("orders", measured), found["trials"], work.sessions)
-    found["design_check"] = tables.frame("design_check", checked)
-    told = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
-    left_out += _without_accuracy(work, told["quality"], told["accuracy"])
-    found["exclusions"] = pd.concat(
+    requests = [request for entry in all_requests(study, measures, observations, people) for request in entry]
+    design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
+    frames["design_check"] = tables.frame("design_check", design_rows)
+    gathered = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
+    left_out += _without_accuracy(work, gathered["quality"], gathered["accuracy"])
+    frames["exclusions"] = pd.concat(
         [
-            tables.frame("exclusions", _sessions(work)),
+            tables.frame("exclusions", _session_exclusions(work)),
             tables.read("exclusions", work.entries["ingest"]),
             tables.read("exclusions", measured),
             tables.frame("exclusions", left_out),
         ]
     )
-    for name, table in told.items():
-        found[name] = _without_excluded(study, work, table)
-    found["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(found["accuracy"]))
-    found["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, found["trials"]))
+    for name, table in gathered.items():
+        frames[name] = _without_excluded(study, work, table)
+    frames["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(frames["accuracy"]))
+    frames["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, frames["trials"]))
     if study.printed is not None:
         path = work.folder / study.printed
-        found["printed"] = compare_printed(path, found["descriptives"], found["comparisons"])
+        frames["printed"] = compare_printed(path, frames["descriptives"], frames["comparisons"])
     if isinstance(study.simulation, SelectionSimulation) and study.repeats is not None:
         repeats = study_tables.read_repeats(work.folder / study.repeats, study.conditions)
         rows = list(reductions(study.simulation, study.conditions, repeats))
-        found["simulated_reductions"] = tables.frame("simulated_reductions", rows)
-    for name, table in found.items():
+        frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
+    for name, table in frames.items():
         tables.write(name, table, work.out)
-    results.write(work.out / "results.json", work.study_name, study, found, _people(work, measures))
+    results.write(work.out / "results.json", work.study_name, study, frames, _participant_facts(work, measures))
     return Outcome()
 
 
-def _of_all_data(study: Study, folder: Path, people: People) -> tuple[list[Row], list[Row]]:
-    """The comparisons as they would be without the exclusions of study.yaml, and what cannot be said of them.
+def _comparisons_of_all_data(study: Study, folder: Path, people: People) -> tuple[list[Row], list[Row]]:
+    """The comparisons as they would be without the exclusions of study.yaml, and rows that say why there are none.
 
-    None where nothing is excluded. Values that somebody decided to leave out may be such that no test takes them.
+    Both are empty where nothing is excluded. The excluded values may be ones that no test can take, which is no error.
     """
     if not study.exclusions:
         return [], []
@@ -91,36 +91,36 @@ def _of_all_data(study: Study, folder: Path, people: People) -> tuple[list[Row],
 
 
 def _without_accuracy(work: Work, quality: pd.DataFrame, accuracy: pd.DataFrame) -> list[Row]:
-    """Sessions whose reference could not be held against any estimate."""
+    """Sessions with a reference for which no accuracy could be computed."""
     reference = work.study.stream_of_kind("reference")
     if reference is None or not work.study.estimators:
         return []
-    there = set(quality.loc[quality["stream"] == reference, "session"])
-    rated = set(accuracy["session"])
-    reason = "its reference has no instant from 1 s after the first frame on"
-    lacking = there - rated
+    with_reference = set(quality.loc[quality["stream"] == reference, "session"])
+    with_accuracy = set(accuracy["session"])
+    reason = "the reference has no sample from 1 s after the first frame onwards"
+    lacking = with_reference - with_accuracy
     return [
         {**session.ids, "what": "no accuracy", "reason": reason} for session in work.sessions if session.id in lacking
     ]
 
 
-def _people(work: Work, measures: pd.DataFrame) -> Row:
-    """How many took part, and what participants.csv says of them."""
+def _participant_facts(work: Work, measures: pd.DataFrame) -> Row:
+    """The number of participants, and the facts about them from participants.csv."""
     if work.study.participants is not None:
         return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants))
     people = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     return {"n": len(people)}
 
 
-def _columns_of_people(work: Work) -> People:
-    """What participants.csv says of each participant, by column."""
+def _participant_columns(work: Work) -> People:
+    """participants.csv by column: the value of each participant; empty without that file."""
     if work.study.participants is None:
         return {}
     table = study_tables.read_participants(work.folder / work.study.participants).set_index("participant")
     return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
 
 
-def _sessions(work: Work) -> list[Row]:
+def _session_exclusions(work: Work) -> list[Row]:
     """The sessions that were set aside or read in part."""
     rows: list[Row] = []
     for what, sessions in (("session set aside", work.set_aside), ("session read in part", work.in_part)):
@@ -129,13 +129,13 @@ def _sessions(work: Work) -> list[Row]:
 
 
 def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataFrame:
-    """A session's facts go with it when it is excluded as a whole; the exclusions say so."""
-    out = {session.id for session in work.sessions if study.exclusion_of(session)}
-    return table[~table["session"].isin(out)]
+    """The rows of a table without those of sessions that study.yaml excludes as a whole, which the exclusions list."""
+    excluded = {session.id for session in work.sessions if study.exclusion_of(session)}
+    return table[~table["session"].isin(excluded)]
 
 
 def descriptives(study: Study, measures: pd.DataFrame) -> list[Row]:
-    """n, mean, SD, median and the t interval of the mean, a row a measure and condition."""
+    """n, mean, SD, median and the t interval of the mean, one row per measure and condition."""
     rows: list[Row] = []
     for measure in sorted(set(measures["measure"]), key=measure_order):
         wide = tables.participant_means(measures, measure, study.conditions)
@@ -162,7 +162,7 @@ def _root_rows(rows: Iterable[Row]) -> list[Row]:
 
 
 def accuracy_means(accuracy: pd.DataFrame) -> list[Row]:
-    """Each estimator's accuracy, means over sessions, as far as a session has the figure."""
+    """Each estimator's accuracy: means over the sessions that have the figure."""
     columns = [name for name in TABLES["accuracy_means"].names if name not in ("estimator", "n")]
     return [
         {"estimator": str(estimator), "n": len(rows), **{column: float(rows[column].mean()) for column in columns}}
@@ -177,15 +177,15 @@ def shown_at_selection(study: Study, trials: pd.DataFrame) -> list[Row]:
     known = trials[trials["squared_error_mm2"].notna()]
     cell = ["condition", "estimator"]
     per_person = known.groupby([*cell, "participant"])["squared_error_mm2"].mean().reset_index()
-    found = {key: rows["squared_error_mm2"] for key, rows in per_person.groupby(cell)}
+    errors = {key: rows["squared_error_mm2"] for key, rows in per_person.groupby(cell)}
     return [
         {
             "condition": condition,
             "estimator": estimator,
-            "n": len(found[condition, estimator]),
-            "rmse_mm": float(np.sqrt(found[condition, estimator].mean())),
+            "n": len(errors[condition, estimator]),
+            "rmse_mm": float(np.sqrt(errors[condition, estimator].mean())),
         }
         for condition in study.conditions
         for estimator in dict.fromkeys(known["estimator"])
-        if (condition, estimator) in found
+        if (condition, estimator) in errors
     ]

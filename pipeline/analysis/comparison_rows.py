@@ -1,4 +1,4 @@
-"""Rows of the table `comparisons`, from what a test says and from the two things it compares."""
+"""Rows of the table `comparisons`, from a test's result and the two samples it compares."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from pipeline.study.measures import measure
 from pipeline.tables.table import Row
 
 Answer = tuple[list[Row], list[Row]]
-"""Rows of `comparisons`, and the exclusions that came of incomplete participants."""
+"""Rows of `comparisons`, and the exclusions of incomplete participants."""
 
 
 def group_pair_row(request: Request, result: Result, pair: Pair) -> Row:
+    """The row of a test of two groups."""
     return {**row_of(request, result), **change_of(request, pair), "contrast": pair.contrast}
 
 
@@ -44,10 +45,10 @@ def row_of(request: Request, result: Result) -> Row:
 
 
 def change_of(request: Request, pair: Pair) -> Row:
-    """The mean difference of a pair, if anybody is in it, and the reduction.
+    """The mean difference of a pair and the reduction; empty where nobody is in the pair.
 
-    A share of the first mean says something only where zero means none: never on a scale known to be of another kind,
-    and not where a mean is zero or negative, which contradicts such a zero.
+    A reduction is meaningful only on a scale whose zero means none: never on another scale, and not where a mean is
+    zero or negative, which contradicts such a zero.
     """
     if not len(pair.first):
         return {}
@@ -62,7 +63,7 @@ def pair_row(request: Request, result: Result, pair: Pair, cases: CompleteCases)
 
 
 def diagnosed(row: Row, pair: Pair, cases: CompleteCases) -> Row:
-    """The row with what is to be said of the differences that it rests on."""
+    """The row with diagnostics of its differences (their shape and outliers) among the details."""
     if row["status"] != OK:
         return row
     diagnosis = diagnostics.differences(pair.first, pair.second, cases.participants)

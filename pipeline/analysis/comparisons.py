@@ -27,24 +27,27 @@ from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 
 People = Mapping[str, Mapping[str, str]]
-"""The columns of participants.csv: what each says of each participant."""
+"""participants.csv by column: the value of each participant."""
 
 
 def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None) -> Answer:
-    """Every row of `comparisons`, and every exclusion that came of them, each once."""
+    """Every row of `comparisons`, and every exclusion that results from them, once each.
+
+    Raises PipelineError where an entry names no measure of the data or does not fit the design.
+    """
     rows: list[Row] = []
     exclusions: list[Row] = []
     if study.comparisons and len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
     by_entry: list[tuple[Comparison, list[Row]]] = []
     for requests in all_requests(study, measures, observations, people):
-        of_entry: list[Row] = []
+        entry_rows: list[Row] = []
         for request in requests:
             answer, incomplete = RUN[request.entry.test](request)
-            of_entry += answer
+            entry_rows += answer
             exclusions += incomplete
-        by_entry.append((requests[0].entry, of_entry))
-        rows += of_entry
+        by_entry.append((requests[0].entry, entry_rows))
+        rows += entry_rows
     families.adjust(by_entry)
     for row in rows:
         row["details"] = json.dumps(row["details"]) if row["details"] else None
@@ -55,7 +58,7 @@ def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame, p
 def all_requests(
     study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None
 ) -> Iterator[list[Request]]:
-    """What each entry asks, one request per measure."""
+    """The requests of each entry, one per measure."""
     known = sorted(set(measures["measure"]), key=measure_order)
     for entry in study.comparisons:
         named = list(dict.fromkeys(name for wanted in entry.measures for name in _matching(wanted, known)))
@@ -66,26 +69,26 @@ def _matching(wanted: str, known: Sequence[str]) -> list[str]:
     """The measures an entry names; `*` stands for scales, never for a total."""
     if "*" in wanted:
         pattern = ".*".join(re.escape(piece) for piece in wanted.split("*"))
-        found = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
+        matching = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
     else:
-        found = [name for name in known if name == wanted]
-    if not found and wanted.endswith("/total"):
-        found = _only_score(wanted.removesuffix("total"), known)
-    if not found:
+        matching = [name for name in known if name == wanted]
+    if not matching and wanted.endswith("/total"):
+        matching = _only_score(wanted.removesuffix("total"), known)
+    if not matching:
         hint = did_you_mean(wanted, known)
         raise PipelineError(f'study.yaml: comparisons: there is no measure "{wanted}" in the data{hint}')
-    return found
+    return matching
 
 
 def _only_score(prefix: str, known: Sequence[str]) -> list[str]:
     """What is meant by the total of an instrument that has a single score; PipelineError for one without a rule."""
-    mine = [name for name in known if name.startswith(prefix)]
-    if len(mine) == 1:
-        return mine
-    if mine and not has_total(prefix.removesuffix("/")):
+    scores = [name for name in known if name.startswith(prefix)]
+    if len(scores) == 1:
+        return scores
+    if scores and not has_total(prefix.removesuffix("/")):
         questionnaire = prefix.removesuffix("/")
         raise PipelineError(
-            f'study.yaml: comparisons: "{questionnaire}" has no total, for nothing says how it is scored; state'
+            f'study.yaml: comparisons: "{questionnaire}" has no total because nothing says how it is scored; state'
             f" scoring: {{{questionnaire}: {{rule: sum, range: [lowest, highest answer]}}}}, or compare"
             f" {questionnaire}/*"
         )

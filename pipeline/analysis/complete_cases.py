@@ -19,10 +19,10 @@ from pipeline.tables.table import Row
 
 @dataclass(frozen=True)
 class Request:
-    """What one entry asks of one measure.
+    """One entry under `comparisons`, for one measure.
 
-    `observations` are the same values with their period and sequence, `people` the columns of participants.csv by
-    their names: what each says of each participant.
+    `observations` are the same values with their period and sequence, `people` participants.csv by column: the
+    value of each participant.
     """
 
     study: Study
@@ -46,7 +46,7 @@ class CompleteCases:
 def by_condition(request: Request) -> CompleteCases:
     """Each participant's mean over everything else (n, k), of those who have a value in every cell of it.
 
-    With `missing: available` also of those who lack a cell of a further factor: their mean is over what is there.
+    With `missing: available` also of those who lack a cell of a further factor: their mean is over the cells they have.
     """
     rows, factors = rows_and_factors(request, request.measures)
     wide = tables.participant_means(rows, request.measure, request.study.conditions)
@@ -70,7 +70,7 @@ def by_factor(request: Request) -> CompleteCases:
         if factor in factors.between:
             raise PipelineError(
                 f'study.yaml: comparisons: "{factor}" of "{request.measure}" does not vary within participants: it'
-                f" tells groups of people apart, and is no factor for within. Write factors: {{{factor}: between}} and"
+                f" divides people into groups, so it cannot stand in within. Write factors: {{{factor}: between}} and"
                 " test: mixed_anova"
             )
         if len(known) < 2:
@@ -89,8 +89,8 @@ def rows_and_factors(request: Request, table: pd.DataFrame) -> tuple[pd.DataFram
     rows = table[table["measure"] == request.measure]
     factors = factors_of(rows)
     if factors.rare:
-        odd = {(level.factor, level.level) for level in factors.rare}
-        rows = rows[[not (odd & set(fact.items())) for fact in parsed(rows["factors"])]]
+        rare = {(level.factor, level.level) for level in factors.rare}
+        rows = rows[[not (rare & set(fact.items())) for fact in parsed(rows["factors"])]]
     return rows, factors
 
 
@@ -102,7 +102,7 @@ def rare_levels(request: Request, factors: Factors) -> list[Row]:
 def _complete(
     request: Request, rows: pd.DataFrame, factors: Factors, wide: pd.DataFrame
 ) -> tuple[pd.DataFrame, list[Row]]:
-    """The participants of `wide` who count, and the exclusions of the others (listwise)."""
+    """The rows of `wide` of complete participants, and the exclusions of the others (listwise)."""
     lacking = missing_cells(rows, request.study.conditions, factors.crossed)
     if request.entry.missing == "available":
         lacking = {person: cells for person, cells in lacking.items() if wide.loc[person].isna().any()}
@@ -129,9 +129,9 @@ def levels_of(study: Study, factor: str, values: pd.Series) -> list[str]:
     """A factor's levels: conditions in the study's order, numbers by size, others by the alphabet."""
     if factor == "condition":
         return list(study.conditions)
-    found = sorted(set(values))
-    numbers = pd.to_numeric(pd.Series(found), errors="coerce")
-    return found if numbers.isna().any() else [found[index] for index in numbers.argsort(kind="stable")]
+    levels = sorted(set(values))
+    numbers = pd.to_numeric(pd.Series(levels), errors="coerce")
+    return levels if numbers.isna().any() else [levels[index] for index in numbers.argsort(kind="stable")]
 
 
 def left_out(request: Request, participant: str, reason: str) -> Row:

@@ -1,4 +1,4 @@
-"""Was the study run as a comparison within people needs it: who met what when, how often, and did the order matter?"""
+"""Checks of the design: orders and their balance, order effects, complete participants, and trials in each cell."""
 
 from __future__ import annotations
 
@@ -27,73 +27,79 @@ from pipeline.tables.table import Row
 from pipeline.words import counted, listing, p_phrase, statistic
 
 Order = tuple[str, ...]
-_NAMED = 5
-_WHOLE = 1e-9  # a count of yes is whole, but for round-off
+_NAMED = 5  # participants in a remark, before "… more"
+_WHOLE = 1e-9  # how far a count of yes may be from a whole number, for round-off
 
 
 def findings(
     study: Study,
     requests: Sequence[Request],
-    told: pd.DataFrame,
+    order_rows: pd.DataFrame,
     trials: pd.DataFrame,
     sessions: Iterable[Session],
 ) -> list[Row]:
-    """The rows of `design_check` for what the comparisons ask; a remark says what is not as it should be.
+    """The rows of `design_check` for the study's comparisons; `remark` is set where a check fails.
 
-    `told` is the table `orders`.
+    `order_rows` is the table `orders`.
     """
     if len(study.conditions) < 2 or not requests:
         return []
-    one_each = list({one.measure: one for one in requests}.values())
+    one_per_measure = list({request.measure: request for request in requests}.values())
     people = sorted(set(requests[0].measures["participant"]))
-    known = _complete_orders(study.conditions, orders.run_orders(told))
+    known = _complete_orders(study.conditions, orders.run_orders(order_rows))
     met = set(zip(requests[0].measures["participant"], requests[0].measures["condition"], strict=True))
     if one_condition_each(study, met):
-        return [*_between(study, requests), *_trials(trials, one_each), *_sessions(requests[0].observations, sessions)]
-    rows = [*_known_orders(people, known), *_disagreements(told)]
+        return [
+            *_between(study, requests),
+            *_trials(trials, one_per_measure),
+            *_sessions(requests[0].observations, sessions),
+        ]
+    rows = [*_known_orders(people, known), *_disagreements(order_rows)]
     if known:
         rows += _balance(study.conditions, list(known.values()))
-        rows += [row for one in one_each for row in _order_effects(one)]
-    rows += [*_complete_people(study, one_each), *_trials(trials, one_each), *_yes_or_no(requests)]
+        rows += [row for request in one_per_measure for row in _order_effects(request)]
+    rows += [*_complete_people(study, one_per_measure), *_trials(trials, one_per_measure), *_yes_or_no(requests)]
     return [*rows, *_sessions(requests[0].observations, sessions)]
 
 
 def _between(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
-    """How many people each condition has, where each met one; and tests that need people to meet several."""
+    """The participants of each condition where each met one, and tests that need people who met several."""
     measures = requests[0].measures
     counts = measures.groupby("condition")["participant"].nunique()
     sizes = ", ".join(f"{condition} {counts.get(condition, 0)}" for condition in study.conditions)
-    within = list(dict.fromkeys(one.entry.test for one in requests if TESTS[one.entry.test].design != "between"))
+    within = list(
+        dict.fromkeys(request.entry.test for request in requests if TESTS[request.entry.test].design != "between")
+    )
     remark = None
     if within:
         remark = (
             f"{listing(within)} {'needs' if len(within) == 1 else 'need'} people who met several conditions; use"
             " t_welch, mann_whitney, anova_welch or kruskal with between: condition"
         )
-    row = {"what": "participants of each condition, who met one each", "found": sizes, "expected": "as many in each"}
+    row = {"what": "participants of each condition, who met one each", "found": sizes, "expected": "the same in each"}
     yield {**row, "remark": remark}
 
 
 def _complete_orders(conditions: Sequence[str], run: pd.DataFrame) -> dict[str, Order]:
-    """The order of each participant of whom it is known for all conditions, each met once."""
-    found: dict[str, Order] = {}
+    """The order of each participant for whom it is known in full, with each condition met once."""
+    complete: dict[str, Order] = {}
     once = run.drop_duplicates(["participant", "condition", "period"])
     for participant, rows in once.groupby("participant", sort=True):
         order = tuple(rows.sort_values("period")["condition"])
         if rows["period"].is_unique and sorted(order) == sorted(conditions):
-            found[str(participant)] = order
-    return found
+            complete[str(participant)] = order
+    return complete
 
 
 def _known_orders(people: Sequence[str], known: Mapping[str, Order]) -> Iterator[Row]:
     unknown = [person for person in people if person not in known]
-    row: Row = {"what": "order of the conditions", "expected": "known of everybody"}
+    row: Row = {"what": "order of the conditions", "expected": "known for everybody"}
     if not known:
         remark = "whether orders were balanced, and whether they mattered, cannot be checked"
         yield {**row, "found": "not known", "remark": remark}
         return
-    found = f"known of {len(people) - len(unknown)} of {counted(len(people), 'participant')}"
-    lacking = f"not known in full, each condition once: {_names(unknown)}" if unknown else None
+    found = f"known for {len(people) - len(unknown)} of {counted(len(people), 'participant')}"
+    lacking = f"not known in full, with each condition once, for {_names(unknown)}" if unknown else None
     yield {**row, "found": found, "remark": lacking}
 
 
@@ -101,22 +107,28 @@ def _names(people: Sequence[str]) -> str:
     return listing([*people[:_NAMED], f"{len(people) - _NAMED} more"] if len(people) > _NAMED else list(people))
 
 
-def _disagreements(told: pd.DataFrame) -> Iterator[Row]:
-    """Participants of whom two sources say two things."""
+def _disagreements(order_rows: pd.DataFrame) -> Iterator[Row]:
+    """Participants for whom two sources give different orders."""
     for first, second in combinations(orders.SOURCES, 2):
-        one, other = (orders.listed(told[told["source"] == source]) for source in (first, second))
-        differ = sorted(person for person in one if person in other and one[person] != other[person])
+        orders_of_first, orders_of_second = (
+            orders.orders_as_text(order_rows[order_rows["source"] == source]) for source in (first, second)
+        )
+        differ = sorted(
+            person
+            for person in orders_of_first
+            if person in orders_of_second and orders_of_first[person] != orders_of_second[person]
+        )
         if differ:
             yield {
                 "what": "order of the conditions",
                 "found": f"{first} and {second} differ for {_names(differ)}",
                 "expected": "one order",
-                "remark": f"{first} count",
+                "remark": f"{first} are used",
             }
 
 
 def _balance(conditions: Sequence[str], known: Sequence[Order]) -> Iterator[Row]:
-    """How often each condition stands in each period, and just before each other one."""
+    """How often each condition comes in each period, and just before each other condition."""
     people, count = len(known), len(conditions)
     low, over = divmod(people, count)
     share = f"{low} or {low + 1}" if over else str(low)
@@ -136,12 +148,12 @@ def _balance(conditions: Sequence[str], known: Sequence[Order]) -> Iterator[Row]
             "what": "times each condition comes just before each other",
             "found": _span(pairs),
             "expected": share,
-            "remark": None if _even(pairs, over) else "not balanced for what came just before",
+            "remark": None if _even(pairs, over) else "not balanced for the preceding condition",
         }
 
 
 def _even(times: Collection[int], over: int) -> bool:
-    """As equal as can be, with so many people over a whole number of rounds?"""
+    """Are the counts as equal as they can be? `over`: participants beyond a whole number of rounds."""
     return max(times) - min(times) <= (1 if over else 0)
 
 
@@ -152,18 +164,18 @@ def _span(numbers: Iterable[int]) -> str:
 
 
 def _order_effects(request: Request) -> list[Row]:
-    """Whether a measure changes with the period, and with what came just before."""
+    """Whether a measure changes with the period, and with the preceding condition."""
     tests: tuple[tuple[str, str, Callable[[Request], Result]], ...] = (
         ("effect of the period", "values change with the period", _period_test),
-        ("carry-over", "values change with what came just before", _carry_over_test),
+        ("carry-over", "values change with the preceding condition", _carry_over_test),
     )
     rows: list[Row] = []
     for what, remark, test in tests:
         row: Row = {"what": what, "measure": request.measure, "expected": "none"}
         try:
             rows.append({**row, **_tested(test(request), remark, request.study.alpha)})
-        except PipelineError:  # an error where a comparison asks for it; here the data just do not say enough
-            rows.append({**row, "found": "cannot be tested: too little is known of the order"})
+        except PipelineError:  # an error where a comparison needs the order; here it only leaves the check open
+            rows.append({**row, "found": "cannot be tested: too little is known about the order"})
     return rows
 
 
@@ -182,14 +194,14 @@ def _carry_over_test(request: Request) -> Result:
 def _crossover(request: Request) -> list[Result]:
     """Treatment, period and carry-over."""
     entry = Comparison(measure=request.measure, test="crossover")
-    found = model_rows.of_crossover(replace(request, entry=entry))
-    return crossover(found.values, found.first_came_first, found.conditions, found.sequences)
+    rows = model_rows.of_crossover(replace(request, entry=entry))
+    return crossover(rows.values, rows.first_came_first, rows.conditions, rows.sequences)
 
 
 def _omnibus(request: Request, fixed: tuple[str, ...], effect: str) -> Result:
     entry = Comparison(measure=request.measure, test="mixed_model", fixed=fixed)
-    found = model_rows.of_model(replace(request, entry=entry))
-    results = mixed_model(found.values, found.participants, found.columns, found.terms)
+    rows = model_rows.of_model(replace(request, entry=entry))
+    results = mixed_model(rows.values, rows.participants, rows.columns, rows.terms)
     return next(result for result in results if result.effect == effect)
 
 
@@ -205,56 +217,58 @@ def _complete_people(study: Study, requests: Sequence[Request]) -> Iterator[Row]
     """Participants who lack a condition, or a cell of a further factor, in a measure that is compared."""
     what = "participants with every condition"
     complete: set[int] = set()
-    for one in requests:
-        rows, factors = rows_and_factors(one, one.measures)
-        yield from _rare_levels(one.measure, factors)
+    for request in requests:
+        rows, factors = rows_and_factors(request, request.measures)
+        yield from _rare_levels(request.measure, factors)
         people = rows["participant"].nunique()
         lacking = missing_cells(rows, study.conditions, factors.crossed)
         if not lacking:
             complete.add(people)
             continue
-        told = _names([f"{person} ({', '.join(cells)})" for person, cells in lacking.items()])
-        remark = f"left out of tests within people, where they lack a value: {told}"
+        names = _names([f"{person} ({', '.join(cells)})" for person, cells in lacking.items()])
+        remark = f"left out of tests within people, where they lack a value: {names}"
         named = f"{what} and {listing(list(factors.crossed))}" if factors.crossed else what
         found = str(people - len(lacking))
-        yield {"what": named, "measure": one.measure, "found": found, "expected": str(people), "remark": remark}
+        yield {"what": named, "measure": request.measure, "found": found, "expected": str(people), "remark": remark}
     if complete:
         numbers = listing([str(number) for number in sorted(complete)])
         yield {"what": what, "found": f"all, {numbers}", "expected": "all"}
 
 
 def _rare_levels(measure: str, factors: Factors) -> Iterator[Row]:
-    """Levels of a factor that hardly anybody has, and which are likely misspelt."""
+    """Levels of a factor that hardly anybody has and that are likely misspelt."""
     for level in factors.rare:
-        row = {"what": f"levels of {level.factor}", "measure": measure, "expected": "known of most participants"}
-        yield {**row, "found": f'"{level.level}" of {listing(list(level.participants))} alone', "remark": level.reason}
+        row = {"what": f"levels of {level.factor}", "measure": measure, "expected": "used for most participants"}
+        yield {**row, "found": f'only {listing(list(level.participants))} has "{level.level}"', "remark": level.reason}
 
 
 def _trials(trials: pd.DataFrame, requests: Sequence[Request]) -> Iterator[Row]:
-    """How many trials there are in each cell: of the study's trials, or of measures that have several values a cell."""
+    """How many trials each cell has, or how many values, of measures that have several per cell."""
     recorded = trials[trials["estimator"] == "recorded"]
     if len(recorded):
         yield _per_cell("trials in each cell", None, recorded.groupby(["participant", "condition"]).size())
         return
-    for one in requests:
-        rows = one.observations[one.observations["measure"] == one.measure]
+    for request in requests:
+        rows = request.observations[request.observations["measure"] == request.measure]
         if (rows["n"] > 1).any():
-            yield _per_cell("values in each cell", one.measure, rows.groupby(["participant", "condition"])["n"].sum())
+            yield _per_cell(
+                "values in each cell", request.measure, rows.groupby(["participant", "condition"])["n"].sum()
+            )
 
 
 def _yes_or_no(requests: Sequence[Request]) -> Iterator[Row]:
-    """Measures whose values are all 0 or 1, in tests that take them for measurements."""
-    for measure in dict.fromkeys(one.measure for one in requests):
-        mine = [one for one in requests if one.measure == measure]
-        rows = mine[0].observations[mine[0].observations["measure"] == measure]
+    """Measures whose values are all 0 or 1, in tests that treat them as measurements."""
+    for measure in dict.fromkeys(request.measure for request in requests):
+        of_measure = [request for request in requests if request.measure == measure]
+        rows = of_measure[0].observations[of_measure[0].observations["measure"] == measure]
         ones = (rows["value"] * rows["n"].astype("float64")).to_numpy("float64")
         whole = len(ones) > 0 and bool((abs(ones - ones.round()) < _WHOLE).all())
         if not (whole and rows["value"].between(0, 1).all() and rows["value"].nunique() > 1):
             continue
-        tests = listing(list(dict.fromkeys(TESTS[one.entry.test].label for one in mine)))
+        tests = listing(list(dict.fromkeys(TESTS[request.entry.test].label for request in of_measure)))
         suited = "McNemar's or Cochran's test, or a logistic model, suits such data"
         row = {"what": "kind of values", "measure": measure, "found": "0 or 1 in every trial"}
-        yield {**row, "expected": "measurements", "remark": f"{tests} take yes and no for measurements; {suited}"}
+        yield {**row, "expected": "measurements", "remark": f"{tests} treat yes and no as measurements; {suited}"}
 
 
 def _per_cell(what: str, measure: str | None, counts: pd.Series) -> Row:
@@ -263,13 +277,13 @@ def _per_cell(what: str, measure: str | None, counts: pd.Series) -> Row:
         "what": what,
         "measure": measure,
         "found": _span(counts),
-        "expected": "as many in each",
+        "expected": "the same in each",
         "remark": uneven if counts.nunique() > 1 else None,
     }
 
 
 def _sessions(observations: pd.DataFrame, sessions: Iterable[Session]) -> Iterator[Row]:
-    """How many sessions there are in each cell, of those that have any."""
+    """How many sessions each cell has that has any."""
     named = observations.dropna(subset="session")[["participant", "condition", "session"]]
     every = {(session.participant, session.condition, session.id) for session in sessions}
     every |= set(named.itertuples(index=False, name=None))
@@ -281,5 +295,5 @@ def _sessions(observations: pd.DataFrame, sessions: Iterable[Session]) -> Iterat
         "what": "sessions in each cell",
         "found": _span(counts.values()),
         "expected": "1",
-        "remark": f"their values count together: {_names(several)}" if several else None,
+        "remark": f"values of several sessions are pooled: {_names(several)}" if several else None,
     }

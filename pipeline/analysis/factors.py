@@ -2,12 +2,12 @@
 
 A column is taken as study.yaml and the data together allow, never by its name:
 
-- *crossed*: people meet several of its levels, and every level is met by many. Each person then owes a value in each
-  of its cells.
+- *crossed*: people meet several of its levels, and every level is met by many. Each person is then
+  expected to have a value in each of its cells.
 - *between*: every person has one level, so it tells groups of people apart.
-- neither: everybody meets other levels (a random choice of targets, a time stamp). Nobody owes a value.
+- neither: everybody meets different levels (a random choice of targets, a time stamp). Nobody lacks a value.
 
-A level that one person, or at most a fifth of them, has beside levels that most have is likely a slip of the pen.
+A level that one person, or at most a fifth of them, has beside levels that most have is likely misspelt.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ class RareLevel:
 
 @dataclass(frozen=True)
 class Factors:
-    """The further factors of one measure: levels of those crossed with people, names of those between, rare levels."""
+    """The further factors of one measure: levels of the crossed ones, names of those between people, rare levels."""
 
     crossed: Mapping[str, tuple[str, ...]]
     between: tuple[str, ...]
     rare: tuple[RareLevel, ...]
 
     def rare_of(self, names: Iterable[str]) -> list[RareLevel]:
-        """Those of some factors."""
+        """The rare levels of some factors."""
         wanted = set(names)
         return [level for level in self.rare if level.factor in wanted]
 
@@ -72,41 +72,41 @@ def factors_of(rows: pd.DataFrame) -> Factors:
     between: list[str] = []
     rare: list[RareLevel] = []
     for name in names:
-        had: dict[str, set[str]] = {}
+        people_with: dict[str, set[str]] = {}
         for person, fact in zip(people, facts, strict=True):
             if name in fact:
-                had.setdefault(fact[name], set()).add(person)
-        of_person: dict[str, int] = {}
-        for who in had.values():
+                people_with.setdefault(fact[name], set()).add(person)
+        levels_met: dict[str, int] = {}
+        for who in people_with.values():
             for person in who:
-                of_person[person] = of_person.get(person, 0) + 1
-        if len(had) < 2:
-            continue  # says the same of everybody, and divides nothing
-        if max(of_person.values()) == 1:
+                levels_met[person] = levels_met.get(person, 0) + 1
+        if len(people_with) < 2:
+            continue  # the same for everybody, so it divides nothing
+        if max(levels_met.values()) == 1:
             between.append(name)
             continue
-        odd = _rare_levels(name, had, len(of_person))
-        common = [level for level in had if level not in {one.level for one in odd}]
-        if any(len(had[level]) >= _COMMON_SHARE * len(of_person) for level in common):
-            crossed[name], rare = tuple(common), rare + odd
+        unusual = _rare_levels(name, people_with, len(levels_met))
+        common = [level for level in people_with if level not in {rare_level.level for rare_level in unusual}]
+        if any(len(people_with[level]) >= _COMMON_SHARE * len(levels_met) for level in common):
+            crossed[name], rare = tuple(common), rare + unusual
     return Factors(crossed, tuple(between), tuple(rare))
 
 
-def _rare_levels(name: str, had: Mapping[str, set[str]], people: int) -> list[RareLevel]:
+def _rare_levels(name: str, people_with: Mapping[str, set[str]], people: int) -> list[RareLevel]:
     """Levels that hardly anybody has, where others are common."""
-    common = [level for level, who in had.items() if len(who) > _COMMON_SHARE * people]
+    common = [level for level, who in people_with.items() if len(who) > _COMMON_SHARE * people]
     if people < _FEW or not common:
         return []
     return [
         RareLevel(name, level, tuple(sorted(who)), _meant(level, common))
-        for level, who in had.items()
+        for level, who in people_with.items()
         if level not in common and (len(who) == 1 or len(who) <= _RARE_SHARE * people)
     ]
 
 
 def _meant(level: str, common: Sequence[str]) -> str | None:
     """The common level that a rare one looks like."""
-    alike = next((other for other in common if folded(other) == folded(level)), None)
+    alike = next((name for name in common if folded(name) == folded(level)), None)
     if alike is not None:
         return alike
     hint = did_you_mean(level, common)
@@ -126,9 +126,9 @@ def folded(text: str) -> str:
 def missing_cells(
     rows: pd.DataFrame, conditions: Sequence[str], crossed: Mapping[str, Sequence[str]]
 ) -> dict[str, list[str]]:
-    """The cells in which a person has no value, as people read them, for each person who lacks one.
+    """The cells in which a person has no value, named for readers (`kinect × left`), for each person who lacks one.
 
-    A cell is a condition and a level of each crossed factor; those that nobody has are no cells.
+    A cell is a condition and a level of each crossed factor; combinations that nobody has do not count.
     """
     facts = parsed(rows["factors"])
     names = list(crossed)

@@ -1,8 +1,8 @@
 """Families of tests, over which p values are adjusted.
 
-A family that study.yaml names (`family: main`) holds every test of the entries that name it. Without a name a family
-are the measures of one entry, effect by effect; where a measure has several pairs of conditions, those pairs. What
-follows up an omnibus test is a family of its own.
+A family that study.yaml names (`family: main`) holds every test of the entries that name it. Without a name, the
+measures of one entry are a family, effect by effect; where a measure has several pairs of conditions, those pairs are.
+The follow-up tests of an omnibus test are a family of their own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pipeline.tables.table import Row
 from pipeline.words import unadjusted_p
 
 MEASURES, PAIRS = "measures", "pairs"
-"""What a family that has no name of its own is over."""
+"""What an unnamed family consists of."""
 
 
 def adjust(entries: Sequence[tuple[Comparison, list[Row]]]) -> None:
@@ -45,8 +45,8 @@ def _follows_up(entry: Comparison, row: Row, rows: Iterable[Row]) -> bool:
     if row["contrast"] is None or "follow_up" not in entry.options:
         return False
     return any(
-        other["contrast"] is None and (other["measure"], other["effect"]) == (row["measure"], row["effect"])
-        for other in rows
+        omnibus["contrast"] is None and (omnibus["measure"], omnibus["effect"]) == (row["measure"], row["effect"])
+        for omnibus in rows
     )
 
 

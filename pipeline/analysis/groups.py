@@ -1,4 +1,4 @@
-"""Groups of participants: who is in which, and each one's value, for tests between people and mixed designs."""
+"""Groups of participants: who is in which, and their values, for tests between people and mixed designs."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class MixedCases:
 
 
 def one_condition_each(study: Study, seen: Iterable[tuple[object, object]]) -> bool:
-    """Do conditions tell groups of people apart: as study.yaml says, or because nobody met two of them?
+    """Does each participant meet one condition: as study.yaml says, or because nobody met two of them?
 
-    `seen` are participants with conditions they met. A study whose second condition nobody met yet is no such design.
+    `seen` are pairs of participant and condition. A second condition that nobody has met yet makes no such design.
     """
     if CONDITION in study.factors:
         return True
@@ -56,7 +56,7 @@ def one_condition_each(study: Study, seen: Iterable[tuple[object, object]]) -> b
 
 
 def by_group(request: Request) -> GroupCases:
-    """Each participant's mean over everything else, by group. Where groups are told by condition, in theirs alone."""
+    """Each participant's mean over everything else, by group; where conditions are the groups, over theirs alone."""
     factor = between_factor(request)
     rows, factors = rows_and_factors(request, request.measures)
     members = group_of_each(request, factor, rows)
@@ -80,7 +80,7 @@ def mixed(request: Request) -> MixedCases:
     if factor == CONDITION:
         raise PipelineError(
             f'study.yaml: comparisons: mixed_anova of "{request.measure}" needs conditions that everybody meets, and'
-            " factors says that condition tells groups apart; use test: anova_welch, between: condition"
+            " factors says that each participant meets one condition; use test: anova_welch, between: condition"
         )
     rows, _ = rows_and_factors(request, request.measures)
     members = group_of_each(request, factor, rows)
@@ -95,10 +95,10 @@ def mixed(request: Request) -> MixedCases:
 
 
 def between_factor(request: Request) -> str:
-    """The factor that tells the groups apart: the entry's `between`, or the study's only one."""
-    named, declared = request.entry.between, list(request.study.factors)
-    if named is not None:
-        return named
+    """The factor whose levels are the groups: the entry's `between`, or the study's only one."""
+    of_entry, declared = request.entry.between, list(request.study.factors)
+    if of_entry is not None:
+        return of_entry
     if len(declared) == 1:
         return declared[0]
     which = f"names several: {', '.join(declared)}" if declared else "names none"
@@ -111,7 +111,7 @@ def between_factor(request: Request) -> str:
 def group_of_each(request: Request, factor: str, rows: pd.DataFrame) -> dict[str, str]:
     """The level of each participant, from participants.csv, the measures' own column, or the one condition they met."""
     if factor == CONDITION:
-        return _one_each(request, factor, zip(rows["participant"], rows["condition"], strict=True))
+        return _one_level_each(request, factor, zip(rows["participant"], rows["condition"], strict=True))
     if factor in request.people:
         return {str(person): str(level) for person, level in request.people[factor].items() if level}
     facts = parsed(rows["factors"])
@@ -122,10 +122,10 @@ def group_of_each(request: Request, factor: str, rows: pd.DataFrame) -> dict[str
             f'study.yaml: comparisons: neither participants.csv nor the measures have a column "{factor}"'
             f"{did_you_mean(factor, known)}"
         )
-    return _one_each(request, factor, pairs)
+    return _one_level_each(request, factor, pairs)
 
 
-def _one_each(request: Request, factor: str, pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
+def _one_level_each(request: Request, factor: str, pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
     members: dict[str, str] = {}
     for person, level in pairs:
         if members.setdefault(str(person), str(level)) != level:
@@ -139,9 +139,9 @@ def _one_each(request: Request, factor: str, pairs: Iterable[tuple[str, str]]) -
 
 def _names(request: Request, factor: str, members: Mapping[str, str], people: Iterable[str]) -> list[str]:
     """The groups that have somebody, in the study's order or by the alphabet."""
-    there = {members[person] for person in people}
+    occupied = {members[person] for person in people}
     return [
-        name for name in levels_of(request.study, factor, pd.Series(sorted(set(members.values())))) if name in there
+        name for name in levels_of(request.study, factor, pd.Series(sorted(set(members.values())))) if name in occupied
     ]
 
 

@@ -32,50 +32,52 @@ from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
 ALL_DATA = "all_data"
-"""The folder of `measures` and `observations` as they would be if study.yaml excluded nothing; where it does."""
+"""The folder of `measures` and `observations` without the exclusions of study.yaml; written only where it has some."""
 
 
 def run(work: Work) -> Outcome:
-    """The study's trials, measures and exclusions; PipelineError for a bad table."""
+    """Write the study's trials, measures and exclusions; raises PipelineError for a table that cannot be used."""
     study = work.study
     exclusions: list[Row] = []
-    (trials, selections), moved = all_trials(work), all_movements(work)
+    (trials, selections), movements = all_trials(work), all_movements(work)
     tabled = measures_table(work)
     values = pd.concat(
         [
             selection_values(study, trials),
             completion_values(work, exclusions),
-            *movement_values(moved),
+            *movement_values(movements),
             *rated_values(work),
             *tabled_values(work, tabled),
         ]
     ).reset_index(drop=True)
     _check_sources(values)
     scored_by = instruments(study, sorted(set(values["measure"])))
-    counts_in = items_of(scored_by)
+    scores_by_item = items_of(scored_by)
     agreement = list(reliability(scored_by, values))
     scores = score_values(scored_by, values, exclusions)
-    names = {name for one in scored_by for name in one.scores}
-    values = pd.concat([values[~values["measure"].isin(_only_items(counts_in))], scores]).reset_index(drop=True)
-    known, everything = excludable(work, values, trials) if study.exclusions else values[:0], values
+    score_names = {name for instrument in scored_by for name in instrument.scores}
+    values = pd.concat([values[~values["measure"].isin(_only_items(scores_by_item))], scores]).reset_index(drop=True)
+    known, all_values = excludable(work, values, trials) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
         check_exclusion(excluded, known)
         values = values[~matches(excluded, values)]
         if excluded.measure is None:
-            trials, selections, moved = (rows[~matches(excluded, rows)] for rows in (trials, selections, moved))
+            trials, selections, movements = (rows[~matches(excluded, rows)] for rows in (trials, selections, movements))
         exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
-    exclusions += incomplete_trials(trials, moved)
+    exclusions += incomplete_trials(trials, movements)
     values = finite_values(values, exclusions)
-    measures = _with_totals(study, _cells(values, CELL), CELL, names)
+    measures = _with_totals(study, _cells(values, CELL), CELL, score_names)
     exclusions += gaps(work, measures)
-    run, sequences = _orders(work, tabled)
-    _write_values(study, measures, orders.placed(values, run, sequences), names, work.out)
+    order_rows, sequences = _orders(work, tabled)
+    _write_values(study, measures, orders.with_periods(values, order_rows, sequences), score_names, work.out)
     if study.exclusions:
-        whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(everything, [])
+        whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(all_values, [])
         (work.out / ALL_DATA).mkdir()
-        counted = _with_totals(whole, _cells(unfiltered, CELL), CELL, names)
-        _write_values(whole, counted, orders.placed(unfiltered, run, sequences), names, work.out / ALL_DATA)
-    tables.write("orders", run, work.out)
+        counted = _with_totals(whole, _cells(unfiltered, CELL), CELL, score_names)
+        _write_values(
+            whole, counted, orders.with_periods(unfiltered, order_rows, sequences), score_names, work.out / ALL_DATA
+        )
+    tables.write("orders", order_rows, work.out)
     tables.write("reliability", tables.frame("reliability", agreement), work.out)
     tables.write("trials", trials, work.out)
     tables.write("selections", selections, work.out)
@@ -83,22 +85,22 @@ def run(work: Work) -> Outcome:
     return Outcome()
 
 
-def _only_items(counts_in: Mapping[str, Sequence[str]]) -> list[str]:
-    """The items that are nothing but items: what an instrument reports by itself, as the NASA-TLX does, stays."""
-    return [name for name in counts_in if name.partition("/")[2] not in reported_scales(name.partition("/")[0])]
+def _only_items(scores_by_item: Mapping[str, Sequence[str]]) -> list[str]:
+    """The items that are not reported by themselves, unlike the scales of the NASA-TLX."""
+    return [name for name in scores_by_item if name.partition("/")[2] not in reported_scales(name.partition("/")[0])]
 
 
 def _write_values(
-    study: Study, measures: pd.DataFrame, placed: pd.DataFrame, scores: Collection[str], folder: Path
+    study: Study, measures: pd.DataFrame, values: pd.DataFrame, scores: Collection[str], folder: Path
 ) -> None:
-    """A study's values: a mean a cell, and the same with their session, period and sequence."""
+    """Write one mean per cell, and one per cell, session, period and sequence."""
     observed = [*CELL, "session", "period", "sequence"]
     tables.write("measures", measures, folder)
-    tables.write("observations", _with_totals(study, _cells(placed, observed), observed, scores), folder)
+    tables.write("observations", _with_totals(study, _cells(values, observed), observed, scores), folder)
 
 
 def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """In which order people met the conditions, and the labels of their sequences."""
+    """The tables `orders` and `sequences`: who met the conditions in which order, and the orders' labels."""
     path = table_path(work, "participants")
     return orders.gathered(
         work.study.conditions,
@@ -110,13 +112,13 @@ def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[
 
 
 def _cells(values: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
-    """The mean of each cell and further factor, and of how many values: one row a cell and measure."""
-    found: Any = values.groupby([*cell, "factors", "measure"], dropna=False, sort=False)["value"]
-    return pd.DataFrame(found.agg(["mean", "size"]).reset_index()).rename(columns={"mean": "value", "size": "n"})
+    """The mean and the number of values of each cell, further factor and measure: one row each."""
+    grouped: Any = values.groupby([*cell, "factors", "measure"], dropna=False, sort=False)["value"]
+    return pd.DataFrame(grouped.agg(["mean", "size"]).reset_index()).rename(columns={"mean": "value", "size": "n"})
 
 
 def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:
-    """Cells and the questionnaires' totals, less those that study.yaml excludes, in the order of the table."""
+    """Cells and the questionnaires' totals without those that study.yaml excludes, in the order of the table."""
     rows = pd.concat([cells, _totals(cells, cell, scores)]).reset_index(drop=True)
     for excluded in study.exclusions:
         if excluded.session is None:
@@ -127,26 +129,26 @@ def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str], scores: Col
 def _totals(cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:
     """`nasa_tlx/total`: a participant's plain sum over the scales; none where a scale is missing.
 
-    Of the instruments only those have one whose record says that people report a sum.
+    Only instruments whose record says that a sum is reported have a total.
     """
     parts = [str(measure).partition("/") for measure in cells["measure"]]
-    told = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
-    ratings = told[(told["scale"] != "") & ~told["measure"].isin(list(scores))]
+    split = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
+    ratings = split[(split["scale"] != "") & ~split["measure"].isin(list(scores))]
     rows = []
     keys = [*cell, "factors"]
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
         scales = set(answered["scale"])
         if "total" in scales or not has_total(str(questionnaire)):
             continue
-        for found, rated in answered.groupby(keys, dropna=False, sort=False):
+        for key, rated in answered.groupby(keys, dropna=False, sort=False):
             if set(rated["scale"]) == scales:
-                rows.append((*found, f"{questionnaire}/total", rated["value"].sum(), rated["n"].min()))
+                rows.append((*key, f"{questionnaire}/total", rated["value"].sum(), rated["n"].min()))
     return pd.DataFrame(rows, columns=[*keys, "measure", "value", "n"])
 
 
 def _check_sources(values: pd.DataFrame) -> None:
-    """A measure comes from one place only."""
+    """PipelineError for a measure that comes from two places."""
     sources = values.groupby("measure")["source"].unique()
-    for measure, found in sources.items():
-        if len(found) > 1:
-            raise PipelineError(f'"{measure}" stands both in {found[0]} and in {found[1]}; rename one of them')
+    for measure, places in sources.items():
+        if len(places) > 1:
+            raise PipelineError(f'"{measure}" is given both in {places[0]} and in {places[1]}; rename one of them')

@@ -1,4 +1,4 @@
-"""What is not in the values, and why: decided, incomplete, not finite, or not there."""
+"""Values that are missing or left out, and why: excluded in study.yaml, incomplete, not finite, or absent."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from pipeline.tables.table import Row
 
 
 def matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
-    """Which rows a decision to exclude takes out."""
-    hit = pd.Series(True, index=rows.index)
+    """Which rows an exclusion of study.yaml removes: one flag per row."""
+    matching = pd.Series(True, index=rows.index)
     for column in ("participant", "condition", "session", "measure"):
         wanted = getattr(excluded, column)
         if wanted is not None and column in rows:
-            hit &= (rows[column] == wanted).fillna(False)
-    return hit.astype(bool)
+            matching &= (rows[column] == wanted).fillna(False)
+    return matching.astype(bool)
 
 
 def excludable(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     """Every combination of ids that an exclusion may name: what is in the data, totals, and sessions set aside."""
-    told = [session.ids for session in (*work.sessions, *(aside for aside, _ in work.set_aside))]
+    session_ids = [session.ids for session in (*work.sessions, *(aside for aside, _ in work.set_aside))]
     columns = [*CELL, "session", "measure"]
     totals = values[values["measure"].str.contains("/")].copy()
     totals["measure"] = totals["measure"].str.partition("/")[0] + "/total" if len(totals) else totals["measure"]
-    sessions = pd.DataFrame(told, columns=columns).astype("object")
+    sessions = pd.DataFrame(session_ids, columns=columns).astype("object")
     return pd.concat(
         [
             values[columns].astype("object"),
@@ -47,21 +47,21 @@ def excludable(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.Dat
 
 
 def check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
-    """An exclusion that fits nothing in the data is an error, for it is likely misspelt."""
+    """PipelineError for an exclusion that matches nothing in the data: it is likely misspelt."""
     for column in ("participant", "session", "measure"):
-        wanted, there = getattr(excluded, column), sorted(set(known[column].dropna()))
-        if wanted is not None and wanted not in there:
-            hint = did_you_mean(wanted, there)
+        wanted, present = getattr(excluded, column), sorted(set(known[column].dropna()))
+        if wanted is not None and wanted not in present:
+            hint = did_you_mean(wanted, present)
             raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
     if not matches(excluded, known).any():
         named = ", ".join(f"{key} {value}" for key, value in excluded.model_dump().items() if value and key != "reason")
         raise PipelineError(f"study.yaml: exclusions: nothing in the data fits {named}; there is nothing to exclude")
 
 
-def incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
+def incomplete_trials(trials: pd.DataFrame, movements: pd.DataFrame) -> list[Row]:
     """Trials without a measurable selection, a duration or a path of the hand, counted by session or cell."""
     recorded = trials[trials["estimator"] == "recorded"]
-    timed = moved[moved["duration_s"].notna()]
+    timed = movements[movements["duration_s"].notna()]
     rows = []
     cell: Any
     for measure, column, what, all_trials in (
@@ -72,9 +72,11 @@ def incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
         missing = all_trials[all_trials[column].isna()]
         if len(missing) == len(all_trials):
             continue  # a study that does not measure this at all
-        for cell, found in missing.groupby([*CELL, "session"], dropna=False, sort=True):
+        for cell, rows_of_cell in missing.groupby([*CELL, "session"], dropna=False, sort=True):
             participant, condition, session = cell
-            named = ", ".join(str(trial) for trial in found["trial"][:10]) + (", …" if len(found) > 10 else "")
+            named = ", ".join(str(trial) for trial in rows_of_cell["trial"][:10]) + (
+                ", …" if len(rows_of_cell) > 10 else ""
+            )
             rows.append(
                 {
                     "participant": participant,
@@ -82,14 +84,14 @@ def incomplete_trials(trials: pd.DataFrame, moved: pd.DataFrame) -> list[Row]:
                     "session": None if pd.isna(session) else session,
                     "measure": measure,
                     "what": what,
-                    "reason": f"{len(found)} of the cell's trials: {named}",
+                    "reason": f"{len(rows_of_cell)} of the cell's trials: {named}",
                 }
             )
     return rows
 
 
 def finite_values(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
-    """Values that are numbers; the others are listed."""
+    """The values that are finite; the others are added to `exclusions`."""
     bad = values[~np.isfinite(values["value"])]
     for row in bad.itertuples():
         what = "missing value" if pd.isna(row.value) else "infinite value"
@@ -125,26 +127,26 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
         return [*rows, *_look_alikes(listed, seen, ()), *_missing_cells(work.study, measures, seen)]
     for participant in sorted(listed):
         for condition in work.study.conditions:
-            if (participant, condition) not in seen and not _decided(work.study, participant, condition, None):
+            if (participant, condition) not in seen and not _excluded(work.study, participant, condition, None):
                 cell = {"participant": participant, "condition": condition}
-                rows.append({**cell, "what": "no data", "reason": "the participant has nothing in this condition"})
+                rows.append({**cell, "what": "no data", "reason": "the participant has no data in this condition"})
     return [*rows, *_look_alikes(listed, seen, work.study.conditions), *_missing_cells(work.study, measures, seen)]
 
 
 def _look_alikes(people: Iterable[str], seen: AbstractSet[tuple[Any, Any]], conditions: Sequence[str]) -> Iterator[Row]:
-    """Ids that differ only in what people overlook, where one of them lacks a condition: likely one person."""
+    """Ids that look alike (case, spaces, zeros) where one of them lacks a condition: likely one person."""
     alike: dict[str, list[str]] = {}
     for person in sorted(people):
         alike.setdefault(folded(person), []).append(person)
     for ids in alike.values():
-        gaps = any((person, condition) not in seen for person in ids for condition in conditions)
-        if len(ids) > 1 and gaps:
+        incomplete = any((person, condition) not in seen for person in ids for condition in conditions)
+        if len(ids) > 1 and incomplete:
             named = " and ".join(f'"{person}"' for person in ids)
             reason = f"{named} differ only in case, spaces or zeros; if they are one person, give them one id"
             yield {"participant": ids[0], "what": "participants with similar ids", "reason": reason}
 
 
-def _decided(study: Study, participant: str, condition: str, measure: str | None) -> bool:
+def _excluded(study: Study, participant: str, condition: str, measure: str | None) -> bool:
     """Is the cell empty because study.yaml excludes it?"""
     return any(
         excluded.session is None and excluded.covers(participant=participant, condition=condition, measure=measure)
@@ -153,14 +155,14 @@ def _decided(study: Study, participant: str, condition: str, measure: str | None
 
 
 def _missing_cells(study: Study, measures: pd.DataFrame, seen: set[Any]) -> list[Row]:
-    """Cells, and cells of a further factor, that others have."""
+    """Rows for the cells, also of further factors, that others have and a participant lacks."""
     rows: list[Row] = []
     for measure, values in measures.groupby("measure", sort=True):
         have = set(zip(values["participant"], values["condition"], strict=True))
         crossed = factors_of(values).crossed
         partial = missing_cells(values, study.conditions, crossed) if crossed else {}
         for participant, condition in sorted(seen):
-            if _decided(study, participant, condition, str(measure)):
+            if _excluded(study, participant, condition, str(measure)):
                 continue
             row: Row = {"participant": participant, "condition": condition, "measure": measure, "what": "missing cell"}
             of_condition = f"{condition}{BETWEEN_FACTORS}"

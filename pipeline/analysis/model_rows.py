@@ -1,4 +1,4 @@
-"""The rows that the mixed model and the crossover take: values with what was run when."""
+"""The rows that the mixed model and the crossover take: values with their period, sequence and preceding condition."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _WHERE = (
 
 @dataclass(frozen=True)
 class ModelRows:
-    """Values (N,) of a mixed model, whose they are, its columns and terms, and who was left out."""
+    """Values (N,) of a mixed model, the participant of each, the model's columns and terms, and who was left out."""
 
     values: FloatArray
     participants: list[str]
@@ -36,16 +36,16 @@ class ModelRows:
 
 
 def of_model(request: Request) -> ModelRows:
-    """A participant's mean in each combination of what `fixed` names, as far as there is one; not listwise.
+    """Each participant's mean in each combination of the levels that `fixed` names and that they have; not listwise.
 
-    `period` is a slope, `factor(period)` a factor; `carry_over` is the condition of the period before, so that the
-    first period, before which nothing came, does not count.
+    `period` is a slope, `factor(period)` a factor; `carry_over` is the condition of the preceding period, so the
+    first period, which has none, does not count.
     """
     terms = list(request.entry.terms)
     names = list(dict.fromkeys(name for term in terms for name in term.split(":")))
-    told = ("condition", "period", "sequence", CARRY_OVER)
+    own_columns = ("condition", "period", "sequence", CARRY_OVER)
     observations, factors = complete_cases.rows_and_factors(request, request.observations)
-    rows = complete_cases.with_factors(request, observations, [name for name in names if name not in told])
+    rows = complete_cases.with_factors(request, observations, [name for name in names if name not in own_columns])
     left_out: list[Row] = complete_cases.rare_levels(request, factors)
     if request.entry.missing == "listwise":
         outside = {name: levels for name, levels in factors.crossed.items() if name not in names}
@@ -53,7 +53,7 @@ def of_model(request: Request) -> ModelRows:
         left_out += partial
     for name in ("period", "sequence"):
         if name in names or (name == "period" and CARRY_OVER in names):
-            rows, unknown = _known(request, rows, name)
+            rows, unknown = _with_known(request, rows, name)
             left_out += unknown
     if CARRY_OVER in names:
         rows, unknown = _with_carry_over(request, rows)
@@ -66,7 +66,7 @@ def of_model(request: Request) -> ModelRows:
 def _without_partial_conditions(
     request: Request, rows: pd.DataFrame, crossed: Mapping[str, Sequence[str]]
 ) -> tuple[pd.DataFrame, list[Row]]:
-    """Without what people have in a condition of which they lack a cell of a factor that is not in the model.
+    """Without a participant's rows of a condition in which a cell of a factor outside the model is missing.
 
     The model takes people who lack a whole condition; a mean over half of a condition's cells would confound the two.
     """
@@ -87,14 +87,14 @@ def _without_partial_conditions(
 
 
 def _means(rows: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
-    """One row a combination of keys: first of all values that there are, then of cells, each counting once."""
+    """The mean of each combination of keys, weighted by `n`, as one row with n = 1."""
     weighted = rows.assign(value=rows["value"] * rows["n"])
     sums = weighted.groupby(list(dict.fromkeys(keys)), dropna=False, sort=True)[["value", "n"]].sum().reset_index()
     return pd.DataFrame(sums.assign(value=sums["value"] / sums["n"], n=1))
 
 
 def _column(request: Request, name: str, values: pd.Series) -> Column:
-    """What a term's name stands for in each row; PipelineError for a factor that has one level."""
+    """A term's value in each row; PipelineError for a factor with one level."""
     if name == "period" and request.entry.period_is_slope:
         return Covariate(values.to_numpy(np.float64))
     levels = complete_cases.levels_of(request.study, "condition" if name == CARRY_OVER else name, values)
@@ -109,31 +109,31 @@ def _column(request: Request, name: str, values: pd.Series) -> Column:
 
 
 def _with_carry_over(request: Request, rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Row]]:
-    """Rows with the condition that their participant met in the period before, without first periods."""
+    """Rows with the condition of their participant's preceding period, without first periods."""
     met = request.observations.dropna(subset="period")
     before = {
         (participant, int(period) + 1): condition
         for participant, period, condition in zip(met["participant"], met["period"], met["condition"], strict=True)
     }
-    at = [(who, int(period)) for who, period in zip(rows["participant"], rows["period"], strict=True)]
+    places = [(who, int(period)) for who, period in zip(rows["participant"], rows["period"], strict=True)]
     rows = rows.copy()
-    rows[CARRY_OVER] = [before.get(place) for place in at]
-    return _known(request, rows[[period > 1 for _, period in at]], CARRY_OVER)
+    rows[CARRY_OVER] = [before.get(place) for place in places]
+    return _with_known(request, rows[[period > 1 for _, period in places]], CARRY_OVER)
 
 
-def _known(request: Request, rows: pd.DataFrame, name: str) -> tuple[pd.DataFrame, list[Row]]:
+def _with_known(request: Request, rows: pd.DataFrame, name: str) -> tuple[pd.DataFrame, list[Row]]:
     """The rows that have a period or sequence, and the exclusions for those that have none."""
     lacking = rows[rows[name].isna()]
     if len(lacking) == len(rows):
         raise PipelineError(
-            f'study.yaml: comparisons: {request.entry.test} of "{request.measure}" needs to know the'
-            f" {name.replace('_', '-')}, and no data say it; {_WHERE}"
+            f'study.yaml: comparisons: {request.entry.test} of "{request.measure}" needs the'
+            f" {name.replace('_', '-')}, but no data state it; {_WHERE}"
         )
     unknown = [
         complete_cases.left_out(
-            request, str(participant), f"no {name} is known for {', '.join(dict.fromkeys(found['condition']))}"
+            request, str(participant), f"no {name} is known for {', '.join(dict.fromkeys(rows_of['condition']))}"
         )
-        for participant, found in lacking.groupby("participant", sort=True)
+        for participant, rows_of in lacking.groupby("participant", sort=True)
     ]
     return rows.drop(index=lacking.index), unknown
 
@@ -154,28 +154,30 @@ def of_crossover(request: Request) -> CrossoverRows:
     complete = complete_cases.by_condition(request)
     rows = request.observations[request.observations["measure"] == request.measure]
     rows = rows[rows["participant"].isin(complete.participants)]
-    kept, left_out = _known(request, rows, "period") if len(rows) else (rows, [])
+    kept, left_out = _with_known(request, rows, "period") if len(rows) else (rows, [])
     first, second = request.study.conditions
     when: dict[str, dict[str, set[int]]] = {}
     for who, condition, period in zip(kept["participant"], kept["condition"], kept["period"], strict=True):
         when.setdefault(who, {}).setdefault(condition, set()).add(int(period))
     keep: list[int] = []
-    early: list[bool] = []
+    first_came_first: list[bool] = []
     for index, participant in enumerate(complete.participants):
         periods = when.get(participant, {})
         if len(periods) < 2:
             continue  # listed among those whose period is not known
         if len(periods[first]) == len(periods[second]) == 1 and periods[first] != periods[second]:
             keep.append(index)
-            early.append(min(periods[first]) < min(periods[second]))
+            first_came_first.append(min(periods[first]) < min(periods[second]))
         else:
             left_out.append(
                 complete_cases.left_out(request, participant, "the two conditions do not have a period each")
             )
     people = [complete.participants[index] for index in keep]
     labels = dict(zip(rows["participant"], rows["sequence"], strict=True))
-    sequences = _labels([labels.get(person) for person in people], early)
-    return CrossoverRows(complete.values[keep], (first, second), early, sequences, [*complete.left_out, *left_out])
+    sequences = _labels([labels.get(person) for person in people], first_came_first)
+    return CrossoverRows(
+        complete.values[keep], (first, second), first_came_first, sequences, [*complete.left_out, *left_out]
+    )
 
 
 def _labels(labels: list[Any], early: list[bool]) -> tuple[str, str] | None:
@@ -184,5 +186,5 @@ def _labels(labels: list[Any], early: list[bool]) -> tuple[str, str] | None:
     of_late = {label for label, first in zip(labels, early, strict=True) if not first}
     if len(of_early) != 1 or len(of_late) != 1 or of_early == of_late:
         return None
-    (one,), (other,) = of_early, of_late
-    return None if pd.isna(one) or pd.isna(other) else (str(one), str(other))
+    (early_label,), (late_label,) = of_early, of_late
+    return None if pd.isna(early_label) or pd.isna(late_label) else (str(early_label), str(late_label))

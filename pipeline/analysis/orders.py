@@ -1,4 +1,4 @@
-"""In which order people met the conditions, from wherever a study says it."""
+"""In which order people met the conditions: from the logs, the measures or the participants table."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from pipeline.tables.table import Row
 
 LOGS, MEASURES, PARTICIPANTS = "the logs", "the measures", "the participants table"
 SOURCES = (LOGS, MEASURES, PARTICIPANTS)
-"""What was run comes before what was planned: where two say it, the first counts."""
+"""From what was run to what was planned: where two sources say it, the first of them counts."""
 
 _BETWEEN = r"[\s,;|/>→+–_-]*"
-_LONGEST = 7  # digits of a session's number, which a stray date has more of
+_LONGEST = 7  # digits from which on a number is no session's number but, say, a date
 _PERIOD = re.compile(r"period_([1-9]\d{0,3})")
 
 
 def conditions_in_order(text: str, conditions: Sequence[str]) -> list[str] | None:
     """The conditions a text lists (`fusion > kinect`), or its letters where each condition has its own (`FK`).
 
-    None where it does neither, as a mere label (`group 1`), or names one condition alone, or one twice.
+    None for a mere label (`group 1`), and where it names a single condition, or one of them twice.
     """
     names = "|".join(re.escape(name) for name in sorted(conditions, key=len, reverse=True))
     letters = {name[0].casefold(): name for name in conditions}
     plain = re.sub(_BETWEEN, "", text).casefold()
-    found: list[str] = []
+    listed: list[str] = []
     if re.fullmatch(f"(?:(?:{names}){_BETWEEN})+", text):
-        found = re.findall(names, text)
+        listed = re.findall(names, text)
     elif len(letters) == len(conditions) and all(letter in letters for letter in plain):
-        found = [letters[letter] for letter in plain]
-    return found if len(found) > 1 and len(set(found)) == len(found) else None
+        listed = [letters[letter] for letter in plain]
+    return listed if len(listed) > 1 and len(set(listed)) == len(listed) else None
 
 
 def gathered(
@@ -59,9 +59,9 @@ def gathered(
             rows += _of_periods(conditions, table)
             periods = True
         if "sequence" in table:
-            named = _labels(table, source)
-            labels = {**named, **labels}
-            rows += [] if periods else _of_labels(conditions, named, source)
+            own_labels = _labels(table, source)
+            labels = {**own_labels, **labels}
+            rows += [] if periods else _of_labels(conditions, own_labels, source)
     sequences = [{"participant": participant, "sequence": label} for participant, label in labels.items()]
     return tables.frame("orders", rows).drop_duplicates(), tables.frame("sequences", sequences)
 
@@ -87,16 +87,18 @@ def _of_periods(conditions: Sequence[str], participants: pd.DataFrame) -> Iterat
 
 def _labels(table: pd.DataFrame, source: str) -> dict[str, str]:
     """The sequence of each participant who has one; PipelineError for two."""
-    told = table[table["sequence"] != ""][["participant", "sequence"]].drop_duplicates()
-    for participant, rows in told.groupby("participant", sort=True):
+    labelled = table[table["sequence"] != ""][["participant", "sequence"]].drop_duplicates()
+    for participant, rows in labelled.groupby("participant", sort=True):
         if len(rows) > 1:
             two = " and ".join(f'"{label}"' for label in rows["sequence"].iloc[:2])
-            raise PipelineError(f'{source}: participant "{participant}" has the sequences {two}; everybody has one')
-    return dict(zip(told["participant"], told["sequence"], strict=True))
+            raise PipelineError(
+                f'{source}: participant "{participant}" has the sequences {two}; give each participant one'
+            )
+    return dict(zip(labelled["participant"], labelled["sequence"], strict=True))
 
 
 def _of_labels(conditions: Sequence[str], labels: Mapping[str, str], source: str) -> Iterator[Row]:
-    """Labels that list the conditions say an order; others are mere names."""
+    """The orders of labels that list the conditions; other labels are mere names."""
     for participant, label in labels.items():
         for period, condition in enumerate(conditions_in_order(label, conditions) or [], 1):
             yield {"participant": participant, "condition": condition, "period": period, "source": source}
@@ -104,10 +106,10 @@ def _of_labels(conditions: Sequence[str], labels: Mapping[str, str], source: str
 
 def _of_logs(conditions: Sequence[str], sessions: Iterable[Session], session_orders: pd.DataFrame) -> list[Row]:
     """A log's fact `order`: the session's number in the participant's order, or the whole order by name."""
-    told = dict(zip(session_orders["session"], session_orders["order"], strict=True))
+    order_facts = dict(zip(session_orders["session"], session_orders["order"], strict=True))
     rows: list[Row] = []
     for session in sessions:
-        text = str(identifier(str(told.get(session.id, "")).strip()))
+        text = str(identifier(str(order_facts.get(session.id, "")).strip()))
         whole = conditions_in_order(text, conditions) or []
         period = int(text) if text.isdecimal() and len(text) < _LONGEST else 0
         if session.condition in whole:
@@ -120,19 +122,19 @@ def _of_logs(conditions: Sequence[str], sessions: Iterable[Session], session_ord
 def _of_measures(measures: pd.DataFrame | None) -> list[Row]:
     if measures is None or "period" not in measures:
         return []
-    told = measures[measures["period"].notna()][["participant", "condition", "period"]].drop_duplicates()
+    with_period = measures[measures["period"].notna()][["participant", "condition", "period"]].drop_duplicates()
     names = ("participant", "condition", "period", "source")
-    return [dict(zip(names, (*row, MEASURES), strict=True)) for row in told.itertuples(index=False)]
+    return [dict(zip(names, (*row, MEASURES), strict=True)) for row in with_period.itertuples(index=False)]
 
 
 def run_orders(orders: pd.DataFrame) -> pd.DataFrame:
-    """Of each participant the rows of the source that counts first."""
+    """Each participant's rows from the source that comes first in SOURCES."""
     ranked = orders.assign(rank=orders["source"].map({source: at for at, source in enumerate(SOURCES)}).astype(int))
     kept: pd.DataFrame = ranked[ranked["rank"] == ranked.groupby("participant")["rank"].transform("min")]
     return kept.drop(columns="rank")
 
 
-def placed(values: pd.DataFrame, orders: pd.DataFrame, sequences: pd.DataFrame) -> pd.DataFrame:
+def with_periods(values: pd.DataFrame, orders: pd.DataFrame, sequences: pd.DataFrame) -> pd.DataFrame:
     """Values with their period (their own, their session's, or that of their condition) and their sequence."""
     run = run_orders(orders)
     by_session = run.dropna(subset="session").drop_duplicates("session").set_index("session")["period"]
@@ -143,12 +145,12 @@ def placed(values: pd.DataFrame, orders: pd.DataFrame, sequences: pd.DataFrame) 
     period = values["period"].astype("Int64")
     period = period.fillna(values["session"].map(by_session).astype("Int64"))
     period = period.fillna(pd.Series(by_cell.reindex(cells).to_numpy(), index=values.index).astype("Int64"))
-    labels = {**listed(run), **dict(zip(sequences["participant"], sequences["sequence"], strict=True))}
+    labels = {**orders_as_text(run), **dict(zip(sequences["participant"], sequences["sequence"], strict=True))}
     return values.assign(period=period, sequence=values["participant"].map(labels).astype("string"))
 
 
-def listed(run: pd.DataFrame) -> dict[str, str]:
-    """Each participant's conditions in the order in which they came, as text."""
+def orders_as_text(run: pd.DataFrame) -> dict[str, str]:
+    """Each participant's conditions in the order they were met, as text: `kinect, fusion`."""
     ordered = run.sort_values("period", kind="stable").drop_duplicates(["participant", "condition", "period"])
     return {
         str(participant): ", ".join(rows["condition"])

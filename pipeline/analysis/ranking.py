@@ -45,37 +45,37 @@ def _only(table: pd.DataFrame, keys: set[tuple[str, str]]) -> pd.DataFrame:
 def _ranked(study: str | None, accuracy: pd.DataFrame, trials: pd.DataFrame) -> list[Row]:
     rows = []
     for estimator, variant in dict.fromkeys([*_keys(accuracy), *_keys(trials)]):
-        ours = {(estimator, variant)}
+        key = {(estimator, variant)}
         row: Row = {"study": study, "estimator": estimator, "variant": variant or None}
-        rows.append(row | _means(_only(accuracy, ours)) | _selections(_only(trials, ours)))
+        rows.append(row | _means(_only(accuracy, key)) | _selections(_only(trials, key)))
     rows.sort(key=lambda row: row.get("rmse_mm", np.inf))  # stable: equals stand in the order asked for
     return [{**row, "rank": place if "rmse_mm" in row else None} for place, row in enumerate(rows, start=1)]
 
 
 def _means(rows: pd.DataFrame) -> Row:
-    """Each figure's mean over the sessions that have it, with its t interval, cut off at what values are possible."""
-    found: Row = {"n": len(rows)}
+    """Each figure's mean over the sessions that have it, with its t interval, cut off at the possible range."""
+    means: Row = {"n": len(rows)}
     for name, possible in _POSSIBLE.items():
         values = rows[name].dropna().to_numpy(np.float64)
         if len(values):
             stem, _, unit = name.rpartition("_")
             summary = described(values)
-            found[name] = summary["mean"]
+            means[name] = summary["mean"]
             if "ci_low" in summary:
-                found[f"{stem}_low_{unit}"] = max(summary["ci_low"], possible[0])
-                found[f"{stem}_high_{unit}"] = min(summary["ci_high"], possible[1])
-    return found
+                means[f"{stem}_low_{unit}"] = max(summary["ci_low"], possible[0])
+                means[f"{stem}_high_{unit}"] = min(summary["ci_high"], possible[1])
+    return means
 
 
 def _selections(trials: pd.DataFrame) -> Row:
-    """The root of the mean over sessions of their mean squared errors; its interval the roots of theirs."""
+    """The root of the mean over sessions of their mean squared errors, with the root of that mean's interval."""
     known = trials[trials["squared_error_mm2"].notna()]
     squared = known.groupby(["study", "session"])["squared_error_mm2"].mean().to_numpy(np.float64)
     if not len(squared):
         return {"selection_n": 0}
     summary = described(squared)
-    found = {"selection_n": len(squared), "selection_rmse_mm": float(np.sqrt(summary["mean"]))}
+    row = {"selection_n": len(squared), "selection_rmse_mm": float(np.sqrt(summary["mean"]))}
     if "ci_low" in summary:
-        found["selection_rmse_low_mm"] = float(np.sqrt(max(0.0, summary["ci_low"])))
-        found["selection_rmse_high_mm"] = float(np.sqrt(summary["ci_high"]))
-    return found
+        row["selection_rmse_low_mm"] = float(np.sqrt(max(0.0, summary["ci_low"])))
+        row["selection_rmse_high_mm"] = float(np.sqrt(summary["ci_high"]))
+    return row

@@ -1,8 +1,8 @@
-"""Scores of questionnaires: which instrument has a rule, what its rule makes of the answers, and what it lacks.
+"""Scores of questionnaires: which instrument has a scoring rule, its scores, and why a score is undefined.
 
-A rule is stated under `scoring:`, or goes without saying where a questionnaire bears the name of an instrument whose
-range of answers is fixed (sus, ueq, ueq_s, ssq, ipq) and the data hold its items. Ratings that are no items of a rule
-stay what they are, and get no total.
+A rule is stated under `scoring:`, or follows from the name of a questionnaire whose range of answers is fixed (sus,
+ueq, ueq_s, ssq, ipq), if the data hold its items. Ratings that are no items of a rule are kept as they are, without a
+total.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SHOWN = 6
 
 @dataclass(frozen=True)
 class Instrument:
-    """A questionnaire of the data with its rule, its limits, and which rule's item each of its measures is."""
+    """A questionnaire of the data with its rule, the range of its answers, and the rule's item that each measure is."""
 
     questionnaire: str
     rule: ScoringRule
@@ -42,7 +42,7 @@ class Instrument:
 
 
 def instruments(study: Study, measures: Sequence[str]) -> list[Instrument]:
-    """The questionnaires of the data that are scored; PipelineError for a rule that does not fit what is there."""
+    """The questionnaires of the data that are scored; PipelineError for a rule that does not fit the data."""
     scales: dict[str, list[str]] = {}
     for name in measures:
         questionnaire, slash, scale = name.partition("/")
@@ -52,8 +52,8 @@ def instruments(study: Study, measures: Sequence[str]) -> list[Instrument]:
         if questionnaire not in scales:
             hint = did_you_mean(questionnaire, sorted(scales))
             raise PipelineError(f'study.yaml: scoring: there is no questionnaire "{questionnaire}" in the data{hint}')
-    found = (_instrument(study, questionnaire, given) for questionnaire, given in scales.items())
-    return [one for one in found if one is not None]
+    candidates = (_instrument(study, questionnaire, given) for questionnaire, given in scales.items())
+    return [instrument for instrument in candidates if instrument is not None]
 
 
 def _instrument(study: Study, questionnaire: str, given: Sequence[str]) -> Instrument | None:
@@ -70,7 +70,7 @@ def _instrument(study: Study, questionnaire: str, given: Sequence[str]) -> Instr
     weights = {scale: item for scale in given if _is_weight(scale) and (item := rule.item(_weighed(scale)))}
     missing = [item for item in rule.items if item not in set(items.values())]
     if missing and entry is None:
-        return None  # scores that are made already, or another version: nothing says that this rule is meant
+        return None  # scores already computed, or another version: nothing says that this rule is meant
     for item in rule.reversed if own else ():
         if item not in items:
             hint = did_you_mean(item, list(items))
@@ -94,57 +94,59 @@ def _weighed(scale: str) -> str:
 
 
 def items_of(scored_by: Sequence[Instrument]) -> dict[str, list[str]]:
-    """For each measure that is an item, the scores that it counts in; items that are no scale of their own."""
+    """For each measure that is an item, the scores to which it contributes (none for some items)."""
     return {
-        f"{one.questionnaire}/{given}": [
-            f"{one.questionnaire}/{scale.name}" for scale in one.rule.scales if item in scale.items
+        f"{instrument.questionnaire}/{given}": [
+            f"{instrument.questionnaire}/{scale.name}" for scale in instrument.rule.scales if item in scale.items
         ]
-        for one in scored_by
-        for given, item in {**one.items, **one.weights}.items()
+        for instrument in scored_by
+        for given, item in {**instrument.items, **instrument.weights}.items()
     }
 
 
 def score_values(scored_by: Sequence[Instrument], values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
-    """Rows of scores, as those of `values`; why one is undefined is listed, and leaves its participant out of it."""
+    """Rows of scores, as those of `values`; a score that is undefined is left out, and listed in `exclusions`."""
     rows: list[Row] = []
-    for one in scored_by:
-        prefix = f"{one.questionnaire}/"
-        names = {f"{prefix}{given}": (item, False) for given, item in one.items.items()}
-        names |= {f"{prefix}{given}": (item, True) for given, item in one.weights.items()}
-        mine = values[values["measure"].isin(list(names))]
-        for cell, answers in mine.groupby([*_CELL, "period"], dropna=False, sort=True):
+    for instrument in scored_by:
+        prefix = f"{instrument.questionnaire}/"
+        names = {f"{prefix}{given}": (item, False) for given, item in instrument.items.items()}
+        names |= {f"{prefix}{given}": (item, True) for given, item in instrument.weights.items()}
+        answers = values[values["measure"].isin(list(names))]
+        for cell, cell_answers in answers.groupby([*_CELL, "period"], dropna=False, sort=True):
             participant, condition, session, period = cell
             ratings: dict[str, float | None] = {}
             weights: dict[str, float | None] = {}
-            for name, value in zip(answers["measure"], answers["value"], strict=True):
+            for name, value in zip(cell_answers["measure"], cell_answers["value"], strict=True):
                 item, is_weight = names[name]
                 (weights if is_weight else ratings)[item] = float(value)
-            result = scored(ratings, one.rule.scales, one.limits, one.rule.reversed, weights or None)
-            who: Row = {"participant": participant, "condition": condition, "session": _known(session)}
+            result = scored(
+                ratings, instrument.rule.scales, instrument.limits, instrument.rule.reversed, weights or None
+            )
+            who: Row = {"participant": participant, "condition": condition, "session": _or_none(session)}
             for score, value in result.scores.items():
                 if value is not None:
                     rows.append({**who, "period": period, "measure": f"{prefix}{score}", "value": value})
-            exclusions += _undefined(who, one, result.faults)
+            exclusions += _undefined(who, instrument, result.faults)
     columns = [*_CELL, "period", "measure", "value"]
-    found = pd.DataFrame(rows, columns=columns).assign(factors=None, source="the scores")
-    return found.astype({"value": "float64", "factors": "object", "period": "Int64"})
+    scores = pd.DataFrame(rows, columns=columns).assign(factors=None, source="the scores")
+    return scores.astype({"value": "float64", "factors": "object", "period": "Int64"})
 
 
-def _known(session: object) -> object:
+def _or_none(session: object) -> object:
     return None if pd.isna(session) else session  # type: ignore[call-overload]
 
 
-def _undefined(who: Row, one: Instrument, faults: Sequence[Fault]) -> Iterator[Row]:
-    """An exclusion a score that is undefined, with every reason."""
+def _undefined(who: Row, instrument: Instrument, faults: Sequence[Fault]) -> Iterator[Row]:
+    """One exclusion per undefined score, with every reason."""
     for score in dict.fromkeys(name for fault in faults for name in fault.scores):
-        reasons = [_reason(fault, one) for fault in faults if score in fault.scores]
+        reasons = [_reason(fault, instrument) for fault in faults if score in fault.scores]
         reason = "; ".join(dict.fromkeys(reasons))
-        yield {**who, "measure": f"{one.questionnaire}/{score}", "what": "score undefined", "reason": reason}
+        yield {**who, "measure": f"{instrument.questionnaire}/{score}", "what": "score undefined", "reason": reason}
 
 
-def _reason(fault: Fault, one: Instrument) -> str:
+def _reason(fault: Fault, instrument: Instrument) -> str:
     if fault.what == OUT_OF_RANGE and fault.value is not None:
-        low, high = one.limits
+        low, high = instrument.limits
         return f"{fault.item} is {number(fault.value)}, outside {low:g} to {high:g}; state the range under scoring"
     if fault.what == MISSING:
         return f"{fault.item} is missing"
@@ -153,28 +155,30 @@ def _reason(fault: Fault, one: Instrument) -> str:
 
 def reliability(scored_by: Sequence[Instrument], values: pd.DataFrame) -> Iterator[Row]:
     """Cronbach's α of every score of several items, over all participants and conditions that answered all of them."""
-    for one in scored_by:
-        prefix = f"{one.questionnaire}/"
-        given = {f"{prefix}{scale}": item for scale, item in one.items.items()}
-        mine = values[values["measure"].isin(list(given))]
-        wide = mine.pivot_table(index=["participant", "condition"], columns="measure", values="value", aggfunc="mean")
+    for instrument in scored_by:
+        prefix = f"{instrument.questionnaire}/"
+        given = {f"{prefix}{scale}": item for scale, item in instrument.items.items()}
+        answers = values[values["measure"].isin(list(given))]
+        wide = answers.pivot_table(
+            index=["participant", "condition"], columns="measure", values="value", aggfunc="mean"
+        )
         wide = wide.rename(columns=given)
-        for item in one.rule.reversed & set(wide.columns):
-            wide[item] = sum(one.limits) - wide[item]
-        for scale in one.rule.scales:
+        for item in instrument.rule.reversed & set(wide.columns):
+            wide[item] = sum(instrument.limits) - wide[item]
+        for scale in instrument.rule.scales:
             items = list(dict.fromkeys(scale.items))
             if len(items) < 2 or not set(items) <= set(wide.columns):
                 continue
-            answers = wide[items].dropna().to_numpy("float64")
-            result = cronbach_alpha(answers)
+            complete = wide[items].dropna().to_numpy("float64")
+            result = cronbach_alpha(complete)
             yield {
                 "measure": f"{prefix}{scale.name}",
-                "rule": one.rule.label or f"{one.rule.scales[0].reading} of {len(items)} items",
+                "rule": instrument.rule.label or f"{instrument.rule.scales[0].reading} of {len(items)} items",
                 "items": len(items),
                 "n": result.n,
                 "alpha": result.statistic,
                 "ci_low": result.ci_low,
                 "ci_high": result.ci_high,
-                "assumes": one.rule.assumes or None,
+                "assumes": instrument.rule.assumes or None,
                 "status": result.status,
             }

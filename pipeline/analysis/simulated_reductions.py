@@ -15,8 +15,8 @@ from pipeline.tables.table import Row
 def reductions(settings: SelectionSimulation, conditions: tuple[str, ...], repeats: pd.DataFrame) -> Iterator[Row]:
     """Rows of `simulated_reductions`: each measure and pair of conditions, 1 − mean₂/mean₁ in each repeated study.
 
-    `repeats` has the columns repeat, condition, measure and value (a mean over participants). The bounds hold 95 % of
-    the studies: they are where a study of as many people may land, not where the mean is.
+    `repeats` has the columns repeat, condition, measure and value (a mean over participants). 95 % of the studies
+    lie between the bounds: they say where one study of as many people may land, not where the mean is.
     """
     for measure, rows in repeats.groupby("measure", sort=False):
         wide = rows.pivot(index="repeat", columns="condition", values="value")
@@ -41,7 +41,7 @@ def reductions(settings: SelectionSimulation, conditions: tuple[str, ...], repea
 
 
 def _published(settings: SelectionSimulation, measure: str, pair: tuple[str, str]) -> Row:
-    for one in settings.published:
-        if one.measure == measure and one.conditions == pair:
-            return {"published_reduction": one.reduction, "source": one.source}
+    for published in settings.published:
+        if published.measure == measure and published.conditions == pair:
+            return {"published_reduction": published.reduction, "source": published.source}
     return {"published_reduction": None, "source": None}

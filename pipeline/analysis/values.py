@@ -1,4 +1,4 @@
-"""The values of every dependent variable, a row each: from logs, and from the study's own tables."""
+"""The values of every dependent variable, one row each: from logs, and from the study's own tables."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ CELL = ["participant", "condition"]
 
 
 def table_path(work: Work, field: str) -> Any:
+    """The path of a table that study.yaml names, such as `participants`; None where it names none."""
     name = getattr(work.study, field)
     return None if name is None else work.folder / name
 
@@ -42,9 +43,9 @@ def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
     squared = np.zeros(len(table))
     for axis in "xyz":
         # A trial counts over the axes its target has; a selection that lacks one of them cannot be measured.
-        aimed = table[f"target_{axis}_mm"].notna() if axis == "z" else pd.Series(True, index=table.index)
-        apart = (table[f"selected_{axis}_mm"] - table[f"target_{axis}_mm"]) ** 2
-        squared = squared + apart.where(aimed, 0.0).to_numpy()
+        has_axis = table[f"target_{axis}_mm"].notna() if axis == "z" else pd.Series(True, index=table.index)
+        difference = (table[f"selected_{axis}_mm"] - table[f"target_{axis}_mm"]) ** 2
+        squared = squared + difference.where(has_axis, 0.0).to_numpy()
     duration_s = table["selection_s"] - table["start_s"]
     tabled = table[[*CELL, "trial"]].assign(
         session=table["session"].replace("", None),
@@ -61,7 +62,7 @@ def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def all_movements(work: Work) -> pd.DataFrame:
-    """The movements of all sessions, or of trials.csv in the order of their starts, and whose they are."""
+    """The movements of all sessions, or of trials.csv in the order of their starts, with participant and condition."""
     people = pd.DataFrame([session.ids for session in work.sessions], columns=[*CELL, "session"])
     logged = tables.read("movements", work.entries["assess"]).merge(people.astype("string"), on="session")
     path = table_path(work, "trials")
@@ -72,12 +73,12 @@ def all_movements(work: Work) -> pd.DataFrame:
     for axis in "xyz":
         table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
     cells = [with_movements(rows) for _, rows in table.groupby([*CELL, "session"], sort=True)]
-    told = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
-    return pd.concat([tables.as_table("movements", told), told[CELL].astype("string")], axis=1)
+    from_trials = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
+    return pd.concat([tables.as_table("movements", from_trials), from_trials[CELL].astype("string")], axis=1)
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
-    """Rows of one measure: participant, condition, session, factors, period, measure, value, and where it stands."""
+    """Rows of one measure: participant, condition, session, factors, period, measure, value, and source."""
     return pd.DataFrame(
         {
             "participant": rows["participant"],
@@ -93,7 +94,7 @@ def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.Da
 
 
 def selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
-    """Squared selection errors and durations, a row a trial; a cell's mean is its measure."""
+    """Squared selection errors (mm², px²) and durations (s), one row per trial."""
     recorded = trials[trials["estimator"] == "recorded"]
     selected = recorded[recorded["squared_error_mm2"].notna()]
     timed = recorded[recorded["duration_s"].notna()]
@@ -108,7 +109,7 @@ def selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """Throughput, a row a sequence of a session, and what the hand's path says, a row a trial."""
+    """Throughput (bits/s), one row per sequence of a session, and measures of the hand's path, one row per trial."""
     rows = [
         (*cell, throughput)
         for cell, trials in moved.groupby([*CELL, "session"], dropna=False, sort=True)
@@ -129,15 +130,15 @@ def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 
 def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
-    """From session_start to the last selection, a row a session that has both; what does not fit is listed."""
+    """Seconds from session_start to the last selection, one row per session with both; `exclusions` lists the rest."""
     rows = []
-    for session, folder in sorted(zip(work.sessions, work.entries["ingest"], strict=True), key=lambda one: one[0].id):
-        happened = tables.read_arrow("events", folder).to_pylist()
+    for session, folder in sorted(zip(work.sessions, work.entries["ingest"], strict=True), key=lambda pair: pair[0].id):
+        events = tables.read_arrow("events", folder).to_pylist()
         who: Row = session.ids
         begins, selections = (
-            [event["time_ns"] for event in happened if event["type"] == kind] for kind in ("session_start", "selection")
+            [event["time_ns"] for event in events if event["type"] == kind] for kind in ("session_start", "selection")
         )
-        stray = sum(place < 0 for _, place in selections_by_trial(happened)[1])
+        stray = sum(place < 0 for _, place in selections_by_trial(events)[1])
         if stray:
             reason = f"{stray} without the trial_start of their trial"
             exclusions.append({**who, "what": "selections outside any trial", "reason": reason})
@@ -148,8 +149,8 @@ def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
                 exclusions.append({**who, "measure": "completion_time_s", "what": "impossible time", "reason": reason})
             else:
                 rows.append((session.participant, session.condition, session.id, seconds))
-    found = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
-    return _values(found, "completion_time_s", "seconds", "the events")
+    durations = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
+    return _values(durations, "completion_time_s", "seconds", "the events")
 
 
 def rated_values(work: Work) -> Iterator[pd.DataFrame]:
@@ -177,6 +178,6 @@ def tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> 
     if "period" in table:
         rows["period"] = table["period"]
     if factors:
-        told = [{k: v for k, v in zip(factors, row, strict=True) if v} for row in table[factors].to_numpy()]
-        rows["factors"] = [json.dumps(facts) if facts else None for facts in told]
+        levels = [{k: v for k, v in zip(factors, row, strict=True) if v} for row in table[factors].to_numpy()]
+        rows["factors"] = [json.dumps(facts) if facts else None for facts in levels]
     yield rows

@@ -23,11 +23,11 @@ from pipeline.statistics.shape import cell_shape
 from pipeline.tables.table import Row
 
 _ROWS_A_CELL = 1.5
-"""From how many rows a participant's condition on, on average, its own variance can be told from that within it."""
+"""Mean rows per participant and condition from which variance between these cells differs from that within them."""
 
 
 def anova(request: Request) -> Answer:
-    """A row an effect, and the pairs that follow up those of more than two levels."""
+    """One row per effect, and the pairs that follow up those of more than two levels."""
     cases = complete_cases.by_factors_of(request)
     rows = [row_of(request, result) for result in rm_anova(cases.values, request.entry.within)]
     if cases.values.shape[1:] == (2,):
@@ -41,19 +41,20 @@ def anova(request: Request) -> Answer:
 
 
 def art(request: Request) -> Answer:
-    """A row an effect, with the shape of the cells; the pairs by ART-C, where follow_up is stated."""
+    """One row per effect, with the shape of the cells; the pairs by ART-C, where follow_up is stated."""
     cases = complete_cases.by_factors_of(request)
     shape = cell_shape(cases.values)
     rows = [row_of(request, result) for result in art_anova(cases.values, request.entry.within)]
     rows = [{**row, "details": {**row["details"], **shape}} for row in rows]
     if "follow_up" in request.entry.model_fields_set and request.entry.follow_up != "none":
-        for one in art_contrasts(cases.values, request.entry.within, cases.levels):
-            row = pair_row(request, one.result, one.pair, cases)
+        for contrast in art_contrasts(cases.values, request.entry.within, cases.levels):
+            row = pair_row(request, contrast.result, contrast.pair, cases)
             rows.append({**row, "adjust": request.entry.follow_up})
     return rows, cases.left_out
 
 
 def friedman_test(request: Request) -> Answer:
+    """One row; of two conditions with their mean difference."""
     cases = complete_cases.by_condition(request)
     row = row_of(request, friedman(cases.values))
     of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
@@ -61,7 +62,7 @@ def friedman_test(request: Request) -> Answer:
 
 
 def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Callable[[Request], Answer]:
-    """What gives a row a pair of conditions."""
+    """A test of every pair of conditions: one row per pair."""
 
     def answer(request: Request) -> Answer:
         cases = complete_cases.by_condition(request)
@@ -73,12 +74,15 @@ def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Calla
 
 
 def mixed_models(request: Request) -> Answer:
-    """A row a term, and the pairs of levels of those that have more than two."""
+    """One row per term, and the pairs of levels of those that have more than two."""
     model = model_rows.of_model(request)
     results = mixed_model(model.values, model.participants, model.columns, model.terms, _random_intercepts(model))
     rows = [row_of(request, result) for result in results]
     if model_rows.CARRY_OVER in model.columns:
-        rows = [{**row, "method": f"{row['method']}; without first periods, before which nothing came"} for row in rows]
+        rows = [
+            {**row, "method": f"{row['method']}; without first periods, which have no preceding condition"}
+            for row in rows
+        ]
     kept: list[Row] = []
     for _, of_term in groupby(rows, key=lambda row: row["effect"]):
         whole, *levels = of_term
@@ -89,7 +93,7 @@ def mixed_models(request: Request) -> Answer:
 
 
 def _random_intercepts(model: model_rows.ModelRows) -> dict[str, IntArray]:
-    """What intercepts a model needs beside those of participants.
+    """The random intercepts that a model needs beside those of participants.
 
     Where participants have several rows in a condition, each of their conditions has one: without it the rows count as
     if each had met the condition anew, and small differences look certain.

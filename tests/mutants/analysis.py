@@ -57,8 +57,8 @@ MUTANTS = (
         _SESSIONS,
     ),
     Mutant(
-        "float(np.sqrt(found[condition, estimator].mean()))",
-        "float(np.sqrt(found[condition, estimator]).mean())",
+        "float(np.sqrt(errors[condition, estimator].mean()))",
+        "float(np.sqrt(errors[condition, estimator]).mean())",
         _SESSIONS,
     ),
     # Comparisons.
@@ -78,7 +78,7 @@ MUTANTS = (
     Mutant('"reduction": 1 - second / first if', '"reduction": second / first - 1 if', _COMPARED),
     Mutant('{"mean_difference": first - second,', '{"mean_difference": second - first,', _COMPARED),
     Mutant('pairs[row["measure"], row["effect"]] > 1', 'pairs[row["measure"], row["effect"]] > 3', _COMPARED),
-    Mutant("return found if numbers.isna().any() else", "return found if True else", (*_DESIGN, *_COMPARED)),
+    Mutant("return levels if numbers.isna().any() else", "return levels if True else", (*_DESIGN, *_COMPARED)),
     Mutant(
         'if factor == "condition":\n        return list(study.conditions)',
         'if factor == "condition":\n        return sorted(study.conditions)',
@@ -92,15 +92,15 @@ MUTANTS = (
     ),
     Mutant('value=sums["value"] / sums["n"], n=1)', 'value=sums["value"] / sums["n"])', _COMPARED),
     Mutant("(participant, int(period) + 1): condition", "(participant, int(period) - 1): condition", _COMPARED),
-    Mutant("rows[[period > 1 for _, period in at]]", "rows[[period > 0 for _, period in at]]", _COMPARED),
+    Mutant("rows[[period > 1 for _, period in places]]", "rows[[period > 0 for _, period in places]]", _COMPARED),
     Mutant(
-        "early.append(min(periods[first]) < min(periods[second]))",
-        "early.append(min(periods[first]) > min(periods[second]))",
+        "first_came_first.append(min(periods[first]) < min(periods[second]))",
+        "first_came_first.append(min(periods[first]) > min(periods[second]))",
         _COMPARED,
     ),
     # Orders, and the check of a design.
     Mutant("SOURCES = (LOGS, MEASURES, PARTICIPANTS)", "SOURCES = (PARTICIPANTS, MEASURES, LOGS)", _DESIGN),
-    Mutant("len(found) > 1 and len(set(found)) == len(found)", "len(found) > 1", _DESIGN),
+    Mutant("len(listed) > 1 and len(set(listed)) == len(listed)", "len(listed) > 1", _DESIGN),
     Mutant("whole.index(session.condition) + 1", "whole.index(session.condition)", _DESIGN),
     Mutant(
         'once = once[~once.duplicated(["participant", "condition"], keep=False)]',

@@ -1,6 +1,6 @@
-"""Printed figures held against each other: what rounding leaves open, and what no data can give.
+"""Checks printed figures against each other: which follow within rounding, and which no data can have.
 
-No module here knows a study's data. `rounded` and `finding` are what the checks speak in; `granularity`, `p_values`
-and `signed_rank` are the mathematics, on plain numbers; `cells`, `arithmetic`, `recomputed`, `freedom`, `from_means`,
-`wilcoxon` and `claims` are the checks, on the models of `pipeline.study.printed`; `audit` runs them all.
+Only `beside_computed` knows a study's data. `finding` is what every check returns and `phrases` writes printed tests as
+text; `granularity`, `p_values` and `signed_rank` are the mathematics, on plain numbers; `audit` runs all the other
+modules, which are the checks, on the models of `pipeline.study.printed`.
 """

@@ -1,4 +1,4 @@
-"""Printed reductions, totals, percentages and counts against the figures they are made of."""
+"""Printed reductions, totals, percentages and counts against the figures they are computed from."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import reduce
 from math import ceil, floor
 from operator import add
 
-from pipeline.analysis.audit.cells import described
+from pipeline.analysis.audit.cells import printed_cell
 from pipeline.analysis.audit.finding import Finding, Statement
 from pipeline.study.printed import Measure, Parts, Publication, Reduction, Share, Total
 from pipeline.study.rounded import Interval, Rounded
@@ -27,7 +27,7 @@ def _reduction(measure: Measure, reduction: Reduction) -> Finding:
     what = f"{measure.name}, {reduction.before} to {reduction.to}"
     statement = Statement("reduction", what, f"{figure} reduced by {_percent(reduction.percent)}")
     if reduction.of == "participants":
-        return statement.unchecked("a mean of the participants' own reductions does not follow from means")
+        return statement.unchecked("the mean of the participants' own reductions cannot be computed from printed means")
     before, after = (getattr(measure.cells[name], reduction.of) for name in (reduction.before, reduction.to))
     if before is None or after is None:
         return statement.unchecked(f"the {figure} of both conditions is needed")
@@ -37,9 +37,11 @@ def _reduction(measure: Measure, reduction: Reduction) -> Finding:
     fits = possible.meets(reduction.percent.interval)
     explanation = f"1 − {after.text}/{before.text}"
     if not fits and not after.interval.low <= 0 <= after.interval.high:
-        other = (before.interval / after.interval - _ONE) * 100
-        explanation += f"; relative to the second, {reduction.percent.span(other.low, other.high)} %"
-    return statement.held(fits, f"{reduction.percent.span(possible.low, possible.high)} %", explanation)
+        relative_to_second = (before.interval / after.interval - _ONE) * 100
+        explanation += (
+            f"; relative to the second, {reduction.percent.span(relative_to_second.low, relative_to_second.high)} %"
+        )
+    return statement.judge(fits, f"{reduction.percent.span(possible.low, possible.high)} %", explanation)
 
 
 def _reduced(before: Rounded, after: Rounded) -> Interval:
@@ -52,10 +54,10 @@ def _percent(figure: Rounded) -> str:
 
 
 def total_finding(publication: Publication, total: Total) -> Finding:
-    """A total against the means it is made of, each of them as far as the scale's steps allow it."""
+    """A total against the means it is computed from, each narrowed to what the scale's steps allow."""
     statement = Statement("total", total.label, total.printed.text)
     measures = publication.named(total.measures)
-    cells = [described(publication, measure, total.condition) for measure in measures]
+    cells = [printed_cell(publication, measure, total.condition) for measure in measures]
     parts: list[Interval] = []
     grains: set[Fraction | None] = set()
     for cell in cells:
@@ -75,12 +77,12 @@ def total_finding(publication: Publication, total: Total) -> Finding:
         grains.add(grain)
     grain = grains.pop() if len(grains) == 1 else None
     factor = Fraction(1, len(parts)) if total.average is not None else Fraction(1)
-    made = reduce(add, parts) * factor
-    fits = _meets(made, None if grain is None else grain * factor, total.printed.interval)
-    follows = total.printed.span(made.low, made.high)
-    does = "average" if total.average is not None else "add up to"
+    possible_total = reduce(add, parts) * factor
+    fits = _meets(possible_total, None if grain is None else grain * factor, total.printed.interval)
+    follows = total.printed.span(possible_total.low, possible_total.high)
+    verb = "average" if total.average is not None else "add up to"
     over = f" over {cells[0].n} participants" if total.sum is not None and len({cell.n for cell in cells}) == 1 else ""
-    return statement.held(fits, follows, f"the printed means of {len(parts)} measures {does} {follows}{over}")
+    return statement.judge(fits, follows, f"the printed means of {len(parts)} measures {verb} {follows}{over}")
 
 
 def _meets(possible: Interval, grain: Fraction | None, printed: Interval) -> bool:
@@ -92,26 +94,26 @@ def _meets(possible: Interval, grain: Fraction | None, printed: Interval) -> boo
 
 
 def share_finding(share: Share) -> Finding:
-    """A percentage of a number of things: of the printed count, or of any."""
+    """A percentage against the printed count, or against every count that is possible."""
     percent = share.percent.interval
     if share.count is not None:
         statement = Statement("percentage", share.label, f"{share.count} of {share.of}, {_percent(share.percent)}")
         exact = Fraction(100 * share.count, share.of)
         fits = share.count <= share.of and percent.low <= exact <= percent.high
-        return statement.held(fits, f"{share.percent.like(exact)} %", f"{share.count} of {share.of}")
+        return statement.judge(fits, f"{share.percent.like(exact)} %", f"{share.count} of {share.of}")
     statement = Statement("percentage", share.label, f"{_percent(share.percent)} of {share.of}")
     counts = range(max(0, ceil(percent.low * share.of / 100)), min(share.of, floor(percent.high * share.of / 100)) + 1)
     if counts and percent.high - percent.low >= Fraction(100, share.of):
         return statement.unchecked(f"of {share.of} every percentage with these digits is possible")
     if counts:
-        return statement.held(True, f"{counts[0]} of {share.of}", "a whole number of them")
+        return statement.judge(True, f"{counts[0]} of {share.of}", "a whole number of them")
     below = min(max(floor(share.percent.value * share.of / 100), 0), share.of - 1)
     near = [share.percent.like(Fraction(100 * count, share.of)) for count in (below, below + 1)]
-    return statement.held(False, f"{near[0]} or {near[1]} %", f"{below} or {below + 1} of {share.of}")
+    return statement.judge(False, f"{near[0]} or {near[1]} %", f"{below} or {below + 1} of {share.of}")
 
 
 def count_finding(parts: Parts) -> Finding:
     """Counts are exact."""
     printed = f"{' + '.join(map(str, parts.parts))} = {parts.total}"
-    made = sum(parts.parts)
-    return Statement("count", parts.label, printed).held(made == parts.total, str(made), "the sum of the parts")
+    total = sum(parts.parts)
+    return Statement("count", parts.label, printed).judge(total == parts.total, str(total), "the sum of the parts")

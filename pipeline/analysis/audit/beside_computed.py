@@ -1,4 +1,4 @@
-"""A paper's printed figures beside the computed ones, and held against each other."""
+"""A paper's printed figures beside the computed ones, and checked against each other."""
 
 from __future__ import annotations
 
@@ -22,30 +22,32 @@ _ROUND_OFF = Fraction(1, 10**6)  # of a unit in the last digit: what arithmetic 
 
 
 def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame) -> pd.DataFrame:
-    """The table `printed`: each figure with its computed value, then what the audit of the file finds.
+    """The table `printed`: each figure with its computed value, then the findings of the audit.
+
+    Raises PipelineError where the file does not fit the study's results: an unknown measure, condition or test.
 
     Verdicts: agrees, differs, undefined for a figure beside its computed value (`check` is null); those of
-    `forensics.finding` where printed figures are held against each other.
+    `pipeline.analysis.audit.finding` where printed figures are checked against each other.
     """
     publication = load_publication(path)
     computed = _Computed(path, descriptives, comparisons)
     rows = [_row(*figure) for figure in _figures(publication, computed)]
-    for found in audit(publication):
+    for finding in audit(publication):
         rows.append(
             {
-                "what": found.what,
-                "check": found.check,
-                "printed": found.printed,
-                "computed": found.follows,
-                "verdict": found.verdict,
-                "explanation": found.explanation,
+                "what": finding.what,
+                "check": finding.check,
+                "printed": finding.printed,
+                "computed": finding.follows,
+                "verdict": finding.verdict,
+                "explanation": finding.explanation,
             }
         )
     return tables.frame("printed", [{**row, "source": publication.source} for row in rows])
 
 
 Figure = tuple[str, Rounded, float]
-"""What it is, as printed, and its computed value, NaN where that is not defined."""
+"""What the figure is, as it is printed, and its computed value (NaN where undefined)."""
 
 
 def _figures(publication: Publication, computed: _Computed) -> Iterator[Figure]:
@@ -71,18 +73,18 @@ def _of_cell(computed: _Computed, measure: Measure, name: str, condition: str, c
     for column in ("mean", "sd", "median", "rmse"):
         figure = getattr(cell, column)
         if figure is not None:
-            yield f"{measure.name}, {condition}: {column}", figure, computed.described(name, condition, column)
+            yield f"{measure.name}, {condition}: {column}", figure, computed.descriptive(name, condition, column)
 
 
 def _of_test(computed: _Computed, measure: Measure, name: str, test: PrintedTest) -> Iterator[Figure]:
     for symbol, statistic in _STATISTIC_NAMES.items():
         figure = getattr(test, symbol)
         if figure is not None:
-            yield f"{label(measure, test)}, {symbol}", figure, computed.tested(name, test, "statistic", statistic)
+            yield f"{label(measure, test)}, {symbol}", figure, computed.comparison(name, test, "statistic", statistic)
     for column in ("p", "p_adjusted"):
         figure = getattr(test, column)
         if figure is not None:
-            yield f"{label(measure, test)}, {column.replace('_', ' ')}", figure, computed.tested(name, test, column)
+            yield f"{label(measure, test)}, {column.replace('_', ' ')}", figure, computed.comparison(name, test, column)
 
 
 def _row(what: str, printed: Rounded, value: float) -> Row:
@@ -99,12 +101,12 @@ def _row(what: str, printed: Rounded, value: float) -> Row:
 
 
 class _Computed:
-    """The study's descriptives and comparisons, asked for the figures that a publication prints."""
+    """Looks up, in a study's descriptives and comparisons, the figures that a publication prints."""
 
     def __init__(self, path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame) -> None:
         self._path, self._descriptives, self._comparisons = path, descriptives, comparisons
 
-    def described(self, measure: str, condition: str, column: str) -> float:
+    def descriptive(self, measure: str, condition: str, column: str) -> float:
         """A condition's mean, sd or median; as `rmse` the root of its mean."""
         rows = self._rows(self._descriptives, "measure", measure)
         value = self._rows(rows, "condition", condition).iloc[0]["mean" if column == "rmse" else column]
@@ -114,32 +116,32 @@ class _Computed:
 
     def reduction(self, measure: str, reduction: Reduction) -> float:
         """In percent of the first figure."""
-        before, after = (self.described(measure, name, reduction.of) for name in (reduction.before, reduction.to))
+        before, after = (self.descriptive(measure, name, reduction.of) for name in (reduction.before, reduction.to))
         return 100 * (1 - after / before) if before != 0 else np.nan
 
     def total(self, measures: Sequence[str], total: Total) -> float:
-        """Over the measures, and over participants for a sum."""
-        means = [self.described(measure, total.condition, "mean") for measure in measures]
+        """Sum or average of the measures' means; for a sum, over all participants."""
+        means = [self.descriptive(measure, total.condition, "mean") for measure in measures]
         if total.sum is not None:
             means = [
-                mean * self.described(measure, total.condition, "n")
+                mean * self.descriptive(measure, total.condition, "n")
                 for mean, measure in zip(means, measures, strict=True)
             ]
         return sum(means) / (len(means) if total.average is not None else 1)
 
-    def tested(self, measure: str, test: PrintedTest, column: str, statistic: str | None = None) -> float:
-        """A column of the one comparison that the printed test is."""
+    def comparison(self, measure: str, test: PrintedTest, column: str, statistic: str | None = None) -> float:
+        """The value in `column` of the comparison that is the printed test; PipelineError unless exactly one is."""
         rows = self._rows(self._comparisons, "measure", measure)
         for name, wanted in (("test", test.test), ("effect", test.effect), ("contrast", test.contrast)):
             rows = rows if wanted is None else self._rows(rows, name, wanted)
         if test.contrast is None and rows["contrast"].isna().any():
-            rows = rows[rows["contrast"].isna()]  # without what follows them up
+            rows = rows[rows["contrast"].isna()]  # without the follow-up tests
         if statistic is not None:
             rows = self._rows(rows, "statistic_name", statistic)
         if len(rows) != 1:
             raise PipelineError(
-                f'{self._path}: a printed test of "{measure}" fits {len(rows)} of the study\'s comparisons; it must fit'
-                " one: give its test, effect or contrast"
+                f'{self._path}: a printed test of "{measure}" matches {len(rows)} of the study\'s comparisons; it must'
+                " match exactly one: state its test, effect or contrast"
             )
         value = rows.iloc[0][column]
         return np.nan if pd.isna(value) else float(value)

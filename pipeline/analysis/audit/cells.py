@@ -15,8 +15,8 @@ from pipeline.study.rounded import Rounded
 
 
 @dataclass(frozen=True)
-class Described:
-    """A cell with what it takes from its measure and the file. `n` is None where it is not known for certain."""
+class PrintedCell:
+    """A cell, and what its measure and the file say of it. `n` is None where it is not known for certain."""
 
     what: str
     cell: Cell
@@ -36,18 +36,18 @@ class Described:
         return Steps(grain, origin, least, most)
 
 
-def described(publication: Publication, measure: Measure, condition: str) -> Described:
+def printed_cell(publication: Publication, measure: Measure, condition: str) -> PrintedCell:
     """A cell by its condition. Groups must each say their own n: the file's may be that of all together."""
     cell = measure.cells[condition]
     n = cell.n if measure.between else cell.n or measure.n or publication.n
     what = f"{measure.name}, {condition}"
-    return Described(what, cell, n, measure.scale or Scale(), publication.sd == "population")
+    return PrintedCell(what, cell, n, measure.scale or Scale(), publication.sd == "population")
 
 
 def cell_findings(publication: Publication, measure: Measure) -> Iterator[Finding]:
     """Every check that a measure's cells allow."""
     for condition in measure.cells:
-        cell = described(publication, measure, condition)
+        cell = printed_cell(publication, measure, condition)
         yield from _out_of_range(cell)
         if cell.steps is not None:
             yield from _granularity(cell, cell.steps)
@@ -61,23 +61,25 @@ def cell_findings(publication: Publication, measure: Measure) -> Iterator[Findin
             )
 
 
-def _out_of_range(cell: Described) -> Iterator[Finding]:
+def _out_of_range(cell: PrintedCell) -> Iterator[Finding]:
     """Figures that no data can give, whatever the others are."""
     low, high = cell.scale.min, cell.scale.max
     for name, figure in (("SD", cell.cell.sd), ("RMSE", cell.cell.rmse)):
         if figure is not None and figure.interval.high < 0:
-            yield Statement("range", cell.what, f"{name} = {figure.text}").held(False, "0 or more", "it has no sign")
+            yield Statement("range", cell.what, f"{name} = {figure.text}").judge(
+                False, "0 or more", "it cannot be negative"
+            )
     for name, figure in (("M", cell.cell.mean), ("median", cell.cell.median)):
         if figure is None:
             continue
         statement = Statement("range", cell.what, f"{name} = {figure.text}")
         if low is not None and figure.interval.high < low.value:
-            yield statement.held(False, f"{low.text} or more", "the scale begins there")
+            yield statement.judge(False, f"{low.text} or more", "the scale begins there")
         if high is not None and figure.interval.low > high.value:
-            yield statement.held(False, f"{high.text} or less", "the scale ends there")
+            yield statement.judge(False, f"{high.text} or less", "the scale ends there")
 
 
-def _granularity(cell: Described, steps: Steps) -> Iterator[Finding]:
+def _granularity(cell: PrintedCell, steps: Steps) -> Iterator[Finding]:
     """GRIM for the mean, GRIMMER for mean and SD, and a median on the scale's steps."""
     mean, sd, median, n = cell.cell.mean, cell.cell.sd, cell.cell.median, cell.n
     if n is None:
@@ -94,45 +96,45 @@ def _granularity(cell: Described, steps: Steps) -> Iterator[Finding]:
         yield _median(cell, steps, median, n)
 
 
-def _scores(cell: Described, n: int) -> str:
+def _scores(cell: PrintedCell, n: int) -> str:
     step = "whole-number" if cell.scale.step is None or cell.scale.step.value == 1 else f"{cell.scale.step.text}-step"
     items = f", each the mean of {cell.scale.items} items" if cell.scale.items > 1 else ""
     return f"{n} {step} scores{items}"
 
 
-def _grim(cell: Described, steps: Steps, mean: Rounded, n: int) -> Finding:
+def _grim(cell: PrintedCell, steps: Steps, mean: Rounded, n: int) -> Finding:
     statement, interval = Statement("GRIM", cell.what, f"M = {mean.text}"), mean.interval
     totals = steps.totals(interval, n)
     if not totals:
         below, above = (mean.like(value) for value in steps.nearest_means(mean.value, n))
-        return statement.held(False, f"{below} or {above}", f"no {_scores(cell, n)} have this mean")
+        return statement.judge(False, f"{below} or {above}", f"no {_scores(cell, n)} have this mean")
     if interval.high - interval.low >= steps.grain / n:
         return statement.unchecked(f"at n = {n} every mean with these digits is possible")
-    return statement.held(True, mean.like(steps.mean(totals[0], n)), f"{_scores(cell, n)} can have this mean")
+    return statement.judge(True, mean.like(steps.mean(totals[0], n)), f"{_scores(cell, n)} can have this mean")
 
 
-def _grimmer(cell: Described, steps: Steps, mean: Rounded, sd: Rounded, n: int) -> Finding:
+def _grimmer(cell: PrintedCell, steps: Steps, mean: Rounded, sd: Rounded, n: int) -> Finding:
     statement = Statement("GRIMMER", cell.what, f"M = {mean.text}, SD = {sd.text}")
-    divisor, other = (n, n - 1) if cell.population else (n - 1, n)
-    found = possible_sample(steps, mean.interval, sd.interval, n, divisor)
-    if found is not None:
-        follows = f"M = {mean.like(found[0])}, SD = {sd.like(sqrt(found[1]))}"
-        return statement.held(True, follows, f"{_scores(cell, n)} can have both")
+    divisor, other_divisor = (n, n - 1) if cell.population else (n - 1, n)
+    sample = possible_sample(steps, mean.interval, sd.interval, n, divisor)
+    if sample is not None:
+        follows = f"M = {mean.like(sample[0])}, SD = {sd.like(sqrt(sample[1]))}"
+        return statement.judge(True, follows, f"{_scores(cell, n)} can have both")
     explanation = f"no {_scores(cell, n)} have both"
-    if possible_sample(steps, mean.interval, sd.interval, n, other) is not None:
+    if possible_sample(steps, mean.interval, sd.interval, n, other_divisor) is not None:
         explanation += f"; they could if the SD were divided by {'n − 1' if cell.population else 'n'}"
-    return statement.held(False, "another mean or SD", explanation)
+    return statement.judge(False, "another mean or SD", explanation)
 
 
-def _median(cell: Described, steps: Steps, median: Rounded, n: int) -> Finding:
+def _median(cell: PrintedCell, steps: Steps, median: Rounded, n: int) -> Finding:
     """A score where n is odd, the mean of two where it is even."""
     grain = steps.grain if n % 2 else steps.grain / 2
     low, high = ((end - steps.origin) / grain for end in (median.interval.low, median.interval.high))
     statement = Statement("median", cell.what, f"median = {median.text}")
-    return statement.held(ceil(low) <= floor(high), f"steps of {float(grain):g}", f"the median of {_scores(cell, n)}")
+    return statement.judge(ceil(low) <= floor(high), f"steps of {float(grain):g}", f"the median of {_scores(cell, n)}")
 
 
-def _spread(cell: Described) -> Iterator[Finding]:
+def _spread(cell: PrintedCell) -> Iterator[Finding]:
     """On a scale without steps: an SD no larger than the mean and the scale's ends allow."""
     mean, sd, low, high = cell.cell.mean, cell.cell.sd, cell.scale.min, cell.scale.max
     if mean is None or sd is None or low is None or (high is None and cell.n is None) or cell.n == 1:
@@ -146,17 +148,17 @@ def _spread(cell: Described) -> Iterator[Finding]:
         squares = at_ends if cell.n is None else min(squares, at_ends)
     largest = squares / (n if cell.population else n - 1)
     ends = f"from {low.text} to {high.text}" if high is not None else f"of {low.text} and more"
-    yield Statement("range", cell.what, f"M = {mean.text}, SD = {sd.text}").held(
+    yield Statement("range", cell.what, f"M = {mean.text}, SD = {sd.text}").judge(
         sd.interval.at_least(0).low ** 2 <= largest,
         f"SD of {sd.like(sqrt(largest))} or less",
-        f"values {ends} with this mean spread no further",
+        f"values {ends} with this mean cannot spread further",
     )
 
 
-def _rmse(cell: Described, rmse: Rounded, mean: Rounded) -> Finding:
+def _rmse(cell: PrintedCell, rmse: Rounded, mean: Rounded) -> Finding:
     """The root of the mean of the squares; compared as squares, which are exact."""
     squares = mean.interval.at_least(0)
-    return Statement("RMSE", cell.what, f"RMSE = {rmse.text}").held(
+    return Statement("RMSE", cell.what, f"RMSE = {rmse.text}").judge(
         rmse.interval.squared().meets(mean.interval),
         rmse.span(sqrt(squares.low), sqrt(squares.high)),
         f"the root of the mean, {mean.text}",

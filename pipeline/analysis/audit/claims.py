@@ -20,9 +20,12 @@ _NAMES = {"holm": "Holm", "bonferroni": "Bonferroni", "benjamini_hochberg": "Ben
 
 
 def claim_findings(publication: Publication) -> Iterator[Finding]:
-    """Each claim against the level; those of a family judged by an adjustment belong to the family."""
+    """Each claim against the level; claims in a family with adjusted p are checked with the family."""
     judged = {
-        id(test) for family in publication.families if family.adjust != "none" for _, test in _of(publication, family)
+        id(test)
+        for family in publication.families
+        if family.adjust != "none"
+        for _, test in _tests_of(publication, family)
     }
     for measure, test in publication.tests():
         if test.significant is not None and (id(test) not in judged or test.p_adjusted is not None):
@@ -30,7 +33,7 @@ def claim_findings(publication: Publication) -> Iterator[Finding]:
 
 
 def below(p: Rounded | None, bounds: Bounds | None, alpha: Fraction) -> bool | None:
-    """Is p below the level? None where rounding leaves it open. The statistic may narrow what is printed."""
+    """Is p below the level? None where rounding leaves it open. `bounds`, from the statistic, narrow p."""
     low: Fraction | float = 0 if p is None else p.interval.low
     high: Fraction | float = 1 if p is None else p.interval.high
     if p is not None and p.relation == "<" and p.value <= alpha:
@@ -55,7 +58,7 @@ def _claim(publication: Publication, measure: Measure, test: PrintedTest, signif
     alpha = _level(publication, test)
     if p is None and (bounds is None or test.statistic is None):
         bare = Statement("claim", label(measure, test), f"called {said}")
-        return bare.unchecked("neither p nor what gives it is given")
+        return bare.unchecked("neither p nor a statistic from which it follows is printed")
     figure = written_p(p) if p is not None else written(*test.statistic, test) if test.statistic else ""
     statement = Statement("claim", label(measure, test), f"{figure}, called {said}")
     is_below = below(p, bounds, alpha)
@@ -63,19 +66,19 @@ def _claim(publication: Publication, measure: Measure, test: PrintedTest, signif
         return statement.unchecked(f"{figure} may lie on either side of {float(alpha):g}")
     follows = "significant" if is_below else "not significant"
     explanation = f"{figure} is {'below' if is_below else 'not below'} the level of {float(alpha):g}"
-    return statement.held(is_below == significant, follows, explanation)
+    return statement.judge(is_below == significant, follows, explanation)
 
 
 def family_findings(publication: Publication, family: Family) -> Iterator[Finding]:
     """A family's tests with p adjusted over them: against what the text says, or as a remark where it adjusted none."""
-    everyone = _of(publication, family)
-    tests = [(measure, test) for measure, test in everyone if test.p is not None]
+    all_tests = _tests_of(publication, family)
+    tests = [(measure, test) for measure, test in all_tests if test.p is not None]
     how = f"by {_NAMES[family.adjust]}" if family.adjust != "none" else "not said to be adjusted"
-    statement = Statement("multiplicity", family.label, f"p of {counted(len(everyone), 'test')}, {how}")
-    if family.adjust == "none" and any(test.p_adjusted is not None for _, test in everyone):
+    statement = Statement("multiplicity", family.label, f"p of {counted(len(all_tests), 'test')}, {how}")
+    if family.adjust == "none" and any(test.p_adjusted is not None for _, test in all_tests):
         yield statement.unchecked("adjusted p values are printed; `adjust` should say by which method")
-    elif len(tests) < 2 or (len(tests) < len(everyone) and family.adjust != "none"):
-        yield statement.unchecked("the p values of all its tests are needed, of two or more")
+    elif len(tests) < 2 or (len(tests) < len(all_tests) and family.adjust != "none"):
+        yield statement.unchecked("needs the p values of all its tests, and at least two tests")
     elif family.adjust == "none":
         yield _by_holm(publication, statement, tests)
     else:
@@ -83,7 +86,7 @@ def family_findings(publication: Publication, family: Family) -> Iterator[Findin
             yield from _adjusted_findings(publication, family, measure, test, bounds)
 
 
-def _of(publication: Publication, family: Family) -> list[Labelled]:
+def _tests_of(publication: Publication, family: Family) -> list[Labelled]:
     return [(measure, test) for measure in publication.named(family.measures) for test in measure.tests]
 
 
@@ -108,9 +111,9 @@ def _by_holm(publication: Publication, statement: Statement, tests: Sequence[Lab
             if bounds[0] > alpha:
                 lost.append(name)
     if not called:
-        return statement.held(True, "none significant", "nothing to lose")
+        return statement.judge(True, "none significant", "no test is called significant")
     if not lost:
-        return statement.held(True, f"{len(called)} after Holm", f"all {len(called)} called significant stay so")
+        return statement.judge(True, f"{len(called)} after Holm", f"all {len(called)} called significant stay so")
     explanation = f"not below the level after Holm over {counted(len(tests), 'test')}: {', '.join(lost)}"
     return statement.remark(f"{len(called) - len(lost)} of {len(called)} after Holm", explanation)
 
@@ -126,7 +129,7 @@ def _adjusted_findings(
         printed = f"{written_p(test.p)}, adjusted {written_p(test.p_adjusted)}"
         statement = Statement("multiplicity", label(measure, test), printed)
         follows = test.p_adjusted.span(*bounds)
-        yield statement.held(meets(bounds, test.p_adjusted.interval), follows, name)
+        yield statement.judge(meets(bounds, test.p_adjusted.interval), follows, name)
     elif test.significant is not None:
         said = "significant" if test.significant else "not significant"
         statement = Statement("claim", label(measure, test), f"{written_p(test.p)}, called {said}")
@@ -135,4 +138,4 @@ def _adjusted_findings(
             yield statement.unchecked(f"{name}: the adjusted p may lie on either side of the level")
         else:
             follows = "significant" if is_below else "not significant"
-            yield statement.held(is_below == test.significant, follows, f"{name}: adjusted p {test.p.span(*bounds)}")
+            yield statement.judge(is_below == test.significant, follows, f"{name}: adjusted p {test.p.span(*bounds)}")

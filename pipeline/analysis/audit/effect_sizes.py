@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import inf, sqrt
 
-from pipeline.analysis.audit.cells import described
+from pipeline.analysis.audit.cells import printed_cell
+from pipeline.analysis.audit.degrees_of_freedom import degrees_of_freedom, exactly, rounded_after_correction
 from pipeline.analysis.audit.finding import Finding, Statement
-from pipeline.analysis.audit.freedom import exactly, freedom, rounded_after_correction
 from pipeline.analysis.audit.p_values import Bounds
-from pipeline.analysis.audit.phrases import label, measure_of_effect
+from pipeline.analysis.audit.phrases import label, written_effect
 from pipeline.statistics.effect_size import hedges_correction
 from pipeline.study.printed import Measure, PrintedTest, Publication
 from pipeline.study.rounded import Interval, Rounded
 
 Reading = tuple[str, Bounds]
-"""What a figure may be meant as, "" for the plain meaning, and what its size then is."""
+"""How a printed figure may be meant ("" for the usual meaning), and the bounds of its size if so."""
 
 _ROUND_OFF = 1e-9
 _PAIRED = ("t_paired", "rm_anova")
@@ -26,9 +26,9 @@ def effect_size_findings(publication: Publication, measure: Measure, test: Print
     """Every effect size that is printed with a test."""
     n = publication.n_of(measure, test)
     if test.partial_eta_squared is not None:
-        yield _held(measure, test, "η²p", test.partial_eta_squared, list(_partial(test, n)), _NEEDS_F)
+        yield _by_readings(measure, test, "η²p", test.partial_eta_squared, list(_partial(test, n)), _NEEDS_F)
     if test.d_z is not None:
-        yield _held(measure, test, "d_z", test.d_z, list(_of_pairs(test, n)), _NEEDS_T)
+        yield _by_readings(measure, test, "d_z", test.d_z, list(_of_pairs(test, n)), _NEEDS_T)
     if test.d is not None:
         yield _cohen(publication, measure, test, test.d, n)
     if test.effect_r is not None:
@@ -36,24 +36,24 @@ def effect_size_findings(publication: Publication, measure: Measure, test: Print
 
 
 _NEEDS_F = "F (or t) and its degrees of freedom are needed"
-_NEEDS_T = "it takes test: t_paired, or rm_anova of two conditions, its statistic and n"
+_NEEDS_T = "needs test: t_paired, or rm_anova with two conditions, its statistic and n"
 
 
-def _held(
+def _by_readings(
     measure: Measure, test: PrintedTest, name: str, printed: Rounded, readings: Sequence[Reading], needed: str
 ) -> Finding:
-    """By the plain reading, or as a remark by another that a publication may mean."""
-    statement = Statement("effect size", label(measure, test), measure_of_effect(test, printed, name))
+    """Agreement by the usual reading; a remark where only another reading fits; else a contradiction."""
+    statement = Statement("effect size", label(measure, test), written_effect(test, printed, name))
     if not readings:
         return statement.unchecked(needed)
     size = printed.interval.size()
     for reading, bounds in readings:
         if _meets(size, bounds):
             if not reading:
-                return statement.held(True, _span(printed, bounds), f"{name} follows from the statistic")
+                return statement.judge(True, _span(printed, bounds), f"{name} follows from the statistic")
             plain = _span(printed, readings[0][1])
             return statement.remark(_span(printed, bounds), f"only if {reading}; else {name} is {plain}")
-    return statement.held(False, _span(printed, readings[0][1]), f"{name} does not follow from the statistic")
+    return statement.judge(False, _span(printed, readings[0][1]), f"{name} does not follow from the statistic")
 
 
 def _meets(size: Interval, bounds: Bounds) -> bool:
@@ -66,7 +66,7 @@ def _span(printed: Rounded, bounds: Bounds) -> str:
 
 def _partial(test: PrintedTest, n: int | None) -> Iterator[Reading]:
     """η²p = F·df₁/(F·df₁ + df₂), whatever the correction for sphericity: it takes both by one factor."""
-    df = freedom(test, n)
+    df = degrees_of_freedom(test, n)
     if test.statistic is None or test.statistic[0] not in ("t", "F") or not df:
         return
     symbol, statistic = test.statistic[0], test.statistic[1].interval
@@ -85,8 +85,8 @@ def _share(ratio: Fraction) -> float:
 
 
 def _t_of_pairs(test: PrintedTest, n: int | None) -> tuple[Bounds, int] | None:
-    """|t| of two paired conditions, and of how many pairs; None where it is another test or n is not known."""
-    df = freedom(test, n)
+    """Bounds of |t| of two paired conditions, and the number of pairs; None for other tests and where n is unknown."""
+    df = degrees_of_freedom(test, n)
     if test.statistic is None or test.test not in _PAIRED or not df or df[-1].low != df[-1].high or df[-1].low < 1:
         return None
     symbol, statistic = test.statistic[0], test.statistic[1].interval
@@ -101,10 +101,10 @@ def _t_of_pairs(test: PrintedTest, n: int | None) -> tuple[Bounds, int] | None:
 
 def _of_pairs(test: PrintedTest, n: int | None) -> Iterator[Reading]:
     """d_z = t/√n."""
-    found = _t_of_pairs(test, n)
-    if found is None:
+    t_and_pairs = _t_of_pairs(test, n)
+    if t_and_pairs is None:
         return
-    (low, high), pairs = found
+    (low, high), pairs = t_and_pairs
     dz = (low / sqrt(pairs), high / sqrt(pairs))
     yield "", dz
     if (correction := hedges_correction(pairs - 1)) is not None:
@@ -112,14 +112,16 @@ def _of_pairs(test: PrintedTest, n: int | None) -> Iterator[Reading]:
 
 
 def _cohen(publication: Publication, measure: Measure, test: PrintedTest, printed: Rounded, n: int | None) -> Finding:
-    """d of groups follows from t and their n; that of pairs depends on which SD it is over, so it can only agree."""
+    """d of groups follows from t and their n. d of pairs may be divided by several SDs, so it can only agree."""
     if test.test in ("t_independent", "welch"):
         return _of_groups(publication, measure, test, printed)
-    statement = Statement("effect size", label(measure, test), measure_of_effect(test, printed, "d"))
+    statement = Statement("effect size", label(measure, test), written_effect(test, printed, "d"))
     for _, bounds in (*_of_pairs(test, n), *_over_sds(publication, measure, test)):
         if _meets(printed.interval.size(), bounds):
-            return statement.held(True, _span(printed, bounds), "d_z, or the difference over an SD that is printed")
-    return statement.unchecked("a d of paired conditions may be over several SDs; where it is t/√n, call it d_z")
+            return statement.judge(True, _span(printed, bounds), "d_z, or the difference divided by a printed SD")
+    return statement.unchecked(
+        "d of paired conditions may be divided by one of several SDs; if it is t/√n, call it d_z"
+    )
 
 
 def _of_groups(publication: Publication, measure: Measure, test: PrintedTest, printed: Rounded) -> Finding:
@@ -137,13 +139,15 @@ def _of_groups(publication: Publication, measure: Measure, test: PrintedTest, pr
             by_df = 2 / sqrt(sum(ns) - 2)
             readings.append(("it is 2t/√df", (float(size.low) * by_df, float(size.high) * by_df)))
         readings += _over_sds(publication, measure, test)
-    return _held(measure, test, "d", printed, readings, "t and n of both groups are needed (of Welch's t equal ones)")
+    return _by_readings(
+        measure, test, "d", printed, readings, "t and n of both groups are needed (for Welch's t, equal n)"
+    )
 
 
 def _over_sds(publication: Publication, measure: Measure, test: PrintedTest) -> list[Reading]:
     """The difference of two printed means over one of their SDs, the mean SD, and the root of the mean variance."""
     names = test.conditions or tuple(measure.cells)
-    cells = [described(publication, measure, name).cell for name in names]
+    cells = [printed_cell(publication, measure, name).cell for name in names]
     means = [cell.mean.interval for cell in cells if cell.mean is not None]
     sds = [cell.sd.interval.at_least(0) for cell in cells if cell.sd is not None]
     if len(cells) != 2 or len(means) != 2 or len(sds) != 2:
@@ -151,10 +155,10 @@ def _over_sds(publication: Publication, measure: Measure, test: PrintedTest) -> 
     difference = (means[0] - means[1]).size()
     lows, highs = [float(sd.low) for sd in sds], [float(sd.high) for sd in sds]
     ways = {
-        "it is over the first SD": (lows[0], highs[0]),
-        "it is over the second SD": (lows[1], highs[1]),
-        "it is over the mean of the SDs": (sum(lows) / 2, sum(highs) / 2),
-        "it is over the root of the mean variance": (_root_mean(lows), _root_mean(highs)),
+        "it is divided by the first SD": (lows[0], highs[0]),
+        "it is divided by the second SD": (lows[1], highs[1]),
+        "it is divided by the mean of the SDs": (sum(lows) / 2, sum(highs) / 2),
+        "it is divided by the root of the mean variance": (_root_mean(lows), _root_mean(highs)),
     }
     return [
         (way, (float(difference.low) / high if high else inf, float(difference.high) / low if low else inf))
@@ -177,10 +181,10 @@ def _from_z(publication: Publication, measure: Measure, test: PrintedTest, print
             readings.append(("", _over_root(size, number, number)))
             if test.test == "wilcoxon":
                 readings.append(
-                    ("N counts observations, two of a participant", _over_root(size, 2 * number, 2 * number))
+                    ("N counts observations, two per participant", _over_root(size, 2 * number, 2 * number))
                 )
                 readings.append(("N counts only pairs that differ", _over_root(size, 1, number)))
-    return _held(measure, test, "r", printed, readings, needed)
+    return _by_readings(measure, test, "r", printed, readings, needed)
 
 
 def _over_root(size: Interval, fewest: int, most: int) -> Bounds:

@@ -1,4 +1,4 @@
-"""What a check says of printed figures."""
+"""The result of a check of printed figures."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ class Statement:
     what: str
     printed: str
 
-    def held(self, fits: bool, follows: str, explanation: str) -> Finding:
-        """An agreement or a contradiction."""
-        return self._found(AGREEMENT if fits else CONTRADICTION, follows, explanation)
+    def judge(self, fits: bool, follows: str, explanation: str) -> Finding:
+        """An agreement where the figures fit, else a contradiction."""
+        return self._finding(AGREEMENT if fits else CONTRADICTION, follows, explanation)
 
     def remark(self, follows: str, explanation: str) -> Finding:
         """Possible, and worth knowing of."""
-        return self._found(REMARK, follows, explanation)
+        return self._finding(REMARK, follows, explanation)
 
     def unchecked(self, reason: str) -> Finding:
         """A check that could not be made."""
-        return self._found(UNCHECKED, "", reason)
+        return self._finding(UNCHECKED, "", reason)
 
-    def _found(self, verdict: Verdict, follows: str, explanation: str) -> Finding:
+    def _finding(self, verdict: Verdict, follows: str, explanation: str) -> Finding:
         return Finding(self.check, self.what, self.printed, follows, verdict, explanation)

@@ -1,13 +1,13 @@
-"""Printed t, and F of two conditions, against what the printed means and SDs leave open."""
+"""Printed t, and F of two conditions, against what the printed means and SDs allow."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from math import inf, sqrt
 
-from pipeline.analysis.audit.cells import Described, described
+from pipeline.analysis.audit.cells import PrintedCell, printed_cell
+from pipeline.analysis.audit.degrees_of_freedom import degrees_of_freedom, exactly
 from pipeline.analysis.audit.finding import Finding, Statement
-from pipeline.analysis.audit.freedom import exactly, freedom
 from pipeline.analysis.audit.p_values import Bounds
 from pipeline.analysis.audit.phrases import label, written
 from pipeline.study.printed import BETWEEN, Measure, PrintedTest, Publication
@@ -22,8 +22,8 @@ def statistic_findings(publication: Publication, measure: Measure, test: Printed
     if test.statistic is None or len(names) != 2 or test.test not in (*_PAIRED, *BETWEEN) or test.effect is not None:
         return
     symbol, statistic = test.statistic
-    df = freedom(test, publication.n_of(measure, test))
-    cells = [described(publication, measure, name) for name in names]
+    df = degrees_of_freedom(test, publication.n_of(measure, test))
+    cells = [printed_cell(publication, measure, name) for name in names]
     if symbol not in ("t", "F") or any(cell.cell.mean is None or cell.cell.sd is None for cell in cells):
         return
     if symbol == "F" and (df is None or df[0] != exactly(1)):
@@ -33,7 +33,7 @@ def statistic_findings(publication: Publication, measure: Measure, test: Printed
     if len(ns) < 2 or min(ns) < 2 or df is None:
         yield statement.unchecked("n of each condition and the degrees of freedom are needed")
     elif test.test in _PAIRED and (ns[0] != ns[1] or not exactly(ns[0] - 1).meets(df[-1])):
-        yield statement.unchecked("the test did not take those whom the means and SDs are of")
+        yield statement.unchecked("the test and the means are not of the same participants")
     else:
         paired = test.test in _PAIRED
         low, high = _paired_t(cells, ns[0]) if paired else _group_t(cells, ns, test.test == "welch")
@@ -41,26 +41,26 @@ def statistic_findings(publication: Publication, measure: Measure, test: Printed
         bounds = (low**power, high**power)
         fits = float(size.low) <= bounds[1] * (1 + _ROUND_OFF) and bounds[0] * (1 - _ROUND_OFF) <= float(size.high)
         follows = statistic.span(*bounds) if high < inf else f"{statistic.like(bounds[0])} or more"
-        what = "whatever the correlation of the conditions" if paired else "with n"
-        yield statement.held(fits, follows, f"what means and SDs leave open, {what}")
+        given = "whatever the correlation of the conditions" if paired else "given n"
+        yield statement.judge(fits, follows, f"what the means and SDs allow, {given}")
 
 
-def _difference(cells: list[Described]) -> Bounds:
+def _difference(cells: list[PrintedCell]) -> Bounds:
     """|difference of the means|."""
     first, second = (cell.cell.mean.interval for cell in cells if cell.cell.mean is not None)
     size = (first - second).size()
     return float(size.low), float(size.high)
 
 
-def _sds(cells: list[Described]) -> list[Bounds]:
+def _sds(cells: list[PrintedCell]) -> list[Bounds]:
     """Each condition's sample SD."""
-    found = []
+    sds = []
     for cell in cells:
         if cell.cell.sd is not None and cell.n is not None:
             factor = sqrt(cell.n / (cell.n - 1)) if cell.population else 1.0
             sd = cell.cell.sd.interval.at_least(0)
-            found.append((float(sd.low) * factor, float(sd.high) * factor))
-    return found
+            sds.append((float(sd.low) * factor, float(sd.high) * factor))
+    return sds
 
 
 def _ratio(above: float, below: float) -> float:
@@ -69,7 +69,7 @@ def _ratio(above: float, below: float) -> float:
     return inf if above > 0 else 0.0
 
 
-def _paired_t(cells: list[Described], n: int) -> Bounds:
+def _paired_t(cells: list[PrintedCell], n: int) -> Bounds:
     """|t|: the SD of the differences lies between |s₁ − s₂| and s₁ + s₂, as the conditions correlate."""
     (low, high), (first, second) = _difference(cells), _sds(cells)
     apart = max(0.0, first[0] - second[1], second[0] - first[1])
@@ -77,7 +77,7 @@ def _paired_t(cells: list[Described], n: int) -> Bounds:
     return sqrt(n) * _ratio(low, first[1] + second[1]), largest
 
 
-def _group_t(cells: list[Described], ns: list[int], welch: bool) -> Bounds:
+def _group_t(cells: list[PrintedCell], ns: list[int], welch: bool) -> Bounds:
     """|t| by Student's pooled variance, or Welch's."""
     (low, high), sds = _difference(cells), _sds(cells)
     errors = []

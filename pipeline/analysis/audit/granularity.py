@@ -1,8 +1,8 @@
 """Which means and SDs n scores on a stepped scale can have: GRIM and GRIMMER, exactly.
 
 GRIM: a mean of n such scores is a whole number of steps over n (Brown and Heathers 2017). GRIMMER: so is the sum of
-squares, with the parity of the sum (Anaya 2016; Allard 2018). Beyond the published tests a sample with both sums is
-looked for, so that a scale's ends and very small n count too.
+squares, with the parity of the sum (Anaya 2016; Allard 2018). Beyond the published tests, a sample with both sums is
+searched for, so that a scale's ends and a very small n matter too.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from math import ceil, floor, isqrt
 
 from pipeline.study.rounded import Interval
 
-_MOST_LOOKS = 20_000  # in a search, before a sample counts as possible, unproven
-_MOST_SUMS = 200  # pairs of sums tried before that
-_MOST_TOTALS = 10_000  # and sums without such a pair
+_MOST_LOOKS = 20_000  # steps of a search, after which a sample counts as possible without proof
+_MOST_SUMS = 200  # pairs of sums tried, before the figures count as possible
+_MOST_TOTALS = 10_000  # sums tried, before the figures count as possible
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def possible_sample(
 
 
 def has_sample(n: int, total: int, squares: int, least: int | None, most: int | None) -> bool | None:
-    """Are there n whole numbers from `least` to `most` with this sum and this sum of squares? None: not found out."""
+    """Are there n whole numbers from `least` to `most` with this sum and this sum of squares? None: unknown."""
     spread = n * squares - total**2
     if spread < 0:
         return False
@@ -93,8 +93,8 @@ def has_sample(n: int, total: int, squares: int, least: int | None, most: int | 
 def _search(n: int, total: int, squares: int, most: int) -> bool | None:
     """The same for numbers from 0 to `most`: take off the largest, then the next that is no larger, and so on.
 
-    What is then left to the others has to be even, which leaves them the most room. A state that led nowhere is not
-    entered twice.
+    The remaining numbers, none larger than the last taken, must reach what is left of both sums. A state that led
+    nowhere is not entered twice.
     """
     if not _may_have(n, total, squares, most):
         return False

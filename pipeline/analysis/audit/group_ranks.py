@@ -1,8 +1,8 @@
 """Printed Mann-Whitney and Kruskal-Wallis tests: what groups of these sizes can have, whatever values tie.
 
-With ties the ranks' variance is smaller and a p may lie on either side of that without; so a p that U alone does not
-give is a remark. Called impossible is only what no values have: with r the correlation of ranks and groups, z² is
-(N − 1)·r², and H is N − 1 times the share of the ranks' variation that groups explain.
+With ties the ranks' variance is smaller and a p may lie on either side of that without; so a p that does not follow
+from U without ties is only a remark. Only what no values can have is called impossible: with r the correlation of ranks
+and groups, z² is (N − 1)·r², and H is N − 1 times the share of the ranks' variation that groups explain.
 """
 
 from __future__ import annotations
@@ -48,26 +48,26 @@ def _kruskal(measure: Measure, test: PrintedTest, number: int) -> Iterator[Findi
     if figure is not None:
         statement = Statement("ranks of groups", label(measure, test), _printed(test))
         fits = figure.interval.low <= number - 1
-        yield statement.held(fits, f"{number - 1} or less", f"H of {number} participants is no more")
+        yield statement.judge(fits, f"{number - 1} or less", f"H of {number} participants cannot be larger")
 
 
 def _mann_whitney(measure: Measure, test: PrintedTest, n: int, m: int) -> Iterator[Finding]:
     statement = Statement("ranks of groups", label(measure, test), _printed(test))
     number = n + m
     if test.U is not None and not _is_u(test.U.interval, n * m):
-        yield statement.held(False, f"0 to {n * m} in halves", f"no U of groups of {n} and {m} is this")
+        yield statement.judge(False, f"0 to {n * m} in steps of 0.5", f"groups of {n} and {m} cannot have this U")
         return
     if test.z is not None:
         largest, least = sqrt(number - 1), 0.0
         if test.U is not None:
-            least = max(0.0, _apart(test.U.interval, n * m)[0] - 0.5) / _sd(n, m)
+            least = max(0.0, _distance(test.U.interval, n * m)[0] - 0.5) / _sd(n, m)
         size = test.z.interval.size()
         fits = float(size.low) <= largest * (1 + _ROUND_OFF) and float(size.high) >= least * (1 - _ROUND_OFF)
-        yield statement.held(fits, test.z.span(least, largest), "z without its sign, for some ties")
+        yield statement.judge(fits, test.z.span(least, largest), "z without its sign, for some ties")
     if test.p is not None:
         yield _p_finding(statement, test, test.p, n, m)
     elif test.U is not None and test.z is None:
-        yield statement.held(True, f"0 to {n * m} in halves", f"a U that groups of {n} and {m} can have")
+        yield statement.judge(True, f"0 to {n * m} in steps of 0.5", f"a U that groups of {n} and {m} can have")
 
 
 def _is_u(printed: Interval, most: int) -> bool:
@@ -79,8 +79,8 @@ def _sd(n: int, m: int) -> float:
     return sqrt(n * m * (n + m + 1) / 12)
 
 
-def _apart(u: Interval, most: int) -> Bounds:
-    """|U − its mean|, U being the one or the other group's."""
+def _distance(u: Interval, most: int) -> Bounds:
+    """Bounds of |U − its mean|, the same for either group's U."""
     size = (Interval(u.low * 2 - most, u.high * 2 - most)).size()
     return float(size.low) / 2, min(float(size.high), most) / 2
 
@@ -91,17 +91,19 @@ def _p_finding(statement: Statement, test: PrintedTest, p: Rounded, n: int, m: i
     fewest_sides = 1 if test.sides == "1" or test.sides is None else 2
     least = min(1 / comb(n + m, n), fewest_sides * float(stats.norm.sf(sqrt(n + m - 1)))) * (1 - _ROUND_OFF)
     if float(p.interval.high) < least:
-        return statement.held(False, f"{least:.2g} or more", f"no p of groups of {n} and {m} is as small")
+        return statement.judge(False, f"{least:.2g} or more", f"groups of {n} and {m} cannot have a p this small")
     if test.U is None:
-        return statement.held(True, "possible", f"a p that groups of {n} and {m} can have, for some ties")
+        return statement.judge(True, "possible", f"a p that groups of {n} and {m} can have, for some ties")
     sides = [2, 1] if test.sides is None else [int(test.sides)]
     for count in sides:
         bounds = _without_ties(test.U.interval, n, m, test.method)
         side = (bounds[0] * count / 2, bounds[1] * count / 2)
         if meets(side, p.interval) or (count == 1 and meets((1 - side[1], 1 - side[0]), p.interval)):
             if count == sides[0]:
-                return statement.held(True, _span(side), "p follows from U, where few values tie")
-            return statement.remark(_span(side), f"only if it is one-sided; else p is {_span(bounds)} where few tie")
+                return statement.judge(True, _span(side), "p follows from U, where few values tie")
+            return statement.remark(
+                _span(side), f"only if it is one-sided; else p is {_span(bounds)} where few values tie"
+            )
     return statement.remark(
         _span(_without_ties(test.U.interval, n, m, test.method)), "p does not follow from U unless many values tie"
     )
@@ -115,15 +117,15 @@ def _without_ties(u: Interval, n: int, m: int, method: str | None) -> Bounds:
     """Two-sided p of the normal approximation, with and without its correction for continuity, and the exact one."""
     from scipy import stats
 
-    near, far = _apart(u, n * m)
-    found: list[float] = []
+    near, far = _distance(u, n * m)
+    p_values: list[float] = []
     if method != "exact":
         for apart in (near, far):
             z = (np.array([apart, max(apart - 0.5, 0.0)])) / _sd(n, m)
-            found += [float(p) for p in 2 * stats.norm.sf(z)]
+            p_values += [float(p) for p in 2 * stats.norm.sf(z)]
     if method != "normal" and n + m <= _MOST_FOR_EXACT:
-        found += [_exact(n * m / 2 - apart, n, m) for apart in (near, far)]
-    return (min(found) * (1 - _ROUND_OFF), min(1.0, max(found) * (1 + _ROUND_OFF))) if found else (0.0, 1.0)
+        p_values += [_exact(n * m / 2 - apart, n, m) for apart in (near, far)]
+    return (min(p_values) * (1 - _ROUND_OFF), min(1.0, max(p_values) * (1 + _ROUND_OFF))) if p_values else (0.0, 1.0)
 
 
 def _exact(u: float, n: int, m: int) -> float:

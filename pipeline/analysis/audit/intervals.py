@@ -20,7 +20,7 @@ def interval_finding(what: str, interval: Printed, cell: Cell, n: int | None, po
     printed = f"{cell.ci_level.text} % CI [{low.text}, {high.text}]"
     statement = Statement("interval", what, printed)
     if low.interval.low > high.interval.high:
-        return statement.held(False, "the lower bound first", "the lower bound is above the upper one")
+        return statement.judge(False, "the lower bound first", "the lower bound is above the upper one")
     level = float(cell.ci_level.value) / 100
     if cell.mean is None or cell.sd is None or n is None or n < 2 or not 0 < level < 1:
         return statement.unchecked("mean, SD and n are needed")
@@ -33,16 +33,16 @@ def interval_finding(what: str, interval: Printed, cell: Cell, n: int | None, po
     by_student = _bounds(cell.mean.interval, spread, t)
     follows = f"[{low.span(*by_student[0])}, {high.span(*by_student[1])}]"
     if _fits(interval, by_student):
-        return statement.held(True, follows, "the t interval of the mean")
-    kind = "of the normal distribution" if _fits(interval, _bounds(cell.mean.interval, spread, z)) else ""
-    explanation = f"an interval {kind}, not of t" if kind else "not the t interval of mean, SD and n"
+        return statement.judge(True, follows, "the t interval of the mean")
+    kind = "by the normal distribution" if _fits(interval, _bounds(cell.mean.interval, spread, z)) else ""
+    explanation = f"an interval {kind}, not by t" if kind else "not the t interval of mean, SD and n"
     if by_t:
-        return statement.held(False, follows, explanation)
+        return statement.judge(False, follows, explanation)
     return statement.remark(follows, explanation if kind else f"{explanation}; is it of another kind?")
 
 
 Ends = tuple[tuple[float, float], tuple[float, float]]
-"""What the lower bound can be, and what the upper one."""
+"""The range of the lower bound, and that of the upper bound."""
 
 
 def _bounds(mean: Interval, spread: tuple[float, float], times: float) -> Ends:

@@ -13,7 +13,7 @@ _ROUND_OFF = 1e-9
 
 
 def mcnemar_finding(publication: Publication, measure: Measure, test: PrintedTest) -> Finding | None:
-    """χ² and p against both numbers, or χ² against n; None of another test, and where nothing can be compared."""
+    """χ² and p against both numbers, or χ² against n; None for another test, and where nothing can be compared."""
     if test.test != "mcnemar":
         return None
     n, parts = publication.n_of(measure, test), [written(*test.statistic, test)] if test.statistic is not None else []
@@ -25,22 +25,22 @@ def mcnemar_finding(publication: Publication, measure: Measure, test: PrintedTes
         return _by_numbers(statement, test, test.discordant, n)
     if test.chi2 is None or n is None:
         return statement.unchecked("how many changed each way, or χ² and n, are needed") if parts else None
-    return statement.held(test.chi2.interval.low <= n, f"{n} or less", "χ² is no more than there are participants")
+    return statement.judge(test.chi2.interval.low <= n, f"{n} or less", "χ² cannot exceed the number of participants")
 
 
 def _by_numbers(statement: Statement, test: PrintedTest, numbers: tuple[int, int], n: int | None) -> Finding:
     """Both numbers against n, then χ² and p against them."""
     b, c = numbers
     if n is not None and b + c > n:
-        return statement.held(False, f"{n} or fewer", f"{b + c} changed, of {n}")
+        return statement.judge(False, f"{n} or fewer", f"{b + c} changed, of {n}")
     if b + c == 0:
-        return statement.held(test.chi2 is None and test.p is None, "no test", "nobody changed")
+        return statement.judge(test.chi2 is None and test.p is None, "no test", "nobody changed")
     squares = sorted({max(abs(b - c) - by, 0.0) ** 2 / (b + c) for by in (0.0, 0.5, 1.0)}, reverse=True)
     if test.chi2 is not None and not _any(squares, test.chi2.interval):
         follows = " or ".join(dict.fromkeys(test.chi2.like(value) for value in squares))
-        return statement.held(False, follows, "χ² of these numbers, with and without a correction for continuity")
+        return statement.judge(False, follows, "χ² of these numbers, with and without a correction for continuity")
     if test.p is None:
-        return statement.held(True, "possible", "χ² of these numbers")
+        return statement.judge(True, "possible", "χ² of these numbers")
     return _p_finding(statement, test, test.p.interval, _p_values(b, c, squares))
 
 
@@ -56,10 +56,10 @@ def _p_finding(statement: Statement, test: PrintedTest, printed: Interval, two_s
     one_sided = [side for p in two_sided for side in (p / 2, 1 - p / 2)]
     follows = " to ".join(dict.fromkeys(f"{p:.2g}" for p in (min(two_sided), max(two_sided))))
     if _any(one_sided if test.sides == "1" else two_sided, printed):
-        return statement.held(True, follows, "p of these numbers, exact or by χ²")
+        return statement.judge(True, follows, "p of these numbers, exact or by χ²")
     if test.sides is None and _any(one_sided, printed):
         return statement.remark(follows, "only if it is one-sided")
-    return statement.held(False, follows, "p of these numbers, exact, mid-p or by χ²")
+    return statement.judge(False, follows, "p of these numbers, exact, mid-p or by χ²")
 
 
 def _any(values: Sequence[float], printed: Interval) -> bool:

@@ -69,5 +69,5 @@ def _bounds(symbol: Symbol, statistic: Interval, df: Sequence[FloatArray]) -> Bo
 
 
 def meets(bounds: Bounds, printed: Interval) -> bool:
-    """Does a printed p lie in what was recomputed?"""
+    """Do a printed p and the recomputed bounds overlap?"""
     return bounds[0] <= float(printed.high) and float(printed.low) <= bounds[1]

@@ -1,4 +1,4 @@
-"""Printed tests as they are written."""
+"""Printed tests as text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pipeline.study.statistical_tests import TESTS
 
 
 def label(measure: Measure, test: PrintedTest) -> str:
-    """A test by its measure, and what tells it from the measure's others."""
+    """A test's measure, contrast, effect and name: `Time: kinect - fusion, paired t test`."""
     known = TESTS.get(test.test or "")
     name = known.label if known else (test.test or "").replace("_", " ")
     named = ", ".join(part for part in (test.contrast, test.effect, name) if part)
@@ -26,6 +26,6 @@ def written(symbol: Symbol, statistic: Rounded, test: PrintedTest) -> str:
     return f"{'χ²' if symbol == 'chi2' else symbol}{df} = {statistic.text}"
 
 
-def measure_of_effect(test: PrintedTest, figure: Rounded, name: str) -> str:
+def written_effect(test: PrintedTest, figure: Rounded, name: str) -> str:
     """`F(1, 11) = 10.86, η²p = .50`."""
     return f"{written(*test.statistic, test)}, {name} = {figure.text}" if test.statistic else f"{name} = {figure.text}"

@@ -1,9 +1,9 @@
 """Which p values a Wilcoxon signed-rank test of n pairs can have, whatever its zeros and ties.
 
 Exact p values are multiples of 2⁻ⁿ, and which of them occur depends on the ties. All patterns of zeros and ties are
-gone through: zeros dropped (Wilcoxon) or ranked and then dropped (Pratt 1959), midranks for ties. For the normal
+tried: zeros dropped (Wilcoxon) or ranked and then dropped (Pratt 1959), midranks for ties. For the normal
 approximation every number of zeros, sum of tie corrections and rank sum is allowed, with and without the corrections
-for ties and continuity. So what is called impossible here is so.
+for ties and continuity. So what is called impossible here cannot occur.
 """
 
 from __future__ import annotations
@@ -90,11 +90,11 @@ def exact_p_possible(n: int, p: Interval, sides: int) -> bool:
 
 
 def untied_p_possible(n: int, p: Interval, sides: int) -> bool:
-    """The same without ties and with few zeros, for larger n: a yes is proof, a no is none."""
+    """The same without ties and with few zeros, for larger n: True is proof, False is not."""
     for ranked in range(n, max(n - 10, 0), -1):
         tails = _untied_tails(ranked)
-        found = np.minimum(1.0, sides * tails)
-        if ((float(p.low) <= found) & (found <= float(p.high))).any():
+        p_values = np.minimum(1.0, sides * tails)
+        if ((float(p.low) <= p_values) & (p_values <= float(p.high))).any():
             return True
     return False
 
@@ -131,8 +131,11 @@ def exact_p_with_sum(n: int, rank_sum: Interval, p: Interval, sides: int) -> boo
 
 def sum_fits(rank_sum: Interval, doubled: int, doubled_total: int) -> bool:
     """Is a printed W one of W₊, W₋ and their difference? `doubled` is 2·W₊, `doubled_total` that of all ranks."""
-    other = doubled_total - doubled
-    return any(rank_sum.low * 2 <= value <= rank_sum.high * 2 for value in (doubled, other, abs(doubled - other)))
+    doubled_negative = doubled_total - doubled
+    return any(
+        rank_sum.low * 2 <= value <= rank_sum.high * 2
+        for value in (doubled, doubled_negative, abs(doubled - doubled_negative))
+    )
 
 
 @dataclass(frozen=True)
@@ -145,8 +148,8 @@ class Approximation:
 
 @cache
 def approximations(n: int) -> tuple[Approximation, ...]:
-    """Those of n differences: with none to all but one of them zero, zeros dropped or by Pratt."""
-    found = []
+    """The approximations for n differences, of which 0 to n − 1 are zero, with zeros dropped or ranked (Pratt)."""
+    by_zeros = []
     for zeros in range(n):
         ranked = n - zeros
         for below in {0, zeros}:  # zeros that took ranks
@@ -154,8 +157,8 @@ def approximations(n: int) -> tuple[Approximation, ...]:
             total = m * (m + 1) // 2 - below * (below + 1) // 2
             squares = (m * (m + 1) * (2 * m + 1) - below * (below + 1) * (2 * below + 1)) / 6
             variances = squares / 4 - np.array(_tie_sums(ranked), dtype=np.float64) / 48
-            found.append(Approximation(2 * total, np.sqrt(variances)))
-    return tuple(found)
+            by_zeros.append(Approximation(2 * total, np.sqrt(variances)))
+    return tuple(by_zeros)
 
 
 @cache

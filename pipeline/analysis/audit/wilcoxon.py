@@ -14,7 +14,7 @@ _METHODS = {None: "exact p or normal approximation", "exact": "exact p", "normal
 
 
 def wilcoxon_finding(publication: Publication, measure: Measure, test: PrintedTest) -> Finding | None:
-    """W and p against n; None of another test, and where neither is printed."""
+    """W and p against n; None for another test, and where neither is printed."""
     if test.test != "wilcoxon":
         return None
     printed = [f"W = {test.W.text}"] if test.W is not None else []
@@ -25,9 +25,11 @@ def wilcoxon_finding(publication: Publication, measure: Measure, test: PrintedTe
     if n is None:
         return statement.unchecked("n is not given")
     if test.W is not None and not _is_rank_sum(test.W.interval, n):
-        return statement.held(False, f"0 to {n * (n + 1) // 2} in halves", f"no rank sum of {n} pairs is this")
+        return statement.judge(
+            False, f"0 to {n * (n + 1) // 2} in steps of 0.5", f"{n} pairs cannot have this rank sum"
+        )
     if test.p is None:
-        return statement.held(True, f"0 to {n * (n + 1) // 2} in halves", f"a rank sum that {n} pairs can have")
+        return statement.judge(True, f"0 to {n * (n + 1) // 2} in steps of 0.5", f"a rank sum that {n} pairs can have")
     return _p_finding(statement, n, test, test.p)
 
 
@@ -50,15 +52,15 @@ def _p_finding(statement: Statement, n: int, test: PrintedTest, p: Rounded) -> F
             return _possible(statement, explanation, remarkable=unsaid or bool(side))
     method, smallest = _METHODS[test.method], signed_rank.smallest_p(n, min(sides), test.method)
     if float(p.interval.high) < smallest:
-        return statement.held(False, f"{smallest:.2g} or more", f"no {method} of {n} pairs is as small")
+        return statement.judge(False, f"{smallest:.2g} or more", f"no {method} of {n} pairs is this small")
     if n > (signed_rank.MOST_FOR_NORMAL if test.method == "normal" else signed_rank.MOST_FOR_ALL_PATTERNS):
-        return statement.unchecked(f"{n} pairs have too many patterns of zeros and ties to go through")
-    return statement.held(False, "another p", f"no {method} of {n} pairs is this, whatever the zeros and ties")
+        return statement.unchecked(f"{n} pairs have too many patterns of zeros and ties to try them all")
+    return statement.judge(False, "another p", f"no {method} of {n} pairs has this value, whatever the zeros and ties")
 
 
 def _possible(statement: Statement, explanation: str, remarkable: bool) -> Finding:
     text = f"{explanation}, for some zeros and ties"
-    return statement.remark("possible", text) if remarkable else statement.held(True, "possible", text)
+    return statement.remark("possible", text) if remarkable else statement.judge(True, "possible", text)
 
 
 def _exact_possible(n: int, rank_sum: Rounded | None, p: Interval, sides: int) -> bool:

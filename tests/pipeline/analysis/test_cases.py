@@ -208,7 +208,7 @@ def test_an_instrument_without_a_rule_has_no_total(tmp_path: Path, steadyhand: S
     study = questionnaire(tmp_path / "a", "comparisons: [{measure: mine/total, test: wilcoxon}]\n", rows)
     ran = steadyhand("compare", study)
     assert ran.code == 2
-    assert '"mine" has no total, for nothing says how it is scored; state scoring: {mine:' in ran.err
+    assert '"mine" has no total because nothing says how it is scored; state scoring: {mine:' in ran.err
 
 
 def test_a_rule_of_ones_own_turns_its_reversed_items(tmp_path: Path, steadyhand: Steadyhand) -> None:

@@ -81,7 +81,7 @@ def checked(
 
 def test_a_balanced_square_calls_for_no_remark_on_its_order(folder: Folder, steadyhand: Steadyhand) -> None:
     rows = checked(folder, steadyhand, SQUARE * 3)
-    assert the(rows, what="order of the conditions")["found"] == "known of 12 of 12 participants"
+    assert the(rows, what="order of the conditions")["found"] == "known for 12 of 12 participants"
     for condition in "ABCD":
         row = the(rows, what="times in each period", condition=condition)
         assert (row["found"], row["expected"], row["remark"]) == ("3, 3, 3, 3", "3 in each", None)
@@ -97,7 +97,7 @@ def test_rotation_alone_balances_the_periods_and_not_what_came_before(folder: Fo
     rows = checked(folder, steadyhand, ["ABCD", "BCDA", "CDAB", "DABC"] * 2)
     assert the(rows, what="times in each period", condition="A")["remark"] is None
     row = the(rows, what="times each condition comes just before each other")
-    assert (row["found"], row["remark"]) == ("0 to 6", "not balanced for what came just before")
+    assert (row["found"], row["remark"]) == ("0 to 6", "not balanced for the preceding condition")
 
 
 def test_one_order_for_everybody_is_not_balanced_and_leaves_nothing_to_test(
@@ -137,7 +137,7 @@ def test_an_order_that_is_not_known_is_said(folder: Folder, steadyhand: Steadyha
 )
 def test_the_participants_table_says_the_order(folder: Folder, steadyhand: Steadyhand, table: str) -> None:
     rows = checked(folder, steadyhand, ["AB", "BA", "AB", "BA"], table, period=False, conditions="AB")
-    assert the(rows, what="order of the conditions")["found"] == "known of 4 of 4 participants"
+    assert the(rows, what="order of the conditions")["found"] == "known for 4 of 4 participants"
     assert the(rows, what="times in each period", condition="A")["found"] == "2, 2"
 
 
@@ -146,7 +146,7 @@ def test_what_was_run_counts_where_the_plan_was_another(folder: Folder, steadyha
     rows = checked(folder, steadyhand, ["AB", "BA", "AB", "BA"], plan, conditions="AB")
     row = next(row for row in rows if row["expected"] == "one order")
     assert row["found"] == "the measures and the participants table differ for P02, P03 and P04"
-    assert row["remark"] == "the measures count"
+    assert row["remark"] == "the measures are used"
     assert the(rows, what="times in each period", condition="A")["found"] == "2, 2"
 
 
@@ -165,7 +165,7 @@ def test_a_participant_with_two_sequences_is_an_error(folder: Folder, steadyhand
     text = "participant,condition,measure,value,sequence\nP1,A,m,1,AB\nP1,B,m,2,BA\n"
     ran = steadyhand("compare", folder("conditions: [A, B]\nmeasures: m.csv\n", **{"m.csv": text}))
     assert ran.code == 2
-    assert 'the measures: participant "P1" has the sequences "AB" and "BA"; everybody has one' in ran.err
+    assert 'the measures: participant "P1" has the sequences "AB" and "BA"; give each participant one' in ran.err
 
 
 def test_a_period_that_is_no_number_is_an_error(folder: Folder, steadyhand: Steadyhand) -> None:
@@ -192,13 +192,13 @@ def test_the_logs_say_the_order_and_how_many_sessions_and_trials_there_are(
     assert ran.code == 0, ran.err
     rows = steadyhand.results()["design_check"]
     row = the(rows, what="sessions in each cell")
-    assert (row["found"], row["remark"]) == ("1 to 2", "their values count together: P1 in a")
+    assert (row["found"], row["remark"]) == ("1 to 2", "values of several sessions are pooled: P1 in a")
     row = the(rows, what="trials in each cell")
-    assert (row["found"], row["expected"]) == ("2 to 4", "as many in each")
+    assert (row["found"], row["expected"]) == ("2 to 4", "the same in each")
     assert "unequal" in row["remark"]
     row = the(rows, what="order of the conditions")
-    assert row["found"] == "known of 3 of 4 participants"
-    assert row["remark"] == "not known in full, each condition once: P1"
+    assert row["found"] == "known for 3 of 4 participants"
+    assert row["remark"] == "not known in full, with each condition once, for P1"
     (condition, period) = steadyhand.results()["comparisons"]
     assert condition["details"]["n_observations"] == 9  # P1 has two sessions of one condition, in two periods
     assert period["effect"] == "period"

@@ -194,9 +194,9 @@ def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhan
         ("test: mixed_model, fixed: [condition, task]", '"m" has no factor "task"'),
         (
             "test: mixed_model, fixed: [condition, period]",
-            "needs to know the period, and no data say it; give a column",
+            "needs the period, but no data state it; give a column",
         ),
-        ("test: crossover", 'crossover of "m" needs to know the period'),
+        ("test: crossover", 'crossover of "m" needs the period'),
         (
             "test: mixed_model, fixed: [condition, hand]",
             '"hand" of "m" has one level in the rows of the model; take it',

@@ -512,7 +512,7 @@ def test_a_study_sets_printed_figures_beside_its_own(folder: Callable[..., Path]
             "tests: [{test: friedman, p: .05}]",
             'the study\'s results have no test "friedman"; known: wilcoxon, t_paired',
         ),
-        ("tests: [{p: .05}]", 'a printed test of "m" fits 2 of the study\'s comparisons; it must fit one'),
+        ("tests: [{p: .05}]", 'a printed test of "m" matches 2 of the study\'s comparisons; it must match exactly one'),
         ("tests: [{test: t_paired, F: 5, df: [1, 5]}]", 'no statistic_name "F"'),
     ],
 )

@@ -1,4 +1,4 @@
-"""Printed degrees of freedom: what they stand for, and what n and the design make of them."""
+"""Printed degrees of freedom: which values they stand for, and which follow from n and the design."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def is_whole(figure: Rounded) -> bool:
     return figure.unit == 1
 
 
-def freedom(test: PrintedTest, n: int | None) -> list[Interval] | None:
+def degrees_of_freedom(test: PrintedTest, n: int | None) -> list[Interval] | None:
     """The degrees of freedom; None where they are neither printed nor follow from n.
 
     Printed whole they are exact, but for the last where a test's need not be whole (Welch, Satterthwaite).
@@ -45,7 +45,7 @@ def freedom(test: PrintedTest, n: int | None) -> list[Interval] | None:
 
 
 def rounded_after_correction(test: PrintedTest, n: int | None) -> list[Interval] | None:
-    """Those of a test within participants, were they corrected for sphericity and then printed whole."""
+    """Their intervals, had they been corrected for sphericity and then rounded; None where that is not possible."""
     tests = (*WITHIN, "mixed_anova", None)
     if test.test not in tests or test.F is None or len(test.df) != 2 or not all(map(is_whole, test.df)):
         return None
@@ -55,8 +55,8 @@ def rounded_after_correction(test: PrintedTest, n: int | None) -> list[Interval]
     return [part.interval.at_least(1) for part in test.df]
 
 
-def freedom_findings(publication: Publication, measure: Measure, test: PrintedTest) -> Iterator[Finding]:
-    """What the design and n make of the degrees of freedom."""
+def degrees_of_freedom_findings(publication: Publication, measure: Measure, test: PrintedTest) -> Iterator[Finding]:
+    """The degrees of freedom against those that follow from n and the design."""
     if not test.df or test.statistic is None:
         return
     statement = Statement("degrees of freedom", label(measure, test), written(*test.statistic, test))
@@ -67,56 +67,56 @@ def freedom_findings(publication: Publication, measure: Measure, test: PrintedTe
         yield statement.unchecked("n is not given") if n is None else _mixed(statement, test, n)
     elif test.test in _LESS_THAN_N:
         less = _LESS_THAN_N[test.test]
-        yield statement.unchecked("n is not given") if n is None else _as_n_gives(statement, test, n - less)
+        yield statement.unchecked("n is not given") if n is None else _against_n(statement, test, n - less)
     elif test.test in ("friedman", "kruskal") and len(measure.cells) > 1:
         yield _levels(statement, measure, test)
     elif test.test in ("t_independent", "anova"):
         yield _between(statement, measure, test)
 
 
-def _as_n_gives(statement: Statement, test: PrintedTest, expected: int) -> Finding:
-    """More cannot be; fewer says that someone was left out, unless the test says its own n."""
+def _against_n(statement: Statement, test: PrintedTest, expected: int) -> Finding:
+    """More than follow from n contradict it; fewer suggest that someone was left out, unless the test states its n."""
     df = test.df[-1]
     if df.interval.high < expected and test.n is None:
-        return statement.remark(str(expected), "fewer than n gives: was someone left out?")
-    return statement.held(df.interval.low <= expected <= df.interval.high, str(expected), "as n gives them")
+        return statement.remark(str(expected), "fewer than follow from n: was someone left out?")
+    return statement.judge(df.interval.low <= expected <= df.interval.high, str(expected), "as follows from n")
 
 
 def _within(statement: Statement, test: PrintedTest, n: int) -> Finding:
-    """The error's are n − 1 times the effect's, whether they are corrected for sphericity or not."""
+    """The error's are n − 1 times the effect's, corrected for sphericity or not."""
     first, second = test.df
     expected = first.value * (n - 1)
     follows, explanation = f"{first.text}, {first.like(expected)}", f"the second are n − 1 = {n - 1} times the first"
     whole = is_whole(first) and is_whole(second)
     if whole and second.value == expected:
-        return statement.held(True, follows, explanation)
+        return statement.judge(True, follows, explanation)
     if first.interval.low <= 0:
-        return statement.held(False, follows, "they are more than 0")
+        return statement.judge(False, follows, "degrees of freedom are more than 0")
     ratio = second.interval / first.interval
     if ratio.low <= n - 1 <= ratio.high:
         if whole:
             return statement.remark(follows, f"{explanation}, only if both are rounded after a correction")
-        return statement.held(True, follows, explanation)
+        return statement.judge(True, follows, explanation)
     if ratio.high < n - 1 and test.n is None:
         return statement.remark(follows, f"{explanation}; these are fewer: was someone left out?")
-    return statement.held(False, follows, explanation)
+    return statement.judge(False, follows, explanation)
 
 
 def _mixed(statement: Statement, test: PrintedTest, n: int) -> Finding:
-    """Of n participants in g groups a within-effect's error has n − g times its own, others have fewer.
+    """With n participants in g groups a within-effect's error has n − g times the effect's, other effects' fewer.
 
     Corrections for sphericity keep that ratio. How many groups and between-factors there were is not said.
     """
     first, second = test.df
     follows, explanation = f"the second at most {n - 2} times the first", f"{n} participants in two groups or more"
     if first.interval.low <= 0:
-        return statement.held(False, follows, "they are more than 0")
+        return statement.judge(False, follows, "degrees of freedom are more than 0")
     fits = second.interval.low / first.interval.high <= n - 2
     if fits and is_whole(first) and is_whole(second) and second.value > first.value * (n - 2):
         if first.value > 1:
             return statement.remark(follows, f"{explanation}, only if both are rounded after a correction")
         fits = False
-    return statement.held(fits, follows, explanation)
+    return statement.judge(fits, follows, explanation)
 
 
 def _levels(statement: Statement, measure: Measure, test: PrintedTest) -> Finding:
@@ -124,7 +124,7 @@ def _levels(statement: Statement, measure: Measure, test: PrintedTest) -> Findin
     levels = len(test.conditions or measure.cells)
     if test.df[0].value != levels - 1 and test.conditions is None:
         return statement.remark(str(levels - 1), f"{levels} conditions less 1; were there others?")
-    return statement.held(test.df[0].value == levels - 1, str(levels - 1), f"{levels} conditions less 1")
+    return statement.judge(test.df[0].value == levels - 1, str(levels - 1), f"{levels} conditions less 1")
 
 
 def _between(statement: Statement, measure: Measure, test: PrintedTest) -> Finding:
@@ -139,4 +139,4 @@ def _between(statement: Statement, measure: Measure, test: PrintedTest) -> Findi
         of_groups = _levels(statement, measure, test)
         if of_groups.verdict != "agreement":
             return of_groups
-    return _as_n_gives(statement, test, (test.n or sum(ns)) - len(groups))
+    return _against_n(statement, test, (test.n or sum(ns)) - len(groups))
