@@ -16,7 +16,7 @@ from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator
-from pipeline.statistics.descriptive import described
+from pipeline.statistics.descriptive import summarize
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.measures import measure_order
 from pipeline.study.settings import Study
@@ -142,7 +142,7 @@ def descriptives(study: Study, measures: pd.DataFrame) -> list[Row]:
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
             if len(values):
-                rows.append({"measure": measure, "condition": condition, **described(values)})
+                rows.append({"measure": measure, "condition": condition, **summarize(values)})
     return rows + _root_rows(rows)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from pipeline.statistics.descriptive import described
+from pipeline.statistics.descriptive import summarize
 from pipeline.tables.table import Row
 
 _POSSIBLE = {
@@ -59,7 +59,7 @@ def _means(rows: pd.DataFrame) -> Row:
         values = rows[name].dropna().to_numpy(np.float64)
         if len(values):
             stem, _, unit = name.rpartition("_")
-            summary = described(values)
+            summary = summarize(values)
             means[name] = summary["mean"]
             if "ci_low" in summary:
                 means[f"{stem}_low_{unit}"] = max(summary["ci_low"], possible[0])
@@ -73,7 +73,7 @@ def _selections(trials: pd.DataFrame) -> Row:
     squared = known.groupby(["study", "session"])["squared_error_mm2"].mean().to_numpy(np.float64)
     if not len(squared):
         return {"selection_n": 0}
-    summary = described(squared)
+    summary = summarize(squared)
     row = {"selection_n": len(squared), "selection_rmse_mm": float(np.sqrt(summary["mean"]))}
     if "ci_low" in summary:
         row["selection_rmse_low_mm"] = float(np.sqrt(max(0.0, summary["ci_low"])))

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.descriptive import described
+from pipeline.statistics.descriptive import summarize
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.power import Design, difference_of_dz
 from pipeline.statistics.sample_size import FEWEST, fewest
@@ -97,7 +97,7 @@ def means(people: pd.DataFrame) -> list[Row]:
 
 
 def _with_interval(name: str, unit: str, values: FloatArray, shown: Callable[[float], float]) -> Row:
-    found = described(values)
+    found = summarize(values)
     columns = {"mean": f"{name}{unit}", "ci_low": f"{name}_low{unit}", "ci_high": f"{name}_high{unit}"}
     return {column: shown(found[key]) for key, column in columns.items() if key in found}
 
@@ -208,5 +208,5 @@ def _clearly(first: FloatArray, second: FloatArray) -> int:
     less = less[np.isfinite(less)]
     if len(less) < 2:
         return 0
-    found = described(less)
+    found = summarize(less)
     return int(found["ci_low"] > 0) - int(found["ci_high"] < 0)

@@ -1,4 +1,4 @@
-"""Tests of differences between conditions, one module a family, on complete participants × conditions arrays.
+"""Tests of differences between conditions, one module per family, on arrays of complete participants × conditions.
 
 Every phrase that `status` can hold is listed here, once.
 """

@@ -20,7 +20,7 @@ from pipeline.statistics.sphericity import sphericity
 
 
 def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
-    """One result an effect (`condition`, `task`, `condition:task`) from values (n, k₁, k₂, …), no cell missing.
+    """One result per effect (`condition`, `task`, `condition:task`) from values (n, k₁, k₂, …), no cell missing.
 
     An effect's scores are the values times its orthonormal contrasts; from their mean and covariance come F,
     Mauchly's W, and the epsilons of Greenhouse and Geisser (1959) and Huynh and Feldt (1976). Effect size:
@@ -32,19 +32,19 @@ def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
     effects = effects_of(levels)
     if status := too_few(n) or degenerate(flat):
         return [_blank(effect_name(factors, effect), n, status) for effect in effects]
-    # Contrasts sum to zero, so that what all of a participant's values share drops out: better before than after.
+    # Contrasts sum to zero, so a participant's common level cancels; it is taken off first, which is more exact.
     (flat, apart), _ = at_unit_scale([flat, from_first(flat)])
     strata = [_stratum(apart @ contrasts(levels, effect)) for effect in effects]
     between = float(np.prod(levels) * np.sum((flat.mean(axis=1) - flat.mean()) ** 2))
     variation = between + sum(stratum.error for stratum in strata)
-    found = [
+    results = [
         tested(_blank(effect_name(factors, effect), n), stratum, variation, apart)
         for effect, stratum in zip(effects, strata, strict=True)
     ]
-    if len(effects) == 1 and levels[0] > 2 and found[0].status == OK:
+    if len(effects) == 1 and levels[0] > 2 and results[0].status == OK:
         residuals = apart - apart.mean(axis=0) - apart.mean(axis=1, keepdims=True) + apart.mean()
-        found[0] = replace(found[0], details={**found[0].details, **normality(residuals.ravel(), "residual_")})
-    return found
+        results[0] = replace(results[0], details={**results[0].details, **normality(residuals.ravel(), "residual_")})
+    return results
 
 
 def effects_of(levels: Sequence[int]) -> list[tuple[int, ...]]:

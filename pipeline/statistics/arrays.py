@@ -1,4 +1,4 @@
-"""The arrays that numbers travel in."""
+"""Types of arrays, and scaling that keeps squares within the range of floats."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _RANKS_DZ = "Cohen's d_z of aligned ranks"
 
 
 def art_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
-    """One result an effect from values (n, k₁, k₂, …), no cell missing (Wobbrock et al. 2011).
+    """One result per effect from values (n, k₁, k₂, …), no cell missing (Wobbrock et al. 2011).
 
     For each effect the values less all other effects are ranked, and the effect is tested on the ranks as in
     `rm_anova`. Effect size: partial η² of the ranks.
@@ -30,15 +30,15 @@ def art_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
     (values,), _ = at_unit_scale([values])
     axes = range(1, values.ndim)
     effects = [effect for size in axes for effect in combinations(axes, size)]
-    found = []
+    results = []
     for effect, plain in zip(effects, rm_anova(values, factors), strict=True):
         if plain.status != OK:
-            found.append(_on_ranks(plain))
+            results.append(_on_ranks(plain))
             continue
         aligned = values - values.mean(axis=0) + _effect(values.mean(axis=0), effect)
         ranks = _ranked(aligned, values)
-        found.append(_on_ranks(next(result for result in rm_anova(ranks, factors) if result.effect == plain.effect)))
-    return found
+        results.append(_on_ranks(next(result for result in rm_anova(ranks, factors) if result.effect == plain.effect)))
+    return results
 
 
 def _effect(means: FloatArray, effect: tuple[int, ...]) -> FloatArray:
@@ -52,7 +52,7 @@ def _effect(means: FloatArray, effect: tuple[int, ...]) -> FloatArray:
 
 
 def _on_ranks(result: Result) -> Result:
-    """An effect's test on the ranks, with what of it applies to ranks."""
+    """The test of an effect on ranks, without the figures that do not apply to ranks."""
     low, high = result.details.get("partial_eta_squared_ci", (None, None))
     return replace(
         result,
@@ -76,7 +76,7 @@ def art_contrasts(values: FloatArray, factors: Sequence[str], levels: Sequence[S
     n = len(values)
     (scaled,), _ = at_unit_scale([values])
     status = too_few(n) or degenerate(scaled.reshape(n, -1))
-    found = []
+    follow_ups = []
     for effect in effects_of(scaled.shape[1:]):
         name = effect_name(factors, effect)
         plain = [pair for pair in pairs.follow_ups(values, factors, levels) if pair.effect == name]
@@ -88,8 +88,8 @@ def art_contrasts(values: FloatArray, factors: Sequence[str], levels: Sequence[S
                 Result(name, "t", "", "", n, status=status) if status else t_paired(of_ranks.first, of_ranks.second)
             )
             named = replace(result, effect=name, method=_CONTRASTS, effect_size_name=_RANKS_DZ, contrast=pair.contrast)
-            found.append(FollowUp(pair, named))
-    return found
+            follow_ups.append(FollowUp(pair, named))
+    return follow_ups
 
 
 def _ranked_together(values: FloatArray, effect: tuple[int, ...]) -> FloatArray:

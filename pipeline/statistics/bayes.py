@@ -38,21 +38,21 @@ def bayes_t(
     prior = f"Cauchy prior of scale {prior_scale:g} on d_z{_SIDES[alternative]}"
     method = f"JZS Bayes factor of the paired difference, {prior}"
     blank = Result(effect, _NAMES[alternative], method, "Cohen's d_z", len(first))
-    found = differences_of(first, second)
-    if isinstance(found, str):
-        return replace(blank, status=found)
-    t = found.mean / found.error
-    log_bf10 = log_bayes_factor(t, found.n, prior_scale)
-    above, below = log_shares(t, found.n, prior_scale)
+    summary = differences_of(first, second)
+    if isinstance(summary, str):
+        return replace(blank, status=summary)
+    t = summary.mean / summary.error
+    log_bf10 = log_bayes_factor(t, summary.n, prior_scale)
+    above, below = log_shares(t, summary.n, prior_scale)
     # One side has half the prior: how much more of the posterior has it?
     logs = {"bf10": log_bf10, "bf_plus0": log_bf10 + np.log(2) + above, "bf_minus0": log_bf10 + np.log(2) + below}
     factors = {name: _factor(value) for name, value in logs.items()}
     chosen = {"two-sided": "bf10", "greater": "bf_plus0", "less": "bf_minus0"}[alternative]
-    low, high = dz_interval(found.dz, found.n)
+    low, high = dz_interval(summary.dz, summary.n)
     return replace(
         blank,
         statistic=factors[chosen],
-        effect_size=found.dz,
+        effect_size=summary.dz,
         ci_low=low,
         ci_high=high,
         details={

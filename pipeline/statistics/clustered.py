@@ -3,8 +3,8 @@
 Each condition has a mean on the scale of the link (log odds of an error, log rate of events), and differences between
 conditions are ratios. How a person's trials depend on each other is not modelled but allowed for: standard errors come
 from how much the participants' own residuals add up (Liang and Zeger 1986), corrected for few participants (Mancl and
-DeRouen 2001), and t has as many degrees of freedom as there are participants less conditions. Counts may so vary more
-than Poisson's law has it, as a negative binomial law would allow.
+DeRouen 2001), and t has as many degrees of freedom as there are participants less conditions. So counts may vary more
+than a Poisson distribution allows, as with a negative binomial one.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ EACH_PAIR = "no effect size of more than two conditions: each pair has its own"
 
 @dataclass(frozen=True)
 class Trials:
-    """One row a trial (N,): what came of it, whose, in which condition; of counts also the time or chances it had."""
+    """One row per trial (N,): outcome, participant, condition; for counts also the time or number of chances."""
 
     outcome: FloatArray
     participants: Sequence[str]
@@ -55,21 +55,23 @@ class Trials:
 def gee(trials: Trials, levels: Sequence[str], family: Family, effect: str = "condition") -> list[Result]:
     """Test a condition's effect on errors (0 or 1, `logit`) or counts (`poisson`) of all trials that there are.
 
-    Of two conditions one row, t; of more first their F, then the t of every two. Effect size: the odds ratio or rate
+    Two conditions give one row, t; more give their F, then the t of every two. Effect size: the odds ratio or rate
     ratio, first over second condition, with its interval.
     """
     people = {name: index for index, name in enumerate(dict.fromkeys(trials.participants))}
     clusters = np.array([people[name] for name in trials.participants], dtype=np.int64)
     blank = Result(effect, "t", _METHODS[family], _RATIOS[family], len(people))
-    pairs = [f"{one} - {other}" for one, other in combinations(levels, 2)]
-    found = _undefined(trials, len(levels), len(people), family) or _estimated(trials, clusters, len(levels), family)
-    if isinstance(found, str):
-        rows = [replace(blank, contrast=pair, status=found) for pair in pairs]
-        return rows if len(levels) == 2 else [replace(blank, statistic_name="F", status=found), *rows]
+    pairs = [f"{first} - {second}" for first, second in combinations(levels, 2)]
+    estimated = _undefined(trials, len(levels), len(people), family) or _estimated(
+        trials, clusters, len(levels), family
+    )
+    if isinstance(estimated, str):
+        rows = [replace(blank, contrast=pair, status=estimated) for pair in pairs]
+        return rows if len(levels) == 2 else [replace(blank, statistic_name="F", status=estimated), *rows]
     df = float(len(people) - len(levels))
-    told = {"n_observations": len(clusters), "dispersion": found.dispersion, "means": found.means.tolist()}
-    whole = [] if len(levels) == 2 else [_f_row(replace(blank, details=told), found, df)]
-    return [*whole, *_pair_rows(replace(blank, details=told), found, df, pairs)]
+    details = {"n_observations": len(clusters), "dispersion": estimated.dispersion, "means": estimated.means.tolist()}
+    omnibus = [] if len(levels) == 2 else [_f_row(replace(blank, details=details), estimated, df)]
+    return [*omnibus, *_pair_rows(replace(blank, details=details), estimated, df, pairs)]
 
 
 def _undefined(trials: Trials, k: int, people: int, family: Family) -> str | None:
@@ -89,7 +91,7 @@ def _undefined(trials: Trials, k: int, people: int, family: Family) -> str | Non
 
 
 def _fits(trials: Trials, family: Family) -> bool:
-    """Are the outcomes what the family is of?"""
+    """Do the outcomes fit the family (0 or 1; counts with exposures above 0)?"""
     if family == "logit":
         return bool(np.isin(trials.outcome, (0.0, 1.0)).all())
     exposed = trials.exposure is None or (trials.exposure > 0).all()
@@ -98,35 +100,35 @@ def _fits(trials: Trials, family: Family) -> bool:
 
 def _estimated(trials: Trials, clusters: IntArray, k: int, family: Family) -> Estimated | str:
     """The conditions' log odds or log rates and their covariances, or why there are none."""
-    found = with_statsmodels.gee(trials.outcome, clusters, trials.conditions, k, family, trials.exposure)
-    if found is None or not (np.isfinite(found.covariance).all() and np.isfinite(found.estimates).all()):
+    estimated = with_statsmodels.gee(trials.outcome, clusters, trials.conditions, k, family, trials.exposure)
+    if estimated is None or not (np.isfinite(estimated.covariance).all() and np.isfinite(estimated.estimates).all()):
         return NOT_CONVERGED
-    return found
+    return estimated
 
 
-def _f_row(blank: Result, found: Estimated, df: float) -> Result:
+def _f_row(blank: Result, estimated: Estimated, df: float) -> Result:
     """Are all conditions alike? Wald's W of q contrasts, scaled as Hotelling's T² is: F = W · (df − q + 1)/(q · df)."""
     blank = replace(blank, statistic_name="F", effect_size_name="")
-    q = len(found.estimates) - 1
+    q = len(estimated.estimates) - 1
     contrasts = np.hstack([np.ones((q, 1)), -np.eye(q)])
-    covariance = contrasts @ found.covariance @ contrasts.T
+    covariance = contrasts @ estimated.covariance @ contrasts.T
     df2 = df - q + 1
     if df2 < 1:
         return replace(blank, status=TOO_FEW_VALUES)
     if np.linalg.matrix_rank(covariance) < q or float(np.trace(covariance)) < _NO_SPREAD:
         return replace(blank, status=NO_ERROR)
-    difference = contrasts @ found.estimates
+    difference = contrasts @ estimated.estimates
     statistic = float(difference @ np.linalg.solve(covariance, difference)) * df2 / (q * df)
     details = {**blank.details, "no_effect_size": EACH_PAIR}
     p = float(stats.f.sf(statistic, q, df2))
     return replace(blank, statistic=statistic, df1=float(q), df2=df2, p=p, details=details)
 
 
-def _pair_rows(blank: Result, found: Estimated, df: float, pairs: Sequence[str]) -> Iterator[Result]:
-    k = len(found.estimates)
+def _pair_rows(blank: Result, estimated: Estimated, df: float, pairs: Sequence[str]) -> Iterator[Result]:
+    k = len(estimated.estimates)
     for (i, j), pair in zip(combinations(range(k), 2), pairs, strict=True):
         weights = np.eye(k)[i] - np.eye(k)[j]
-        log_ratio, variance = float(weights @ found.estimates), float(weights @ found.covariance @ weights)
+        log_ratio, variance = float(weights @ estimated.estimates), float(weights @ estimated.covariance @ weights)
         if variance < _NO_SPREAD:
             yield replace(blank, contrast=pair, status=NO_ERROR)
             continue
@@ -145,7 +147,7 @@ def _pair_rows(blank: Result, found: Estimated, df: float, pairs: Sequence[str])
                 **blank.details,
                 "log_ratio": log_ratio,
                 "se": error,
-                **_uncorrected(log_ratio, float(weights @ found.uncorrected @ weights)),
+                **_uncorrected(log_ratio, float(weights @ estimated.uncorrected @ weights)),
             },
         )
 

@@ -1,4 +1,4 @@
-"""Orders of conditions that are balanced for position and for what came just before."""
+"""Orders of conditions that are balanced for position and for the preceding condition."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def williams_design(conditions: int) -> list[Order]:
 
 
 def assigned(conditions: int, participants: int, seed: int | None = None) -> list[Order]:
-    """An order a participant: whole squares one after the other, the last as far as it is needed.
+    """One order per participant: whole squares one after the other, the last as far as it is needed.
 
     With a seed, chance decides within each square who gets which sequence.
     """
@@ -43,7 +43,7 @@ def assigned(conditions: int, participants: int, seed: int | None = None) -> lis
 
 @dataclass(frozen=True)
 class Balance:
-    """How many times each condition stands in each period, a count a period, and one comes straight before another."""
+    """How many times each condition comes in each period, and how many times one comes directly before another."""
 
     in_periods: Mapping[Hashable, tuple[int, ...]]
     in_pairs: Mapping[tuple[Hashable, Hashable], int]

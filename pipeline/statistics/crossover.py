@@ -38,9 +38,11 @@ def crossover(
     (n, _), early = values.shape, np.asarray(first_came_first, dtype=bool)
     names = sequences or (", ".join(conditions), ", ".join(reversed(conditions)))
     contrasts = (f"{conditions[0]} - {conditions[1]}", "1 - 2", f"{names[0]} - {names[1]}")
-    told = {"sequences": {names[0]: int(early.sum()), names[1]: int(n - early.sum())}}
+    details = {"sequences": {names[0]: int(early.sum()), names[1]: int(n - early.sum())}}
     blank = [
-        Result(effect, "t", "2 × 2 crossover, t of the sequence groups", "estimate", n, contrast=contrast, details=told)
+        Result(
+            effect, "t", "2 × 2 crossover, t of the sequence groups", "estimate", n, contrast=contrast, details=details
+        )
         for effect, contrast in zip(EFFECTS, contrasts, strict=True)
     ]
     status = None

@@ -8,7 +8,7 @@ from scipy import stats
 from pipeline.statistics.arrays import FloatArray
 
 
-def described(values: FloatArray) -> dict[str, float]:
+def summarize(values: FloatArray) -> dict[str, float]:
     """Of `values` (n,), n ≥ 1: n, mean, median and, from two values on, sd, ci_low and ci_high (95 %, Student's t)."""
     n = len(values)
     row = {"n": n, "mean": float(values.mean()), "median": float(np.median(values))}

@@ -1,4 +1,4 @@
-"""What to look at before a test of differences is believed: are they normal, and does any lie far out?"""
+"""Diagnostics of paired differences: are they normally distributed, and is any an outlier?"""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _SHAPIRO_UP_TO = 5000  # values, as far as Royston's approximation was made for
 
 
 def differences(first: FloatArray, second: FloatArray, participants: Sequence[str]) -> dict[str, Any]:
-    """Shapiro and Wilk's test of the differences first − second, and the participants whose difference lies far out.
+    """Shapiro and Wilk's test of the differences first − second, and the participants whose difference is an outlier.
 
     `outliers` is None where more than half of the differences are equal: then no spread is left to judge by.
     """
     values = rounded_differences(first, second)
-    found = far_out(values)
-    outliers = None if found is None else [participants[index] for index in found]
+    far_out_places = far_out(values)
+    outliers = None if far_out_places is None else [participants[index] for index in far_out_places]
     return {**normality(values), "outliers": outliers, "outlier_rule": OUTLIER_RULE}
 
 
@@ -34,8 +34,8 @@ def normality(values: FloatArray, prefix: str = "") -> dict[str, float | None]:
     (values,), _ = at_unit_scale([values])
     apart = values - np.mean(values) if len(values) else values
     if 3 <= len(values) <= _SHAPIRO_UP_TO and not negligible(float(np.sum(apart**2)), values):
-        found = stats.shapiro(apart / np.max(np.abs(apart)))  # SciPy takes a range below 1e-19 for none
-        w, p = float(found.statistic), float(found.pvalue)
+        shapiro = stats.shapiro(apart / np.max(np.abs(apart)))  # SciPy takes a range below 1e-19 for none
+        w, p = float(shapiro.statistic), float(shapiro.pvalue)
     return {f"{prefix}shapiro_w": w, f"{prefix}shapiro_p": p}
 
 

@@ -34,9 +34,9 @@ def standardized_interval(t: float, df: float, error: float, level: float = 0.95
         width = 10 + abs(t)
         # Of one degree of freedom t may be a small part of its noncentrality: the bracket grows until it holds it.
         while width < _WIDEST * (10 + abs(t)):
-            found = _solve(lambda shift: noncentral_t_cdf(t, df, shift) - target, t - width, t + width)
-            if found is not None:
-                return found * error
+            noncentrality = _solve(lambda shift: noncentral_t_cdf(t, df, shift) - target, t - width, t + width)
+            if noncentrality is not None:
+                return noncentrality * error
             width *= 4
         return None
 
@@ -94,8 +94,8 @@ def partial_eta_squared_interval(
         upper = max(10.0, 4 * statistic * df1)
         while below(upper) > target and upper < _WIDEST * statistic * df1:
             upper *= 2
-        found = _solve(lambda value, target=target: below(value) - target, 0.0, upper)  # type: ignore[misc]
-        bounds.append(None if found is None else found / (found + df2))
+        bound = _solve(lambda value, target=target: below(value) - target, 0.0, upper)  # type: ignore[misc]
+        bounds.append(None if bound is None else bound / (bound + df2))
     return bounds[0], bounds[1]
 
 

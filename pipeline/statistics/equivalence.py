@@ -18,20 +18,20 @@ def tost(first: FloatArray, second: FloatArray, bounds: tuple[float, float], eff
     The statistic is the t of the side with the larger p, which is the p of the whole; effect size d_z.
     """
     blank = Result(effect, "t", "two one-sided paired t tests (TOST)", "Cohen's d_z", len(first))
-    found = differences_of(first, second)
-    if isinstance(found, str):
-        return replace(blank, status=found)
-    df, mean, error = found.n - 1, found.mean, found.error
+    summary = differences_of(first, second)
+    if isinstance(summary, str):
+        return replace(blank, status=summary)
+    df, mean, error = summary.n - 1, summary.mean, summary.error
     t_lower, t_upper = (mean - bounds[0]) / error, (mean - bounds[1]) / error
     p_lower, p_upper = float(stats.t.sf(t_lower, df)), float(stats.t.cdf(t_upper, df))
-    low, high = dz_interval(found.dz, found.n)
+    low, high = dz_interval(summary.dz, summary.n)
     margin = float(stats.t.ppf(0.95, df)) * error
     return replace(
         blank,
         statistic=float(t_lower if p_lower >= p_upper else t_upper),
         df2=float(df),
         p=max(p_lower, p_upper),
-        effect_size=found.dz,
+        effect_size=summary.dz,
         ci_low=low,
         ci_high=high,
         details={

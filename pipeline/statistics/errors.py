@@ -50,9 +50,9 @@ def mcnemar(first: FloatArray, second: FloatArray, effect: str = "condition") ->
 
 def _difference_interval(b: int, c: int, n: int) -> list[float]:
     """Of the first proportion less the second: Wald's with one more participant for b and for c, and two for n."""
-    one, other = (b + 1) / (n + 2), (c + 1) / (n + 2)
-    margin = float(stats.norm.ppf(0.975) * np.sqrt((one + other - (one - other) ** 2) / (n + 2)))
-    return [max(-1.0, one - other - margin), min(1.0, one - other + margin)]
+    first, second = (b + 1) / (n + 2), (c + 1) / (n + 2)
+    margin = float(stats.norm.ppf(0.975) * np.sqrt((first + second - (first - second) ** 2) / (n + 2)))
+    return [max(-1.0, first - second - margin), min(1.0, first - second + margin)]
 
 
 def cochran_q(values: FloatArray, effect: str = "condition") -> Result:
@@ -71,7 +71,7 @@ def cochran_q(values: FloatArray, effect: str = "condition") -> Result:
         return replace(blank, status=ranked.status)
     statistic, chi2_p = with_statsmodels.cochran_q(values)
     exact = "exact" in ranked.method
-    told = ("no_interval",) if "no_interval" in ranked.details else ()
+    explained = ("no_interval",) if "no_interval" in ranked.details else ()
     return replace(
         blank,
         method="Cochran's Q, exact over all orders of each participant's answers" if exact else blank.method,
@@ -84,7 +84,7 @@ def cochran_q(values: FloatArray, effect: str = "condition") -> Result:
             "chi2_p": chi2_p,
             "n_changed": int(np.sum(np.ptp(values, axis=1) > 0)),
             "proportions": [float(share) for share in values.mean(axis=0)],
-            **{name: ranked.details[name] for name in told},
+            **{name: ranked.details[name] for name in explained},
         },
     )
 

@@ -29,17 +29,17 @@ def bootstrap(first: FloatArray, second: FloatArray, seed: int, level: float = 0
     `bootstrap_resamples`, `bootstrap_seed`. The same for the same seed.
     """
     (values,), exponent = at_unit_scale([rounded_differences(first, second)])
-    told: dict[str, Any] = {"bootstrap_resamples": RESAMPLES, "bootstrap_seed": seed}
+    details: dict[str, Any] = {"bootstrap_resamples": RESAMPLES, "bootstrap_seed": seed}
     reason = TOO_FEW_TO_RESAMPLE if len(values) < _FROM else ALL_EQUAL if np.ptp(values) == 0 else None
     if reason is not None:
-        return {"bootstrap_ci_difference": None, "bootstrap_ci_dz": None, **told, "no_bootstrap": reason}
+        return {"bootstrap_ci_difference": None, "bootstrap_ci_dz": None, **details, "no_bootstrap": reason}
     mean, dz = _bca(values, _mean, seed, level), _bca(values, _dz, seed, level)
     if mean is None or dz is None:
-        told["no_bootstrap"] = UNBOUNDED
+        details["no_bootstrap"] = UNBOUNDED
     return {
         "bootstrap_ci_difference": None if mean is None else [float(np.ldexp(bound, exponent)) for bound in mean],
         "bootstrap_ci_dz": dz,
-        **told,
+        **details,
     }
 
 
@@ -60,15 +60,15 @@ def _bca(values: FloatArray, statistic: Any, seed: int, level: float) -> list[fl
     random = np.random.default_rng(seed)
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        found = stats.bootstrap(
+        resampled = stats.bootstrap(
             (values,), statistic, n_resamples=RESAMPLES, confidence_level=level, method="BCa", rng=random
         )
-    bounds = [float(found.confidence_interval.low), float(found.confidence_interval.high)]
+    bounds = [float(resampled.confidence_interval.low), float(resampled.confidence_interval.high)]
     return bounds if np.isfinite(bounds).all() else None
 
 
 def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, Any]:
-    """For `details`: p when each participant's two values may as well be exchanged, of the mean difference, two-sided.
+    """For `details`: two-sided p of the mean difference if each participant's two values are exchangeable.
 
     `permutation_p`; `permutation_exact`: are all 2ⁿ exchanges counted, as up to 40 participants? Else of 99,999 drawn
     at random, the one found counted among them (Phipson and Smyth 2010), and `permutation_p_error` is the standard
@@ -79,7 +79,7 @@ def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, A
     if n <= EXACT_UP_TO:
         p = _exact_p(values) if n else None
         return {"permutation_p": p, "permutation_exact": True, "permutation_count": 2**n, "permutation_p_error": None}
-    found = stats.permutation_test(
+    permuted = stats.permutation_test(
         (values,),
         _mean,
         permutation_type="samples",
@@ -88,7 +88,7 @@ def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, A
         batch=_AT_ONCE,
         rng=np.random.default_rng(seed),
     )
-    p = float(found.pvalue)
+    p = float(permuted.pvalue)
     return {
         "permutation_p": p,
         "permutation_exact": False,
@@ -104,11 +104,13 @@ def _exact_p(values: FloatArray) -> float:
     SciPy's permutation test goes through them one by one, which of 20 participants takes ten seconds. A sum is one of
     half of the participants plus one of the others: each half's sums are few, and sorted they are counted at once.
     """
-    found = abs(float(values.sum())) - _ROUND_OFF * float(np.abs(values).sum())
+    observed = abs(float(values.sum())) - _ROUND_OFF * float(np.abs(values).sum())
     half = len(values) // 2
-    one, other = _signed_sums(values[:half]), np.sort(_signed_sums(values[half:]))
-    reaching = np.sum(len(other) - np.searchsorted(other, found - one, side="left"), dtype=np.float64)
-    return float(min(1.0, 2 * reaching / (float(len(one)) * len(other))))
+    first_half, second_half = _signed_sums(values[:half]), np.sort(_signed_sums(values[half:]))
+    reaching = np.sum(
+        len(second_half) - np.searchsorted(second_half, observed - first_half, side="left"), dtype=np.float64
+    )
+    return float(min(1.0, 2 * reaching / (float(len(first_half)) * len(second_half))))
 
 
 def _signed_sums(values: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ def effective(moved: FloatArray, deviations: FloatArray, time_s: FloatArray, blo
     """
     rows = []
     for name in dict.fromkeys(block):
-        own = np.array([one == name for one in block])
+        own = np.array([label == name for label in block])
         if own.sum() < 2:
             continue
         amplitude, width, time = float(moved[own].mean()), effective_width(deviations[own]), float(time_s[own].mean())

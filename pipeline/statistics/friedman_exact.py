@@ -38,7 +38,7 @@ def friedman_p(ranks: FloatArray) -> float | None:
     base = int(doubled.sum()) + 1  # no rank sum reaches it, so that sums are the digits of one whole number
     if k > _MOST_CONDITIONS or base**k > np.iinfo(np.int64).max:
         return None
-    found = int(np.sum(doubled.sum(axis=0) ** 2))
+    observed = int(np.sum(doubled.sum(axis=0) ** 2))
     states, chances, made = np.zeros((1, k), dtype=np.int64), np.ones(1), 0
     *others, last = (np.array(sorted(set(permutations(row.tolist()))), dtype=np.int64) for row in doubled)
     for orders in others:
@@ -49,7 +49,7 @@ def friedman_p(ranks: FloatArray) -> float | None:
     if made + len(states) * len(last) / _LAST_IS_CHEAPER > MOST_SUMS:
         return None
     squares = np.sum(states**2, axis=1)[:, None] + 2 * states @ last.T + np.sum(last**2, axis=1)
-    return float(min(1.0, np.sum(chances @ (squares >= found)) / len(last)))
+    return float(min(1.0, np.sum(chances @ (squares >= observed)) / len(last)))
 
 
 def _with_one_more(states: IntArray, chances: FloatArray, orders: IntArray, base: int) -> tuple[IntArray, FloatArray]:

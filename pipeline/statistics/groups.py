@@ -1,4 +1,4 @@
-"""What every test of groups of participants begins with: can they be tested, and at which scale?"""
+"""Checks and ranks that every test of groups of participants shares."""
 
 from __future__ import annotations
 

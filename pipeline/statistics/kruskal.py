@@ -45,7 +45,7 @@ def kruskal_wallis(groups: Sequence[FloatArray], effect: str = "group") -> Resul
         details={
             "eta_squared_h": (statistic - k + 1) / (n - k) if n > k else None,
             "n_groups": [len(group) for group in groups],
-            "mean_ranks": [float(one.mean()) for one in ranks],
+            "mean_ranks": [float(group.mean()) for group in ranks],
         },
     )
 

@@ -23,24 +23,24 @@ def learning(
 ) -> list[Result]:
     """The slopes of log value on log order (Newell and Rosenbloom 1981), against zero and between conditions.
 
-    A row a trial (N,): its value, such as a time, which must be above 0; its number in the condition from 1 on; whose
-    it is; its condition. First a row a condition, its slopes against zero (contrast: the condition), then one of every
-    two (contrast `a - b`), of the participants who have a slope in both. A slope needs two orders. Effect size: d_z of
-    the slopes, or of their differences; the mean slope and what it makes of a value when trials double are in the
-    details.
+    One row per trial (N,): its value, such as a time, which must be above 0; its number in the condition from 1 on;
+    its participant; its condition. First one row per condition, its slopes against zero (contrast: the condition),
+    then one of every two (contrast `a - b`), of the participants who have a slope in both. A slope needs two
+    orders. Effect size: d_z of the slopes, or of their differences; the mean slope and what it makes of a value
+    when trials double are in the details.
     """
     slopes = _slopes(values, orders, participants, conditions, len(levels))
     if isinstance(slopes, str):
-        names = [*levels, *(f"{one} - {other}" for one, other in combinations(levels, 2))]
+        names = [*levels, *(f"{first} - {second}" for first, second in combinations(levels, 2))]
         people = len(set(participants))
         return [Result(EFFECT, "t", _METHOD, "Cohen's d_z", people, contrast=name, status=slopes) for name in names]
     rows = []
     for slope, name in zip(slopes.T, levels, strict=True):
         known = slope[np.isfinite(slope)]
         rows.append(_row(known, np.zeros(len(known)), name, len(slope)))
-    for (i, one), (j, other) in combinations(enumerate(levels), 2):
+    for (i, first), (j, second) in combinations(enumerate(levels), 2):
         both = np.isfinite(slopes[:, i]) & np.isfinite(slopes[:, j])
-        rows.append(_row(slopes[both, i], slopes[both, j], f"{one} - {other}", len(slopes)))
+        rows.append(_row(slopes[both, i], slopes[both, j], f"{first} - {second}", len(slopes)))
     return rows
 
 
@@ -62,8 +62,8 @@ def _slopes(
 
 
 def _row(first: FloatArray, second: FloatArray, contrast: str, people: int) -> Result:
-    found = t_paired(first, second, EFFECT)
-    told: dict[str, Any] = {
+    tested = t_paired(first, second, EFFECT)
+    details: dict[str, Any] = {
         "slope": None,
         "ratio_when_trials_double": None,
         "ci_slope": None,
@@ -71,8 +71,8 @@ def _row(first: FloatArray, second: FloatArray, contrast: str, people: int) -> R
     }
     if len(first):
         slope = float(np.mean(first - second))
-        told |= {"slope": slope, "ratio_when_trials_double": float(2**slope)}
-    if "ci_difference" in found.details:
-        told["ci_slope"] = found.details["ci_difference"]
-    kept = {name: value for name, value in found.details.items() if name not in ("ci_difference", "d_av")}
-    return replace(found, method=_METHOD, contrast=contrast, details={**told, **kept})
+        details |= {"slope": slope, "ratio_when_trials_double": float(2**slope)}
+    if "ci_difference" in tested.details:
+        details["ci_slope"] = tested.details["ci_difference"]
+    kept = {name: value for name, value in tested.details.items() if name not in ("ci_difference", "d_av")}
+    return replace(tested, method=_METHOD, contrast=contrast, details={**details, **kept})

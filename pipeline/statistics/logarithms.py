@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.statistics import NOT_POSITIVE, OK
 from pipeline.statistics.anova import effect_name, effects_of, rm_anova
 from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.descriptive import described
+from pipeline.statistics.descriptive import summarize
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import FollowUp, follow_ups
 from pipeline.statistics.result import Result
@@ -95,10 +95,10 @@ def rm_anova_of_logarithms(values: FloatArray, factors: Sequence[str]) -> list[R
     if isinstance(logs, str):
         blank = rm_anova(values[:0], factors)[0]
         names = [effect_name(factors, effect) for effect in effects_of(values.shape[1:])]
-        found = [replace(blank, effect=name, n=len(values), status=logs) for name in names]
+        results = [replace(blank, effect=name, n=len(values), status=logs) for name in names]
     else:
-        found = rm_anova(logs, factors)
-    return [replace(result, method=result.method + _OF_LOGARITHMS) for result in found]
+        results = rm_anova(logs, factors)
+    return [replace(result, method=result.method + _OF_LOGARITHMS) for result in results]
 
 
 def ratio_follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequence[Sequence[str]]) -> list[FollowUp]:
@@ -112,17 +112,17 @@ def ratio_follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequenc
             FollowUp(pair, replace(_not_positive(pair.effect, _PAIRED, len(values)), contrast=pair.contrast))
             for pair in follow_ups(values, factors, levels)
         ]
-    found = []
+    results = []
     for pair in follow_ups(logs, factors, levels):
         result = as_ratio(t_paired(pair.first, pair.second, pair.effect))
         means = replace(pair, first=np.exp(pair.first), second=np.exp(pair.second))
-        found.append(FollowUp(means, replace(result, contrast=pair.contrast)))
-    return found
+        results.append(FollowUp(means, replace(result, contrast=pair.contrast)))
+    return results
 
 
 def geometric_mean(values: FloatArray) -> dict[str, Any]:
     """Of values (n,) above zero: the geometric mean and the bounds of its 95 % interval; None where undefined."""
     logs = logarithms(values)
-    row = {} if isinstance(logs, str) or not len(values) else described(logs)
+    row = {} if isinstance(logs, str) or not len(values) else summarize(logs)
     names = {"geometric_mean": "mean", "geometric_ci_low": "ci_low", "geometric_ci_high": "ci_high"}
     return {name: _exponential(row.get(of)) for name, of in names.items()}

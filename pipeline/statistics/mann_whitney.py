@@ -33,11 +33,11 @@ def mann_whitney(first: FloatArray, second: FloatArray, effect: str = "group") -
     blank = Result(effect, "U", "Mann-Whitney test, two-sided", "rank-biserial", len(first) + len(second))
     if status := missing([first, second]):
         return replace(blank, status=status)
-    (one, other), exponent = at_unit_scale([first, second])
-    together = np.concatenate([one, other])
+    (scaled_first, scaled_second), exponent = at_unit_scale([first, second])
+    together = np.concatenate([scaled_first, scaled_second])
     if not varies(together):
         return replace(blank, status=NO_VARIATION)
-    n, m = len(one), len(other)
+    n, m = len(scaled_first), len(scaled_second)
     ranks = midranks(together)
     u = float(ranks[:n].sum()) - n * (n + 1) / 2
     p, how = rank_sum_p(ranks, n)
@@ -52,7 +52,7 @@ def mann_whitney(first: FloatArray, second: FloatArray, effect: str = "group") -
         effect_size=2 * u / (n * m) - 1,
         ci_low=low,
         ci_high=high,
-        details={"n_groups": [n, m], **_shift(one, other, exponent)},
+        details={"n_groups": [n, m], **_shift(scaled_first, scaled_second, exponent)},
     )
 
 
@@ -71,9 +71,9 @@ def rank_sum_p(ranks: FloatArray, n: int) -> tuple[float, str]:
     doubled = np.rint(2 * ranks).astype(np.int64)  # midranks are halves
     weights = doubled - doubled.min()
     ways = _ways(weights, count)
-    found = round(2 * float(chosen.sum())) - count * int(doubled.min())
+    observed = round(2 * float(chosen.sum())) - count * int(doubled.min())
     apart = np.abs(number * np.arange(len(ways)) - count * int(weights.sum()))
-    far = apart >= abs(number * found - count * int(weights.sum()))
+    far = apart >= abs(number * observed - count * int(weights.sum()))
     return float(ways[far].sum() / ways.sum()), "exact, midranks"
 
 

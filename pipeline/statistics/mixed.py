@@ -24,7 +24,7 @@ from pipeline.statistics import (
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.effect_size import partial_eta_squared_interval
 from pipeline.statistics.random_intercept import PARTICIPANT, Rows
-from pipeline.statistics.random_intercepts import described, fitted
+from pipeline.statistics.random_intercepts import fitted, method_text
 from pipeline.statistics.result import IntArray, Result, negligible
 from pipeline.statistics.satterthwaite import Fit, degrees_of_freedom, f_test
 
@@ -81,13 +81,15 @@ def mixed_model(
     (scaled,), exponent = at_unit_scale([values])
     rows = Rows(scaled, _design(columns, terms, len(values)), index)
     groupings = {PARTICIPANT: index, **(random or {})}
-    blank = Result("", "t", described(groupings), "estimate", len(people))
-    found = _undefined(rows, columns) or fitted(rows, groupings)
-    if isinstance(found, str):
-        return [replace(blank, effect=term, contrast=_contrast(columns, term), status=found) for term in terms]
-    details = _told(found.fit, len(values), exponent, rows.free)
-    blank = replace(blank, method=described(groupings, found), details=details)
-    results = [result for term in terms for result in _tested(found.fit, columns, terms, replace(blank, effect=term))]
+    blank = Result("", "t", method_text(groupings), "estimate", len(people))
+    fitted_model = _undefined(rows, columns) or fitted(rows, groupings)
+    if isinstance(fitted_model, str):
+        return [replace(blank, effect=term, contrast=_contrast(columns, term), status=fitted_model) for term in terms]
+    details = _shared_details(fitted_model.fit, len(values), exponent, rows.free)
+    blank = replace(blank, method=method_text(groupings, fitted_model), details=details)
+    results = [
+        result for term in terms for result in _tested(fitted_model.fit, columns, terms, replace(blank, effect=term))
+    ]
     return [_unscaled(result, exponent) for result in results]
 
 
@@ -98,8 +100,8 @@ def cells_of(participants: Sequence[str], condition: Factor) -> IntArray:
     return cells
 
 
-def _told(model: Fit, count: int, exponent: int, free: int) -> dict[str, Any]:
-    """What of the fit is the same for every term, in the values' own unit."""
+def _shared_details(model: Fit, count: int, exponent: int, free: int) -> dict[str, Any]:
+    """Details that every term shares, in the unit of the values."""
     variances = {name: _power(variance, 2 * exponent) for name, variance in model.variances.items()}
     return {
         "singular": bool(model.zero),
@@ -154,7 +156,7 @@ def _design(columns: Mapping[str, Column], terms: Sequence[str], rows: int) -> F
     blocks = [np.ones((rows, 1))]
     for term in terms:
         parts = [columns[name].columns for name in term.split(":")]
-        blocks.append(reduce(lambda one, two: (one[:, :, None] * two[:, None, :]).reshape(rows, -1), parts))
+        blocks.append(reduce(lambda first, second: (first[:, :, None] * second[:, None, :]).reshape(rows, -1), parts))
     return np.hstack(blocks)
 
 

@@ -54,20 +54,20 @@ def mixed_anova(values: FloatArray, codes: IntArray, between: str, factors: Sequ
     people = _strata(flat @ contrasts(levels, ()), groups)[1]
     within = [_strata(apart @ contrasts(levels, effect), groups) for effect in effects]
     variation = people.error + sum(of_group.error for _, of_group in within)
-    found = [_group_row(replace(blank, effect=between), people, variation, flat, groups)]
+    results = [_group_row(replace(blank, effect=between), people, variation, flat, groups)]
     for effect, strata in zip(effects, within, strict=True):
         for name, stratum in zip(_names(between, factors, effect), strata, strict=True):
-            found.append(_within_row(replace(blank, effect=name), stratum, variation, apart))
-        if len(effect) == 1 and levels[effect[0]] == 2 and found[-2].status == OK:
+            results.append(_within_row(replace(blank, effect=name), stratum, variation, apart))
+        if len(effect) == 1 and levels[effect[0]] == 2 and results[-2].status == OK:
             first, second = (values.take(level, effect[0] + 1).reshape(n, -1).mean(axis=1) for level in (0, 1))
             compared = t_in_groups(first, second, codes).details
-            told = {name: compared[name] for name in ("difference", "ci_difference")}
-            found[-2] = replace(found[-2], details={**found[-2].details, **told})
-    if len(effects) == 1 and levels[0] > 2 and found[1].status == OK:
+            difference = {name: compared[name] for name in ("difference", "ci_difference")}
+            results[-2] = replace(results[-2], details={**results[-2].details, **difference})
+    if len(effects) == 1 and levels[0] > 2 and results[1].status == OK:
         centred = apart - apart.mean(axis=1, keepdims=True)
         residuals = np.concatenate([(centred[rows] - centred[rows].mean(axis=0)).ravel() for rows in groups])
-        found[1] = replace(found[1], details={**found[1].details, **normality(residuals, "residual_")})
-    return found
+        results[1] = replace(results[1], details={**results[1].details, **normality(residuals, "residual_")})
+    return results
 
 
 def _untestable(flat: FloatArray, groups: Sequence[IntArray]) -> str | None:
@@ -168,12 +168,12 @@ def follow_ups(
     groups = [values[codes == code] for code in range(len(names))]
     means = [group.mean(axis=tuple(range(1, group.ndim))) for group in groups]
     pairs = of_groups(means, names, name) if len(names) > 2 else []
-    found = [FollowUp(pair, t_welch(pair.first, pair.second, name)) for pair in pairs]
+    rows = [FollowUp(pair, t_welch(pair.first, pair.second, name)) for pair in pairs]
     for pair in within_pairs(values, factors, levels):
-        found.append(FollowUp(pair, t_in_groups(pair.first, pair.second, codes, pair.effect)))
-    for effect in effects_of([len(one) for one in levels]):
-        found += _of_interaction(groups, between, factors, levels, effect)
-    return [FollowUp(one.pair, replace(one.result, contrast=one.pair.contrast)) for one in found]
+        rows.append(FollowUp(pair, t_in_groups(pair.first, pair.second, codes, pair.effect)))
+    for effect in effects_of([len(names) for names in levels]):
+        rows += _of_interaction(groups, between, factors, levels, effect)
+    return [FollowUp(row.pair, replace(row.result, contrast=row.pair.contrast)) for row in rows]
 
 
 def _of_interaction(

@@ -42,26 +42,26 @@ def differences_of(first: FloatArray, second: FloatArray) -> Differences | str:
 def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -> Result:
     """Student's t of the differences first − second, two-sided; effect size d_z with its noncentral-t interval."""
     blank = Result(effect, "t", "paired t test, two-sided", "Cohen's d_z", len(first))
-    found = differences_of(first, second)
-    if isinstance(found, str):
-        return replace(blank, status=found)
-    df = found.n - 1
-    statistic, margin = found.mean / found.error, float(stats.t.ppf(0.975, df)) * found.error
-    low, high = dz_interval(found.dz, found.n)
+    summary = differences_of(first, second)
+    if isinstance(summary, str):
+        return replace(blank, status=summary)
+    df = summary.n - 1
+    statistic, margin = summary.mean / summary.error, float(stats.t.ppf(0.975, df)) * summary.error
+    low, high = dz_interval(summary.dz, summary.n)
     correction = hedges_correction(df)
-    (one, other), exponent = at_unit_scale([first, second])
-    pooled = float(np.ldexp(np.sqrt((np.var(one, ddof=1) + np.var(other, ddof=1)) / 2), exponent))
+    (scaled_first, scaled_second), exponent = at_unit_scale([first, second])
+    pooled = float(np.ldexp(np.sqrt((np.var(scaled_first, ddof=1) + np.var(scaled_second, ddof=1)) / 2), exponent))
     return replace(
         blank,
         statistic=float(statistic),
         df2=float(df),
         p=float(2 * stats.t.sf(abs(statistic), df)),
-        effect_size=found.dz,
+        effect_size=summary.dz,
         ci_low=low,
         ci_high=high,
         details={
-            "hedges_gz": None if correction is None else correction * found.dz,
-            "d_av": found.mean / pooled if pooled > 0 else None,
-            "ci_difference": [found.mean - margin, found.mean + margin],
+            "hedges_gz": None if correction is None else correction * summary.dz,
+            "d_av": summary.mean / pooled if pooled > 0 else None,
+            "ci_difference": [summary.mean - margin, summary.mean + margin],
         },
     )

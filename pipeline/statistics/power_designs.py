@@ -1,7 +1,8 @@
 """Power in closed form beyond one within-factor: groups, factorial and mixed designs, equivalence.
 
 Each design is a frozen value of what is assumed of the study; `power(effect, n)` is of n participants in each group
-(of a design without groups: in all), and `method` names how it was computed. `detectable` and `fewest` turn it round.
+(of a design without groups: in all), and `method` names how it was computed. `detectable` and `fewest` solve it for the
+effect and for n.
 """
 
 from __future__ import annotations

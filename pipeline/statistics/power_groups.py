@@ -78,11 +78,11 @@ def detectable_by_simulation(
                 low = middle
         return high
 
-    found = [crossing(lambda share: share.power), crossing(lambda share: share.interval()[1])]
+    crossings = [crossing(lambda share: share.power), crossing(lambda share: share.interval()[1])]
     certain = crossing(lambda share: share.interval()[0])
-    if found[0] is None:
+    if crossings[0] is None:
         return None
-    return found[0], found[1] or 0.0, largest if certain is None else certain
+    return crossings[0], crossings[1] or 0.0, largest if certain is None else certain
 
 
 def _drawn(

@@ -37,8 +37,8 @@ class Share:
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Of the power, exact (Clopper and Pearson 1934)."""
-        found = stats.binomtest(self.significant, self.studies).proportion_ci(level, method="exact")
-        return float(found.low), float(found.high)
+        proportion = stats.binomtest(self.significant, self.studies).proportion_ci(level, method="exact")
+        return float(proportion.low), float(proportion.high)
 
 
 @dataclass(frozen=True)

@@ -87,8 +87,8 @@ def _variance_ratio(rows: Rows) -> float:
         ratio = float(optimize.brentq(slope, low, high, xtol=1e-300, rtol=1e-14) ** 2)
         return ratio if ratio > _SINGULAR else 0.0
     # So large a ratio that round-off hides the slope; nothing but σ_b² depends on where exactly it is.
-    found = optimize.minimize_scalar(lambda root: _profile(rows, root**2), bounds=(low, high), method="bounded")
-    return float(found.x**2)
+    minimum = optimize.minimize_scalar(lambda root: _profile(rows, root**2), bounds=(low, high), method="bounded")
+    return float(minimum.x**2)
 
 
 def _independent(rows: Rows, ratio: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -32,8 +32,8 @@ def fitted(rows: Rows, groupings: Mapping[str, IntArray]) -> Fitted | str:
     if _without_residual(problem):
         return NO_RESIDUAL
     alone = list(problem.groupings) == [PARTICIPANT]
-    found = random_intercept.fit(rows) if alone else variance_components.fit(problem)
-    return NOT_CONVERGED if found is None else Fitted(found, tuple(left_out))
+    fit = random_intercept.fit(rows) if alone else variance_components.fit(problem)
+    return NOT_CONVERGED if fit is None else Fitted(fit, tuple(left_out))
 
 
 def _without_residual(problem: Problem) -> bool:
@@ -44,16 +44,16 @@ def _without_residual(problem: Problem) -> bool:
     return negligible(float(np.sum(left**2)), problem.values)
 
 
-def described(groupings: Iterable[str], found: Fitted | None = None) -> str:
-    """The method in words; `found` adds what the fit did without."""
+def method_text(groupings: Iterable[str], fitted_model: Fitted | None = None) -> str:
+    """The method in words; `fitted_model` adds the random intercepts that the fit left out."""
     names = list(groupings)
-    zero = found.fit.zero if found else []
+    zero = fitted_model.fit.zero if fitted_model else []
     if names == [PARTICIPANT]:
         singular = "; singular fit: no variance between participants is found" if zero else ""
         return f"linear mixed model, random intercept, {_ESTIMATION}{singular}"
     text = f"linear mixed model, {_written(names)}, {_ESTIMATION}"
-    if found and found.left_out:
-        text += f"; left out, as these data cannot tell its variance: {_written(found.left_out)}"
+    if fitted_model and fitted_model.left_out:
+        text += f"; left out, as these data cannot tell its variance: {_written(fitted_model.left_out)}"
     if zero:
         text += f"; singular fit, estimated as zero and left out: {_written(zero)}"
     return text

@@ -146,7 +146,7 @@ def _distribution(weights: IntArray, tilt: float = 0.0) -> FloatArray:
         for block in np.split(weights, range(_BLOCK, len(weights), _BLOCK))
     ]
     while len(parts) > 1:
-        pairs = [signal.fftconvolve(one, two) for one, two in zip(parts[::2], parts[1::2], strict=False)]
+        pairs = [signal.fftconvolve(first, second) for first, second in zip(parts[::2], parts[1::2], strict=False)]
         parts = pairs + parts[2 * len(pairs) :]
     return parts[0]
 

@@ -34,17 +34,17 @@ def rank_biserial_interval(
 ) -> tuple[float, float]:
     """Of r; `p` is the exact two-sided one that it must not contradict. Arguments as for `rank_biserial`."""
     n, m, total = len(differences), int(np.count_nonzero(differences)), float(ranks.sum())
-    found = rank_biserial(differences, ranks)
+    r = rank_biserial(differences, ranks)
     of_one_sign = 2 * ((1 - level) / 2) ** (1 / m) - 1
     low, high = -1.0, 1.0
-    if abs(found) < 1:
-        margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * _error(differences, ranks) / (1 - found**2)
-        low, high = (float(np.tanh(np.arctanh(found) + sign * margin)) for sign in (-1, 1))
-    low, high = (of_one_sign, 1.0) if found == 1 else (low, max(high, -of_one_sign))
-    low, high = (-1.0, -of_one_sign) if found == -1 else (min(low, of_one_sign), high)
+    if abs(r) < 1:
+        margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * _error(differences, ranks) / (1 - r**2)
+        low, high = (float(np.tanh(np.arctanh(r) + sign * margin)) for sign in (-1, 1))
+    low, high = (of_one_sign, 1.0) if r == 1 else (low, max(high, -of_one_sign))
+    low, high = (-1.0, -of_one_sign) if r == -1 else (min(low, of_one_sign), high)
     if p >= 1 - level:
         return min(low, 0.0), max(high, 0.0)
-    return (max(low, 1 / total), high) if found > 0 else (low, min(high, -1 / total))
+    return (max(low, 1 / total), high) if r > 0 else (low, min(high, -1 / total))
 
 
 def _error(differences: FloatArray, ranks: FloatArray) -> float:

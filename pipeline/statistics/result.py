@@ -1,4 +1,4 @@
-"""What a test says of one effect, and when there is nothing to say."""
+"""The result of a test of one effect, and the statuses where it is undefined."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ IntArray = npt.NDArray[np.int64]
 
 _ROUND_OFF = 1e-12  # of the largest value: what arithmetic on decimal data leaves behind
 _ROUND_OFF_STEPS = 64
-_TOLD_APART = 4  # spacings of floats: decimals closer than that are lost in their own round-off
+_DISTINGUISHABLE = 4  # spacings of floats: decimals closer than that are lost in their own round-off
 _KNOWN_TO = 1e-6
 
 
 @dataclass(frozen=True)
 class Result:
-    """One row of `comparisons`, less what the study adds. None where a figure is not defined."""
+    """One row of `comparisons`, without what the study adds (measure, family, adjusted p). None: figure not defined."""
 
     effect: str
     statistic_name: str
@@ -57,12 +57,12 @@ def room_of(sizes: FloatArray, step: float = 0.0) -> FloatArray:
     """
     spacing = np.spacing(np.abs(sizes))
     room: FloatArray = np.maximum(_ROUND_OFF_STEPS * spacing, np.spacing(np.median(np.abs(sizes))) if sizes.size else 0)
-    told_apart = (step >= _TOLD_APART * spacing) | ((step >= 1) & (spacing <= 1))
+    told_apart = (step >= _DISTINGUISHABLE * spacing) | ((step >= 1) & (spacing <= 1))
     return np.where(told_apart, np.minimum(room, step / 2), room)
 
 
 def tied(values: FloatArray, room: FloatArray) -> FloatArray:
-    """Values (n,) of which those that round-off alone parts are equal in size, and those within their room are zero.
+    """Values (n,) in which those that differ by round-off alone are made equal in size, and those within `room` zero.
 
     No other value moves by more than a millionth of itself: a value known less well than that ties with nothing.
     """

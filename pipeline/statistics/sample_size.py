@@ -76,8 +76,8 @@ def sample_size(design: Design, power: float, studies: int, seed: int, most: int
         corrected = _needed(lambda n: at(n).corrected or at(n).own, power, start, most)
     middle = exact or simulated.n or most
     answers = (simulated, corrected) if corrected else (simulated,)
-    found = [n for answer in answers for n in (answer.n, answer.low, answer.high) if n]
-    numbers = {*_spread(middle, most), middle, max(FEWEST, middle - 1), *found}
+    answers_n = [n for answer in answers for n in (answer.n, answer.low, answer.high) if n]
+    numbers = {*_spread(middle, most), middle, max(FEWEST, middle - 1), *answers_n}
     rows = tuple(Row(n, closed_form(design, n), at(n)) for n in sorted(numbers))
     return SampleSize(rows, exact, simulated, corrected)
 

@@ -84,17 +84,17 @@ def _wrong(value: float | None, limits: tuple[float, float]) -> str | None:
 
 def _weight_faults(scale: Scale, weights: Mapping[str, float | None]) -> Iterator[Fault]:
     """Weights of k items: whole numbers up to k − 1, and any j of them sum to at least j(j − 1)/2 (Landau 1953)."""
-    found = [weights.get(item) for item in scale.items]
+    by_item = [weights.get(item) for item in scale.items]
     most = len(scale.items) - 1
-    single = [_wrong(weight, (0, most)) for weight in found]
+    single = [_wrong(weight, (0, most)) for weight in by_item]
     yield from (
         Fault(item, f"weight {what}", weight, (scale.name,))
-        for item, weight, what in zip(scale.items, found, single, strict=True)
+        for item, weight, what in zip(scale.items, by_item, single, strict=True)
         if what is not None
     )
     if any(single):
         return
-    whole = sorted(weight for weight in found if weight is not None)
+    whole = sorted(weight for weight in by_item if weight is not None)
     sums = list(accumulate(whole))
     enough = all(total >= comb(count, 2) for count, total in enumerate(sums, 1))
     if sums[-1] != comb(len(whole), 2) or not enough or any(weight % 1 for weight in whole):

@@ -28,10 +28,10 @@ def cell_shape(values: FloatArray) -> dict[str, float | bool | None]:
     where all values are above zero.
     """
     (scaled,), _ = at_unit_scale([values.reshape(len(values), int(np.prod(values.shape[1:])))])
-    found = _shape(scaled)
+    own_scale = _shape(scaled)
     logs = np.log(scaled) if scaled.size and np.all(scaled > 0) else None
-    beside = _shape(logs) if logs is not None else dict.fromkeys(found)
-    return {**found, **{f"log_{name}": figure for name, figure in beside.items()}}
+    beside = _shape(logs) if logs is not None else dict.fromkeys(own_scale)
+    return {**own_scale, **{f"log_{name}": figure for name, figure in beside.items()}}
 
 
 def _shape(cells: FloatArray) -> dict[str, float | bool | None]:

@@ -91,10 +91,10 @@ def _correlations(matrices: _Matrices) -> FloatArray:
     size = len(parts) + 1
     information = np.empty((size, size))
     information[0, 0] = matrices.free
-    for i, one in enumerate(parts):
-        information[0, i + 1] = information[i + 1, 0] = np.trace(inner[one, one])
-        for j, other in enumerate(parts):
-            information[i + 1, j + 1] = np.sum(inner[one, other] ** 2)
+    for i, first_part in enumerate(parts):
+        information[0, i + 1] = information[i + 1, 0] = np.trace(inner[first_part, first_part])
+        for j, second_part in enumerate(parts):
+            information[i + 1, j + 1] = np.sum(inner[first_part, second_part] ** 2)
     spread = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     if np.any(np.diag(information) < _DISTINCT):
         return np.zeros((1, 1))  # an intercept that the fixed effects explain
@@ -162,14 +162,14 @@ class _Solved:
         first[0] = (extra + np.trace(self.inverse)) / residual - self.residuals @ self.residuals / residual**2
         second[0, 0] = -(extra + np.sum(self.inverse * self.inverse.T)) / residual**2
         second[0, 0] += 2 * (self.residuals @ moved) / residual**3
-        for i, one in enumerate(parts, start=1):
-            first[i] = np.trace(self.weighted[one, one]) / residual - np.sum(self.scores[one] ** 2) / residual**2
-            second[0, i] = second[i, 0] = -np.trace(twice[one, one]) / residual**2
-            second[0, i] = second[i, 0] = second[0, i] + 2 * (again[one] @ self.scores[one]) / residual**3
-            for j, other in enumerate(parts, start=1):
-                block = self.weighted[one, other]
+        for i, part in enumerate(parts, start=1):
+            first[i] = np.trace(self.weighted[part, part]) / residual - np.sum(self.scores[part] ** 2) / residual**2
+            second[0, i] = second[i, 0] = -np.trace(twice[part, part]) / residual**2
+            second[0, i] = second[i, 0] = second[0, i] + 2 * (again[part] @ self.scores[part]) / residual**3
+            for j, other_part in enumerate(parts, start=1):
+                block = self.weighted[part, other_part]
                 second[i, j] = -np.sum(block**2) / residual**2
-                second[i, j] += 2 * (self.scores[one] @ block @ self.scores[other]) / residual**3
+                second[i, j] += 2 * (self.scores[part] @ block @ self.scores[other_part]) / residual**3
         return first, second
 
 
@@ -194,8 +194,8 @@ def _highest(matrices: _Matrices) -> FloatArray:
     count = len(matrices.parts)
     if not count:
         return np.zeros(0)
-    grid = [np.array(one) for one in product((0.0, *_STARTS), repeat=count)]
-    start = min(grid, key=lambda one: _Solved(matrices, one).deviance)
+    grid = [np.array(ratios) for ratios in product((0.0, *_STARTS), repeat=count)]
+    start = min(grid, key=lambda ratios: _Solved(matrices, ratios).deviance)
 
     def criterion(roots: FloatArray) -> tuple[float, FloatArray]:
         solved = _Solved(matrices, roots**2)
@@ -204,8 +204,8 @@ def _highest(matrices: _Matrices) -> FloatArray:
     roots = np.sqrt(start)
     for _ in range(_STEPS):
         bounds = [(0.0, np.sqrt(_LARGEST))] * count
-        found = optimize.minimize(criterion, roots, jac=True, method="L-BFGS-B", bounds=bounds)
-        roots = np.asarray(found.x)
+        search = optimize.minimize(criterion, roots, jac=True, method="L-BFGS-B", bounds=bounds)
+        roots = np.asarray(search.x)
         # At a root of zero the slope in the root is zero too; whether the variance should rise is in that of τ.
         rising = (roots**2 <= _SINGULAR) & (_Solved(matrices, np.where(roots**2 <= _SINGULAR, 0, roots**2)).slope < 0)
         if not np.any(rising):
@@ -258,8 +258,8 @@ def _fitted(problem: Problem, matrices: _Matrices, variances: FloatArray) -> Fit
     through = fixed @ spread  # what the coefficients' covariance owes to the intercepts'
     derivatives = [of_coefficients(np.eye(p) + through @ matrices.inner @ through.T)]
     for part in matrices.parts:
-        one = fixed @ solved.inverse.T[:, part]
-        derivatives.append(of_coefficients(one @ one.T))
+        columns = fixed @ solved.inverse.T[:, part]
+        derivatives.append(of_coefficients(columns @ columns.T))
     _, second = solved.derivatives(residual)
     constant = matrices.free * (1 + np.log(2 * np.pi / matrices.free)) + 2 * np.sum(np.log(np.abs(np.diag(triangle))))
     return Fit(
@@ -268,6 +268,6 @@ def _fitted(problem: Problem, matrices: _Matrices, variances: FloatArray) -> Fit
         derivatives=np.stack(derivatives),
         uncertainty=np.linalg.inv(second / 2).astype(np.float64),
         variance_residual=residual,
-        variances=dict(zip(problem.groupings, (float(one) for one in variances[1:]), strict=True)),
+        variances=dict(zip(problem.groupings, (float(variance) for variance in variances[1:]), strict=True)),
         log_likelihood=float(-(solved.deviance + constant) / 2),
     )

@@ -31,12 +31,12 @@ def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Res
     2021), and leaves out 0 exactly where p is below .05.
     """
     blank = Result(effect, "t", "Welch's t test, two-sided", "Cohen's d_s", len(first) + len(second))
-    (one, other), exponent = at_unit_scale([first, second])
-    if status := untestable([one, other]):
+    (scaled_first, scaled_second), exponent = at_unit_scale([first, second])
+    if status := untestable([scaled_first, scaled_second]):
         return replace(blank, status=status)
-    sizes = np.array([len(one), len(other)])
-    variances = np.array([np.var(one, ddof=1), np.var(other, ddof=1)])
-    difference = float(one.mean() - other.mean())
+    sizes = np.array([len(scaled_first), len(scaled_second)])
+    variances = np.array([np.var(scaled_first, ddof=1), np.var(scaled_second, ddof=1)])
+    difference = float(scaled_first.mean() - scaled_second.mean())
     shares = variances / sizes
     error = float(np.sqrt(shares.sum()))
     df = float(shares.sum() ** 2 / np.sum(shares**2 / (sizes - 1)))
@@ -61,8 +61,8 @@ def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Res
             "d_av_ci": list(d_av_ci),
             "ci_difference": [float(np.ldexp(difference + sign * margin, exponent)) for sign in (-1, 1)],
             "n_groups": [int(size) for size in sizes],
-            **spreads([one, other]),
-            **_normality([one, other]),
+            **spreads([scaled_first, scaled_second]),
+            **_normality([scaled_first, scaled_second]),
         },
     )
 
@@ -122,17 +122,17 @@ def spreads(groups: Sequence[FloatArray]) -> dict[str, float | None]:
 
     None where the deviations do not vary within any group, as in groups of two.
     """
-    found: dict[str, float | None] = {}
+    tests: dict[str, float | None] = {}
     for name, center in _SPREADS.items():
         middle = np.mean if center == "mean" else np.median
         deviations = [np.abs(group - middle(group)) for group in groups]
         defined = untestable(deviations) is None
         f, p = with_pingouin.levene(groups, center) if defined else (None, None)
-        found |= {f"{name}_f": f, f"{name}_p": p}
-    return found
+        tests |= {f"{name}_f": f, f"{name}_p": p}
+    return tests
 
 
 def _normality(groups: Sequence[FloatArray]) -> dict[str, list[float | None]]:
     """Shapiro and Wilk's W and p of each group."""
-    found = [normality(group) for group in groups]
-    return {f"groups_{name}": [one[name] for one in found] for name in ("shapiro_w", "shapiro_p")}
+    tests = [normality(group) for group in groups]
+    return {f"groups_{name}": [test[name] for test in tests] for name in ("shapiro_w", "shapiro_p")}

@@ -23,8 +23,8 @@ def welch_anova(groups: Sequence[FloatArray]) -> tuple[float, float, float, floa
     with _quiet():
         import pingouin
 
-        found = pingouin.welch_anova(data=_table(groups), dv="value", between="group").iloc[0]
-    return float(found["F"]), float(found["ddof1"]), float(found["ddof2"]), float(found["p_unc"])
+        table = pingouin.welch_anova(data=_table(groups), dv="value", between="group").iloc[0]
+    return float(table["F"]), float(table["ddof1"]), float(table["ddof2"]), float(table["p_unc"])
 
 
 def games_howell(groups: Sequence[FloatArray]) -> list[tuple[float, float, float, float]]:
@@ -32,8 +32,8 @@ def games_howell(groups: Sequence[FloatArray]) -> list[tuple[float, float, float
     with _quiet():
         import pingouin
 
-        found = pingouin.pairwise_gameshowell(data=_table(groups), dv="value", between="group")
-    columns = (found[name].to_numpy(np.float64) for name in ("T", "df", "se", "pval"))
+        table = pingouin.pairwise_gameshowell(data=_table(groups), dv="value", between="group")
+    columns = (table[name].to_numpy(np.float64) for name in ("T", "df", "se", "pval"))
     return [(float(t), float(df), float(error), float(p)) for t, df, error, p in zip(*columns, strict=True)]
 
 
@@ -42,8 +42,8 @@ def kruskal(groups: Sequence[FloatArray]) -> tuple[float, float]:
     with _quiet():
         import pingouin
 
-        found = pingouin.kruskal(data=_table(groups), dv="value", between="group").iloc[0]
-    return float(found["H"]), float(found["p_unc"])
+        table = pingouin.kruskal(data=_table(groups), dv="value", between="group").iloc[0]
+    return float(table["H"]), float(table["p_unc"])
 
 
 def levene(groups: Sequence[FloatArray], center: Literal["mean", "median"]) -> tuple[float, float]:
@@ -51,8 +51,8 @@ def levene(groups: Sequence[FloatArray], center: Literal["mean", "median"]) -> t
     with _quiet():
         import pingouin
 
-        found = pingouin.homoscedasticity(list(groups), method="levene", center=center).iloc[0]
-    return float(found["W"]), float(found["pval"])
+        table = pingouin.homoscedasticity(list(groups), method="levene", center=center).iloc[0]
+    return float(table["W"]), float(table["pval"])
 
 
 @contextmanager

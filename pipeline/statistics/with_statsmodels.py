@@ -30,8 +30,8 @@ def cochran_q(values: FloatArray) -> tuple[float, float]:
     with _quiet():
         from statsmodels.stats.contingency_tables import cochrans_q
 
-        found = cochrans_q(values)
-    return float(found.statistic), float(found.pvalue)
+        result = cochrans_q(values)
+    return float(result.statistic), float(result.pvalue)
 
 
 @dataclass(frozen=True)
@@ -65,17 +65,17 @@ def gee(
         over = exposure if family == "poisson" else None
         model = sm.GEE(outcome, design, groups=clusters, family=law, exposure=over)
         try:
-            found = model.fit(cov_type="bias_reduced", maxiter=200)
+            fit = model.fit(cov_type="bias_reduced", maxiter=200)
         except (np.linalg.LinAlgError, ValueError):
             return None
-    if not found.converged:
+    if not fit.converged:
         return None
-    residuals = np.asarray(found.resid_pearson)
+    residuals = np.asarray(fit.resid_pearson)
     return Estimated(
-        np.asarray(found.params),
-        np.asarray(found.cov_robust_bc),
-        np.asarray(found.cov_robust),
-        np.exp(found.params) if family == "poisson" else 1 / (1 + np.exp(-np.asarray(found.params))),
+        np.asarray(fit.params),
+        np.asarray(fit.cov_robust_bc),
+        np.asarray(fit.cov_robust),
+        np.exp(fit.params) if family == "poisson" else 1 / (1 + np.exp(-np.asarray(fit.params))),
         float(np.sum(residuals**2) / (len(outcome) - levels)),
     )
 

@@ -84,7 +84,7 @@ MUTANTS = (
         _TESTS,
     ),
     Mutant("if df < 2:\n        return None", "if df < 1:\n        return None", _TESTS),
-    Mutant("found / (found + df2)", "found / (found + df1 + df2 + 1)", _TESTS),
+    Mutant("bound / (bound + df2)", "bound / (bound + df1 + df2 + 1)", _TESTS),
     Mutant("if below(0.0) < target:", "if below(0.0) < 0:", _TESTS),
     # Equivalence.
     Mutant("p=max(p_lower, p_upper)", "p=min(p_lower, p_upper)", _MODELS),
@@ -110,7 +110,9 @@ MUTANTS = (
         "log_likelihood=float(-solved.deviance / 2)",
         _INTERCEPTS,
     ),
-    Mutant("second[i, j] += 2 * (self.scores[one] @ block @ self.scores[other]) / residual**3", "pass", _INTERCEPTS),
+    Mutant(
+        "second[i, j] += 2 * (self.scores[part] @ block @ self.scores[other_part]) / residual**3", "pass", _INTERCEPTS
+    ),
     Mutant(
         "second[0, 0] += 2 * (self.residuals @ moved) / residual**3",
         "second[0, 0] += (self.residuals @ moved) / residual**3",
@@ -139,9 +141,11 @@ MUTANTS = (
     ),
     # Paired differences.
     Mutant("np.std(values, ddof=1) / np.sqrt(n))", "np.std(values) / np.sqrt(n))", _TESTS),
-    Mutant("df = found.n - 1\n    statistic, margin", "df = found.n\n    statistic, margin", _TESTS),
+    Mutant("df = summary.n - 1\n    statistic, margin", "df = summary.n\n    statistic, margin", _TESTS),
     Mutant(
-        "(np.var(one, ddof=1) + np.var(other, ddof=1)) / 2)", "np.var(one, ddof=1) + np.var(other, ddof=1))", _TESTS
+        "(np.var(scaled_first, ddof=1) + np.var(scaled_second, ddof=1)) / 2)",
+        "np.var(scaled_first, ddof=1) + np.var(scaled_second, ddof=1))",
+        _TESTS,
     ),
     Mutant("len(effect) > 1 or len(levels[effect[0]]) > 2", "len(effect) > 1 or len(levels[effect[0]]) > 1", _MODELS),
     Mutant('if factors[index] == "condition"), effect[0])', 'if factors[index] == ""), effect[0])', _MODELS),
@@ -199,7 +203,7 @@ MUTANTS = (
     Mutant("np.sqrt(np.sum(ranks**2) / 4)", "np.sqrt(np.sum(ranks**2) / 2)", _TESTS),
     Mutant("np.tanh(z - margin)), float(np.tanh(z + margin))", "z - margin), float(z + margin)", _TESTS),
     # Friedman's exact p.
-    Mutant("np.sum(chances @ (squares >= found))", "np.sum(chances @ (squares > found))", _FRIEDMAN),
+    Mutant("np.sum(chances @ (squares >= observed))", "np.sum(chances @ (squares > observed))", _FRIEDMAN),
     Mutant("np.repeat(chances / len(orders), len(orders))", "np.repeat(chances, len(orders))", _FRIEDMAN),
     Mutant("sorted(set(permutations(row.tolist())))", "sorted(permutations(row.tolist()))[::2]", _FRIEDMAN),
     # Round-off.

@@ -16,7 +16,7 @@ from scipy import stats
 
 from pipeline.analysis.ranking import ranked
 from pipeline.sessions.variants import read_changes
-from pipeline.statistics.descriptive import described
+from pipeline.statistics.descriptive import summarize
 from pipeline.tables import table as tables
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Ran, Steadyhand
@@ -338,7 +338,7 @@ def test_at_the_selections_is_the_root_of_the_mean_over_sessions_of_their_means(
     )
     (row,) = ranked(tables.frame("accuracy", []), trials)
     assert (row["rank"], row["selection_n"], row["selection_rmse_mm"]) == (None, 2, pytest.approx(np.sqrt(6)))
-    summary = described(np.array([2.0, 10.0]))
+    summary = summarize(np.array([2.0, 10.0]))
     assert row["selection_rmse_low_mm"] == 0
     assert row["selection_rmse_high_mm"] == pytest.approx(np.sqrt(summary["ci_high"]))
 
