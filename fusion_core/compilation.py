@@ -1,9 +1,9 @@
 """How functions are compiled, and where the machine code is kept between runs.
 
-Numba keeps machine code in a file and looks only at the source file of the function that it compiled. But a compiled
-function holds copies of all it calls, and of the constants it uses. If one of these stands in another file and is
-edited, Numba would go on running the old code without a word. So the machine code of each state of the sources has a
-folder of its own: any edit, in any file, leads to an empty folder, and everything is compiled anew.
+Numba keeps machine code in a file and checks only the source file of the function that it compiled. But a compiled
+function contains copies of all functions it calls and of the constants it uses. If one of these is in another file and
+is edited, Numba would silently go on running the old code. So there is one folder of machine code for each state of the
+sources: any edit, in any file, leads to another, empty folder, and everything is compiled again.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _numba_settings = Lock()
 class Compiler:
     """A decorator: `@compiled`, or `@compiled(fastmath=True)` with further options of `numba.njit`.
 
-    For the functions of one package, a folder. They may call each other and those of fusion_core; a function or
-    constant of a third place would not be noticed when it changes.
+    It is for the functions of one package, which is a folder. They may call each other and those of fusion_core. They
+    must not use functions or constants from anywhere else, since a change there would not be noticed.
     """
 
     def __init__(self, package: Path) -> None:
@@ -78,14 +78,14 @@ def code_folder(package: Path, users_folder: str = "") -> Path | None:
                 shutil.rmtree(earlier, ignore_errors=True)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):  # a folder may be there and still not be ours to write to
+        with tempfile.TemporaryFile(dir=folder):  # a folder may exist and still not be writable
             return folder
     except OSError:
         return None
 
 
 def sources_digest(package: Path) -> str:
-    """Of the contents of every .py file in the package and in fusion_core, however deep, and Numba's version."""
+    """A digest of the contents of every .py file in the package and in fusion_core, and of Numba's version."""
     digest = hashlib.sha256(numba.__version__.encode())
     for root in dict.fromkeys((_FUSION_CORE, package)):
         for source in sorted(root.rglob("*.py")):

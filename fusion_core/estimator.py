@@ -1,4 +1,4 @@
-"""What every estimator is, and the plain loop that any faster path is pinned to."""
+"""The protocol of an estimator, and the plain loop that every faster path must agree with."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from fusion_core.sensors import Sensor
 
 
 class Estimator(Protocol):
-    """A frozen value of parameters with a pure state. Causal: it knows only samples that were given to it."""
+    """Parameters that do not change, and a state that is passed in and returned.
+
+    An estimator is causal: its state depends only on the samples that were passed to `update`. `update` and `replay`
+    raise ValueError for readings that do not have their sensor's dimension.
+    """
 
     @property
     def sensors(self) -> Mapping[str, Sensor]:
@@ -23,7 +27,7 @@ class Estimator(Protocol):
         """The state before any sample."""
 
     def update(self, state: Any, sensor: str, sample: Sample) -> Any:
-        """The state after one more sample; `state` itself is left as it was."""
+        """The state after one more sample; `state` itself is not changed."""
 
     def predict(self, state: Any, time: float) -> tuple[FloatArray, FloatArray]:
         """Mean and SD of the position at `time` (s), each (d,) in mm; NaN before the first position."""
@@ -33,7 +37,7 @@ class Estimator(Protocol):
 
 
 def require_readings(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> None:
-    """ValueError that names the sensor whose readings do not have its dimension."""
+    """Raise ValueError, naming the sensor, where readings do not have its dimension."""
     for name, sensor in sensors.items():
         if name in samples and samples[name].value.shape[1] != sensor.dimension:
             raise ValueError(
@@ -43,7 +47,7 @@ def require_readings(sensors: Mapping[str, Sensor], samples: Mapping[str, Sample
 
 
 def require_reading(name: str, sensor: Sensor, sample: Sample) -> None:
-    """ValueError unless a reading has its sensor's dimension and is finite."""
+    """Raise ValueError unless a reading has its sensor's dimension and is finite."""
     if sample.value.shape != (sensor.dimension,):
         raise ValueError(
             f"{name}: a reading must have shape ({sensor.dimension},), as its dimension says, got {sample.value.shape}"
@@ -53,7 +57,7 @@ def require_reading(name: str, sensor: Sensor, sample: Sample) -> None:
 
 
 def arrivals(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> Iterator[tuple[str, Sample]]:
-    """Every sample of the sensors in order of arrival; equal arrivals in the sensors' order."""
+    """Every sample of the sensors in order of arrival; samples that arrive at once in the order of the sensors."""
     names = [name for name in sensors if name in samples]
     arrival = np.concatenate([samples[name].arrival for name in names]) if names else np.empty(0)
     which = np.repeat(np.arange(len(names)), [len(samples[name]) for name in names])
@@ -64,7 +68,10 @@ def arrivals(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> I
 
 
 def replay_loop(estimator: Estimator, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-    """Replay by one `update` a sample and one `predict` a time: the reference for every batch path."""
+    """Replay by one `update` per sample and one `predict` per time; every batch path must give the same.
+
+    `times` (n,) in s, in any order; the track's mean and SD are (n, d) in mm.
+    """
     dimension = next(iter(estimator.sensors.values())).dimension
     mean = np.full((len(times), dimension), np.nan)
     sd = np.full((len(times), dimension), np.nan)
@@ -81,5 +88,5 @@ def replay_loop(estimator: Estimator, samples: Mapping[str, Samples], times: Flo
 
 
 def unknown(dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Mean and SD before there is anything to say."""
+    """Mean and SD (d,) before the first position: NaN."""
     return np.full(dimension, np.nan), np.full(dimension, np.nan)

@@ -38,7 +38,7 @@ class Raw:
         return state.value, np.full(tracker.dimension, tracker.noise_sd)
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-        """By one look-up of the newest arrival."""
+        """The same for all times at once, by a search for the newest frame that has arrived."""
         name = position_sensor(self.sensors)
         tracker = self.sensors[name]
         if name not in samples:
@@ -64,7 +64,7 @@ class Smoothed:
 
 @dataclass(frozen=True)
 class Smoother:
-    """What filters of single frames share: one step a frame, and no uncertainty of their own (the sensor's noise).
+    """The base of filters that take one step per frame. Their SD is the sensor's noise: they know no better.
 
     A frame older than the newest comes too late to be smoothed and changes nothing.
     """
@@ -83,7 +83,7 @@ class Smoother:
         return None
 
     def update(self, state: Smoothed | None, sensor: str, sample: Sample) -> Smoothed | None:
-        """One step a frame; other sensors change nothing."""
+        """One step per frame; readings of other sensors change nothing."""
         if sensor != position_sensor(self.sensors):
             return state
         if state is None:
@@ -136,8 +136,8 @@ def _share(cutoff_hz: float, step_s: float) -> float:
 class Holt(Smoother):
     """Double exponential smoothing (Holt 1957), the Kinect's own smoother, with prediction ahead.
 
-    Level and trend are those of the measurement time, over true time steps; the estimate goes on along the trend up to
-    `ahead_s`, so that `ahead_s` = the tracker's latency takes the lag out and brings its noise in.
+    Level and trend are those of the measurement time, over true time steps. The estimate is extrapolated along the
+    trend by up to `ahead_s`: with the tracker's latency there, the lag goes and the trend's noise comes in.
     """
 
     level_weight: float = 0.5
@@ -158,7 +158,7 @@ class Holt(Smoother):
         return level, state.rate + self.trend_weight * ((level - state.position) / step_s - state.rate)
 
     def predict(self, state: Smoothed | None, time: float) -> tuple[FloatArray, FloatArray]:
-        """The level, gone on along the trend to `time`, `ahead_s` at the most."""
+        """The level, extrapolated along the trend to `time`, but by `ahead_s` at most."""
         held, sd = super().predict(state, time)
         if state is None:
             return held, sd

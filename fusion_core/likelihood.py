@@ -1,4 +1,4 @@
-"""Parameters by maximum likelihood: how well each position is foretold from everything measured before it."""
+"""Parameters by maximum likelihood: how well each position is predicted from everything measured before it."""
 
 from __future__ import annotations
 
@@ -8,32 +8,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from fusion_core.estimator import Estimator
-from fusion_core.kalman import event_steps
+from fusion_core.kalman.event_history import LOG_DETERMINANT, SQUARED
 from fusion_core.kalman.fusion import FusionKalman
 from fusion_core.samples import FloatArray, Samples
 from fusion_core.sensors import position_sensor
 
 _STEP = 0.02  # of a numerical derivative, in logarithms
-_TELLS = np.log(3.0) / 1.96  # an interval within a factor of three either way tells something
-_OF_PRIOR = 0.5  # and so does one of half the prior's width
-_ALWAYS = 1e-12  # keeps a flat curvature invertible
+_LARGEST_SD = np.log(3.0) / 1.96  # of a parameter that counts as identified: within a factor of three either way,
+_LARGEST_SHARE_OF_PRIOR = 0.5  # and its SD at most this share of the prior's
+_RIDGE = 1e-12  # keeps a flat curvature invertible
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A parameter's estimate and 95 % interval; `told` says whether the data say what it is at all."""
+    """A parameter's estimate and 95 % interval; `identified` says whether the data determine it at all."""
 
     value: float
     low: float
     high: float
-    told: bool
+    identified: bool
 
 
-def foretold(estimator: FusionKalman, samples: Mapping[str, Samples], block_s: float = 5.0) -> FloatArray:
+def position_log_likelihood(
+    estimator: FusionKalman, samples: Mapping[str, Samples], block_s: float = 5.0
+) -> FloatArray:
     """Log density of the positions, each given all readings measured before it, summed over blocks of time (k,).
 
-    Accelerations count by what they foretell, not by themselves: a model of the hand's motion is only roughly right,
-    and it is the position that is asked for. Raises ValueError for the fixed-gain path.
+    Accelerations count only through the positions they predict: the model of the hand's motion is only roughly right,
+    and the position is what the estimator is for. Readings are taken in order of measurement, whatever their arrival.
     """
     steps = estimator.event_time
     history = steps.filtered(samples)
@@ -42,17 +44,17 @@ def foretold(estimator: FusionKalman, samples: Mapping[str, Samples], block_s: f
     of_position = ~steps.model.biased[history.sensor]
     of_position[0] = False  # the first is where the filter begins
     axes = steps.model.observes.sum(axis=1)[history.sensor]
-    squared, log_determinant = (
-        history.adapted[:, event_steps.SQUARED],
-        history.adapted[:, event_steps.LOG_DETERMINANT],
-    )
+    squared, log_determinant = history.adapted[:, SQUARED], history.adapted[:, LOG_DETERMINANT]
     density = -0.5 * (squared + log_determinant + axes * np.log(2 * np.pi))
     block = ((history.time - history.time[0]) // block_s).astype(np.int64)
     return np.asarray(np.bincount(block[of_position], density[of_position]), dtype=np.float64)
 
 
-def foretold_by(estimator: Estimator, samples: Mapping[str, Samples], block_s: float = 5.0) -> FloatArray:
-    """The same for any estimator (k,): each position given what it makes of all readings measured before it."""
+def log_likelihood_by_replay(estimator: Estimator, samples: Mapping[str, Samples], block_s: float = 5.0) -> FloatArray:
+    """The same (k,) for any estimator: each position given the estimate from all readings measured before it.
+
+    The estimate's SD and the tracker's noise together are taken as the SD of the position.
+    """
     at_once = {
         name: Samples(stream.time, stream.time, stream.value, stream.rotation)
         for name, stream in ((name, _by_time(stream)) for name, stream in samples.items())
@@ -68,7 +70,7 @@ def foretold_by(estimator: Estimator, samples: Mapping[str, Samples], block_s: f
 
 
 def _by_time(stream: Samples) -> Samples:
-    """In order of measurement."""
+    """The readings in order of measurement."""
     order = np.argsort(stream.time, kind="stable")
     rotation = None if stream.rotation is None else stream.rotation[order]
     return Samples(stream.time[order], np.sort(stream.arrival), stream.value[order], rotation)
@@ -79,10 +81,11 @@ def maximise(
 ) -> list[Fitted]:
     """The positive parameters that make the data likeliest, with intervals.
 
-    `blocks` gives the log likelihood of each stretch of data (k,) for parameters (m,); `prior_sd` (m,) holds each
-    parameter near `start`, as the SD of its logarithm (infinite: not at all). The intervals are those of a
-    misspecified model: curvature and the scatter of the stretches' slopes together (White 1982, eq. 2.3), since
-    a motion prior is only roughly right. Raises ValueError for a start that is not above 0.
+    `blocks` gives the log likelihood (k,) of each stretch of data for parameters (m,). `prior_sd` (m,) is the SD of
+    each parameter's logarithm around that of `start` before any data; infinite means that nothing is known. The
+    intervals are those of a misspecified model (White 1982, eq. 2.3), since a motion prior is only roughly right: they
+    combine the curvature of the likelihood with the scatter of the stretches' slopes. Raises ValueError for a start
+    that is not above 0.
     """
     from scipy.optimize import minimize
 
@@ -94,17 +97,17 @@ def maximise(
     def cost(logarithm: FloatArray) -> float:
         return float(np.sum(0.5 * ((logarithm - origin) / spread) ** 2) - np.sum(blocks(np.exp(logarithm))))
 
-    found = minimize(cost, origin, method="Powell", options={"xtol": 1e-3, "ftol": 1e-8})
-    best = np.atleast_1d(np.asarray(found.x, dtype=np.float64))
+    optimum = minimize(cost, origin, method="Powell", options={"xtol": 1e-3, "ftol": 1e-8})
+    best = np.atleast_1d(np.asarray(optimum.x, dtype=np.float64))
     sd = _sandwich(lambda logarithm: blocks(np.exp(logarithm)), best, spread)
     return [
         Fitted(
-            float(np.exp(at)),
-            float(np.exp(at - 1.96 * one)),
-            float(np.exp(at + 1.96 * one)),
-            bool(one < min(_TELLS, _OF_PRIOR * held)),
+            float(np.exp(log_value)),
+            float(np.exp(log_value - 1.96 * log_sd)),
+            float(np.exp(log_value + 1.96 * log_sd)),
+            bool(log_sd < min(_LARGEST_SD, _LARGEST_SHARE_OF_PRIOR * log_prior_sd)),
         )
-        for at, one, held in zip(best, sd, spread, strict=True)
+        for log_value, log_sd, log_prior_sd in zip(best, sd, spread, strict=True)
     ]
 
 
@@ -116,11 +119,11 @@ def _sandwich(blocks: Callable[[FloatArray], FloatArray], best: FloatArray, prio
     behind = np.array([blocks(best - step) for step in steps])
     slopes = (ahead - behind) / (2 * _STEP)
     scatter = slopes @ slopes.T
-    curvature = np.diag(prior_sd**-2.0) + _ALWAYS * np.eye(count)
+    curvature = np.diag(prior_sd**-2.0) + _RIDGE * np.eye(count)
     for row in range(count):
         for column in range(row + 1):
-            both, one = steps[row] + steps[column], steps[row] - steps[column]
-            corners = blocks(best + both) - blocks(best + one) - blocks(best - one) + blocks(best - both)
+            both, opposite = steps[row] + steps[column], steps[row] - steps[column]
+            corners = blocks(best + both) - blocks(best + opposite) - blocks(best - opposite) + blocks(best - both)
             bend = float(np.sum(corners)) / (4 * _STEP**2)
             curvature[row, column] -= bend
             if row != column:

@@ -1,15 +1,15 @@
-"""The door for a loop that runs: what an estimator shows at an instant, from what has arrived by then, compiled.
+"""Estimators in a running loop, compiled: what is shown at an instant, from the readings that have arrived by then.
 
-Who runs a loop, a simulation or a live study, needs none of the estimators' compiled steps:
+A loop, whether a simulation or a live study, uses this module and none of the estimators' compiled steps:
 
 - `live(estimator, names, readings, rotation, instants)` makes an estimator ready, once the times of all readings are
   known, as they are in a simulation; `show` then writes what is displayed at an instant and may be called from compiled
   code. It calls the very steps that `replay` calls, so a replay of the log gives what was displayed to the last bits.
-- Where readings come one by one, as in a live study, `start`, `update` and `predict` of the estimator do the same, a
-  reading at a time (`fusion_core.estimator.Estimator`). So does an estimator that has no compiled form here.
+- Where readings come one by one, as in a live study, use the estimator's `start`, `update` and `predict`
+  (`fusion_core.estimator.Estimator`), which give the same. So does an estimator that has no compiled form here.
 
-What may change: `Live` and its parts are the door's own, and nobody else looks into them. What must not: `show` takes
-readings in by arrival and none that arrives after the instant, or a display would know the future.
+What may change: `Live` and its parts are private to this module. What must not: `show` takes readings in order of
+arrival, and none that arrives after the instant, or a display would know the future.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from fusion_core.compilation import compiled
 from fusion_core.estimator import Estimator
 from fusion_core.filters import Raw
 from fusion_core.kalman import position_steps
-from fusion_core.kalman.event_replay import arrive
-from fusion_core.kalman.event_steps import History, Model, expect
+from fusion_core.kalman.event_history import History, Model
+from fusion_core.kalman.event_replay import insert_reading
+from fusion_core.kalman.event_steps import predict_position
 from fusion_core.kalman.event_time import EventTime
 from fusion_core.kalman.fusion import FusionKalman
 from fusion_core.kalman.position import PositionKalman
@@ -38,7 +39,7 @@ _UPCOMING, _OLDEST, _COUNT = 0, 1, 2
 
 
 class Kalman(NamedTuple):
-    """The position-only filter and its moments."""
+    """The position-only filter: its parameters, and its moments: mean (3, d) and covariance (3, 3)."""
 
     noise_variance: float
     initial_sd: tuple[float, float]
@@ -49,7 +50,7 @@ class Kalman(NamedTuple):
 
 
 class EventPath(NamedTuple):
-    """The event-time filter, its room, and its readings in the order in which they arrive."""
+    """The event-time filter, its history, and its readings in order of arrival."""
 
     model: Model
     history: History
@@ -63,7 +64,7 @@ class EventPath(NamedTuple):
 
 
 class Live(NamedTuple):
-    """One estimator of whichever kind; the parts of the others are there for their types alone."""
+    """One estimator of any kind. Compiled code needs every field, so those of the other kinds hold unused defaults."""
 
     kind: int
     at: IntArray  # upcoming reading; of the event path the oldest row and the count of rows
@@ -73,7 +74,10 @@ class Live(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the sensors have read so far, a row a reading, in s since the session's origin; values are filled in."""
+    """What the sensors have read so far, one row per reading; times (n,) in s since the session's origin.
+
+    Times are known beforehand; the loop fills in the values (n, d) as they are measured.
+    """
 
     frame_time: FloatArray
     frame_arrival: FloatArray
@@ -85,7 +89,7 @@ class Readings(NamedTuple):
 
 @compiled
 def show(live: Live, readings: Readings, instants: FloatArray, index: int, shown: FloatArray) -> None:
-    """Writes what is displayed at an instant into its row of `shown`; NaN before there is anything to show."""
+    """Writes the position displayed at `instants[index]` into `shown[index]` (d,) in mm; NaN before the first frame."""
     if live.kind == _WINDOW:
         _show_window(live.window, readings, instants[index], index, shown[index])
     elif live.kind == _EVENT_TIME:
@@ -96,7 +100,7 @@ def show(live: Live, readings: Readings, instants: FloatArray, index: int, shown
 
 @compiled
 def _show_position(live: Live, readings: Readings, now: float, shown: FloatArray) -> None:
-    """The newest frame, held or filtered."""
+    """Writes the newest frame (d,), as it is or filtered."""
     kalman, arrival = live.kalman, readings.frame_arrival
     upcoming = live.at[_UPCOMING]
     while upcoming < len(arrival) and arrival[upcoming] <= now:
@@ -108,7 +112,7 @@ def _show_position(live: Live, readings: Readings, now: float, shown: FloatArray
                 )
             else:
                 dt = arrival[upcoming] - arrival[upcoming - 1]
-                mean, covariance = position_steps.moved(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)
+                mean, covariance = position_steps.predict(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)
                 position_steps.correct(mean, covariance, value, kalman.noise_variance)
             kalman.mean[:], kalman.covariance[:] = mean, covariance
         upcoming += 1
@@ -119,12 +123,12 @@ def _show_position(live: Live, readings: Readings, now: float, shown: FloatArray
         shown[:] = readings.frame_mm[upcoming - 1]
     else:
         dt = max(now - arrival[upcoming - 1], 0.0) + kalman.ahead_s
-        shown[:] = position_steps.ahead(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)[0]
+        shown[:] = position_steps.predict_position(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)[0]
 
 
 @compiled
 def _show_window(window: Schedule, readings: Readings, now: float, index: int, shown: FloatArray) -> None:
-    """The weighted sum over the window: weights depend on times alone."""
+    """Writes the weighted sum over the window; the weights depend on times alone."""
     first, last = window.spans[0, index], window.spans[1, index]
     begin, end = window.spans[2, index], window.spans[3, index]
     positions, others = last - first, end - begin
@@ -153,19 +157,19 @@ def _show_window(window: Schedule, readings: Readings, now: float, index: int, s
 
 @compiled
 def _show_event_time(live: Live, readings: Readings, now: float, shown: FloatArray) -> None:
-    """All that has arrived taken in at its time, and the newest moments moved on to now."""
+    """Inserts all readings that have arrived, and writes the position predicted from the newest moments."""
     event, upcoming, span = live.event, live.at[_UPCOMING], (live.at[_OLDEST], live.at[_COUNT])
     while upcoming < len(event.arrival) and event.arrival[upcoming] <= now:
         row = event.row[upcoming]
         value = readings.frame_mm[row] if event.is_frame[upcoming] else readings.force_mm_s2[row]
         time, sensor, coupling = event.time[upcoming], event.sensor[upcoming], event.coupling[upcoming]
-        span = arrive(event.model, event.history, span, time, sensor, value, coupling, event.history_s)
+        span = insert_reading(event.model, event.history, span, time, sensor, value, coupling, event.history_s)
         upcoming += 1
     live.at[_UPCOMING], live.at[_OLDEST], live.at[_COUNT] = upcoming, span[0], span[1]
     if span[1] == 0:
         shown[:] = np.nan
         return
-    shown[:] = expect(event.model, event.history, span[1] - 1, now)[0]
+    shown[:] = predict_position(event.model, event.history, span[1] - 1, now)[0]
 
 
 def live(
@@ -197,7 +201,7 @@ def live(
 
 
 def _samples(readings: Readings, names: tuple[str, str], rotation: FloatArray) -> dict[str, Samples]:
-    """The readings to come, whose values are the number of their row."""
+    """The readings to come; each value is the number of its row, by which the real value is looked up later."""
 
     def numbered(count: int, like: FloatArray) -> FloatArray:
         return np.repeat(np.arange(count, dtype=np.float64)[:, None], like.shape[1], axis=1)
@@ -219,11 +223,12 @@ def _kalman(estimator: PositionKalman, noise_sd_mm: float, dimension: int) -> Ka
 
 
 def _event_path(path: EventTime, names: tuple[str, str], samples: dict[str, Samples]) -> EventPath:
-    rows, arrival, room = path.in_order({name: one for name, one in samples.items() if name in path.sensors})
+    used = {name: stream for name, stream in samples.items() if name in path.sensors}
+    rows, arrival, history = path.in_order(used)
     order = list(path.sensors)
     return EventPath(
         path.model,
-        room,
+        history,
         float(path.history_s),
         rows.sensor == order.index(names[0]),
         rows.sensor,

@@ -1,4 +1,4 @@
-"""The two types everything speaks: sensor readings in, position estimates out."""
+"""The types that every estimator takes and gives: sensor readings in, position estimates out."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Sensor:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """What is observed, as terms."""
+        """The operator as a sum of terms."""
         if isinstance(self.operator, str):
             return (Term(1.0, OPERATORS[self.operator]),)
         return self.operator
@@ -79,9 +79,9 @@ class Sensor:
         return OPERATORS[self.operator] if isinstance(self.operator, str) else None
 
     def sees(self, dimension: int) -> tuple[int, ...]:
-        """The axes of the position that it observes, of `dimension`; ValueError if they do not fit.
+        """The axes that it observes, of a position of `dimension` axes.
 
-        Axes it does not name are all: a sensor of fewer must say which.
+        Raises ValueError where they do not fit: a sensor of fewer axes than the position must say which it sees.
         """
         axes = tuple(range(self.dimension)) if self.axes is None else self.axes
         if max(axes) >= dimension or (self.axes is None and self.dimension != dimension):
@@ -92,7 +92,7 @@ class Sensor:
 
 
 def position_sensor(sensors: Mapping[str, Sensor]) -> str:
-    """The name of the first sensor that observes whole positions; ValueError if there is none."""
+    """The name of the first sensor that observes whole positions. Raises ValueError if there is none."""
     for name, sensor in sensors.items():
         if sensor.order == 0 and sensor.axes is None:
             return name
@@ -100,7 +100,7 @@ def position_sensor(sensors: Mapping[str, Sensor]) -> str:
 
 
 def require_fit(sensors: Mapping[str, Sensor]) -> int:
-    """The position's dimension; ValueError that names the sensor where one does not fit it."""
+    """The position's dimension. Raises ValueError, naming the sensor, where one does not fit it."""
     dimension = sensors[position_sensor(sensors)].dimension
     for name, sensor in sensors.items():
         try:
@@ -111,7 +111,7 @@ def require_fit(sensors: Mapping[str, Sensor]) -> int:
 
 
 def require_covered(sensors: Mapping[str, Sensor], name: str, span_s: float) -> None:
-    """ValueError that names the sensor that is later than the span that an estimator keeps, its parameter `name`."""
+    """Raise ValueError where a sensor is later than the span an estimator keeps, which is its parameter `name`."""
     for late, sensor in sensors.items():
         if sensor.latency_s > span_s:
             raise ValueError(

@@ -1,4 +1,4 @@
-"""How good a track is against a reference: error, lag, jitter, and whether its stated SD is honest."""
+"""How good a track is compared with a reference: error, lag, jitter, and whether its stated SD is right."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fusion_core.samples import FloatArray, Samples
 
 BoolArray = npt.NDArray[np.bool_]
 
-GAP_S = 0.05  # a reference is not interpolated over more than this
+GAP_S = 0.05  # a reference is not interpolated over longer gaps
 LAG_RANGE_S = 0.5
 _LAG_STEP_S = 0.005
 _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
-_FLAT = 1e-6  # of a cost: while the reference is still, any shift fits
+_FLAT = 1e-6  # costs that differ by less than this share say nothing: while the reference is still, any shift fits
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def rmse(estimate: FloatArray, reference: FloatArray) -> float:
 
 
 def stated_sd(sd: FloatArray) -> float:
-    """Root mean over time of the stated variances summed over axes, in mm: what `rmse` would be if they are right."""
+    """Root mean over time of the stated variances summed over axes, in mm: the `rmse` to expect if they are right."""
     return float(np.sqrt(np.mean(np.sum(sd**2, axis=1))))
 
 
@@ -66,13 +66,14 @@ def coverage_95(estimate: FloatArray, sd: FloatArray, reference: FloatArray) -> 
 
 
 def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.random.Generator) -> Interval:
-    """The shift in s within ±0.5 s that minimises Σ‖estimate(t) − reference(t − lag)‖², positive = late; times rise.
+    """The shift in s within ±0.5 s that minimises Σ‖estimate(t) − reference(t − lag)‖²; positive = late.
 
-    Sub-sample by a parabola through the smallest squared distance and its neighbours; the 95 % interval is the
-    2.5 and 97.5 percentile of 1000 resamples of moving blocks of 0.5 s. NaN with less than 1 s of usable track, or
-    where the smallest distance sits at the edge of the range. A resample at the edge counts as the edge, so that an
-    interval that reaches ±0.5 s says the data cannot tell; one in which the hand never moves says nothing of the lag
-    and does not count.
+    `time` (n,) rises, `estimate` is (n, d) in mm. The lag is refined below the step of 5 ms by a parabola through the
+    smallest squared distance and its neighbours. The 95 % interval is the 2.5 and 97.5 percentile over 1000 resamples
+    of moving blocks of 0.5 s. NaN with less than 1 s of usable track, or where the smallest distance is at the edge of
+    the range. A resample whose smallest distance is at the edge counts with the edge, so an interval that reaches
+    ±0.5 s means that the data do not determine the lag. A resample in which the hand never moves says nothing about the
+    lag and is left out.
     """
     order = np.argsort(reference.time, kind="stable")
     known, value = reference.time[order], reference.value[order]
@@ -88,14 +89,14 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     if scale - blocks.total.min() <= _FLAT * scale or not 0 < whole < len(shifts) - 1:
         return NO_INTERVAL
     picks = random.integers(len(blocks.still), size=(_RESAMPLES, max(1, len(time) // block)))
-    found = lag_steps.best_of_resamples(blocks, picks)
-    found = found[np.isfinite(found)]
-    low, high = np.percentile(found, [2.5, 97.5]) if len(found) >= _RESAMPLES // 2 else (np.nan, np.nan)
+    resampled = lag_steps.best_of_resamples(blocks, picks)
+    resampled = resampled[np.isfinite(resampled)]
+    low, high = np.percentile(resampled, [2.5, 97.5]) if len(resampled) >= _RESAMPLES // 2 else (np.nan, np.nan)
     return Interval(*(float(shifts[0] + steps * _LAG_STEP_S) for steps in (whole, low, high)))
 
 
 def _surrounded(known: FloatArray, time: FloatArray) -> BoolArray:
-    """The instants at which the reference, read at the rising `known`, reaches without a gap to every shift."""
+    """Whether the reference, sampled at rising times `known`, covers every shift of each instant without a gap."""
     if len(known) < 2:
         return np.zeros(len(time), dtype=np.bool_)
     gaps = np.concatenate([[0], np.cumsum(np.diff(known) > GAP_S)])
@@ -107,7 +108,7 @@ def _surrounded(known: FloatArray, time: FloatArray) -> BoolArray:
 
 
 def _segments(known: FloatArray, value: FloatArray) -> lag_steps.Segments:
-    """The reference as straight pieces; one that takes no time leads nowhere."""
+    """The reference as straight pieces between its samples; the slope of a piece without duration is set to 0."""
     lasting, rise = np.diff(known), np.diff(value.T)
     slope = np.divide(rise, lasting, out=np.zeros_like(rise), where=lasting > 0)
     return lag_steps.Segments(
@@ -118,7 +119,7 @@ def _segments(known: FloatArray, value: FloatArray) -> lag_steps.Segments:
 
 
 def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Unbiased cross-correlation of two (n, d) signals, each axis less its mean, summed over axes.
+    """Unbiased cross-correlation of two (n, d) signals, summed over axes, after subtracting each axis's mean.
 
     Returns shifts in samples, −(n−1) … n−1, and at each the mean of first[t]·second[t + shift] over the overlap:
     the peak sits at a positive shift where `first` is ahead of `second` (paper, Fig. 9).
@@ -127,8 +128,8 @@ def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArra
 
     n = len(first)
     length = fft.next_fast_len(2 * n - 1, real=True)
-    a, b = (fft.rfft((one - one.mean(axis=0)).T, length) for one in (first, second))
-    circular = fft.irfft(np.sum(a.conj() * b, axis=0), length)  # of all axes; shifts below 0 at its end
+    a, b = (fft.rfft((signal - signal.mean(axis=0)).T, length) for signal in (first, second))
+    circular = fft.irfft(np.sum(a.conj() * b, axis=0), length)  # summed over axes; negative shifts are at its end
     shifts = np.arange(-(n - 1), n)
     return shifts, np.asarray(circular[shifts] / (n - np.abs(shifts)), dtype=np.float64)
 
@@ -136,13 +137,13 @@ def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArra
 def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: Samples) -> float:
     """How far in s the track is ahead of the tracker *as it arrived*, by the paper's Fig. 9, within ±0.5 s.
 
-    Both are brought to one regular grid at the track's median step; the tracker is held between arrivals, as it was
-    seen. NaN where the peak sits at the edge of the range or there is no motion.
+    Both are resampled to one regular grid at the track's median step; the tracker holds its value between arrivals, as
+    it was seen. NaN where the peak is at the edge of the range or there is no motion.
     """
-    found = lead_curve(time, estimate, tracker)
-    if found is None:
+    curve = lead_curve(time, estimate, tracker)
+    if curve is None:
         return np.nan
-    lead, correlation = found
+    lead, correlation = curve
     inside = np.abs(lead) <= LAG_RANGE_S
     peak = int(np.argmax(correlation[inside]))
     if peak in (0, int(inside.sum()) - 1) or not correlation[inside][peak] > 0:

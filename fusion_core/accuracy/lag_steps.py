@@ -1,28 +1,28 @@
-"""What the search for a lag computes most often, compiled: costs of blocks at each shift, and the best of resamples.
+"""The search for a lag, compiled: the costs of blocks of instants at each shift, and the best shift of each resample.
 
 Theory of operation
 ===================
 
 The lag of an estimate is the shift s that minimises Σ‖estimate(t) − reference(t − s)‖² over the instants t; its
 interval comes from resampling blocks of instants that follow each other (a moving-block bootstrap), hundreds of
-times. Computed as it stands that is instants × shifts × resamples distances. Two facts make it cheap:
+times. Done directly, that takes instants × shifts × resamples distances. Two facts make it cheap:
 
 - The reference is a straight line between its readings, so an instant's squared distance is, within each piece, a
   quadratic of the shift: three numbers a piece instead of a distance a shift (`_squared_distances`).
 - A resample's cost is the sum of its blocks' costs. So the costs of every block at every shift are computed once
   (`block_costs`), and a resample only adds rows.
 
-And most shifts cannot be the best. Shifts stand in groups of eight, a line of memory:
+Besides, most shifts cannot be the best. Shifts are in groups of eight, which fill one cache line:
 
     shifts          | 0 … 7 | 8 … 15 | 16 … 23 | …
     lowest a block  |   4   |    1   |     6   | …        a bound for each block and group
 
-The sum of a resample's blocks' lowest costs within a group is below each of the group's costs. A group whose bound is
-above a cost already found is left out (`best_of_resamples`), which is most of them.
+For each group, the sum of the blocks' lowest costs is a lower bound on a resample's cost. A group whose bound is above
+a cost that is already known is skipped (`best_of_resamples`); most groups are.
 
-What must stay true. What is found is what all costs would give, to the last bit of round-off: the tests compare with
-the sum over all shifts. A stretch of shifts that fit equally well (a hand that stands still) counts by its first; a
-resample is still only where each of its blocks is (`_STILL`).
+What must stay true. The result is the one that all costs would give, to the last bit: the tests compare it with the sum
+over all shifts. Where several neighbouring shifts fit equally well (the hand stands still), the first of them counts. A
+resample counts as still only if each of its blocks is (`_STILL`).
 
 What may change. The size of a group, and how blocks are picked. The cost must stay a sum over instants, or nothing of
 this holds.
@@ -38,8 +38,8 @@ import numpy.typing as npt
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
-_GROUP = 8  # shifts: a line of memory
-_ROUND_OFF = 1e-9  # of a cost, what the order of a sum may change
+_GROUP = 8  # shifts: one cache line of 64 bytes
+_ROUND_OFF = 1e-9  # by how much of a cost the order of a sum may change it
 _STILL = 1e-6  # a block whose costs differ by less than this share is the same at every shift
 
 
@@ -52,7 +52,7 @@ class Segments(NamedTuple):
 
 
 class Blocks(NamedTuple):
-    """Costs of blocks of instants that follow each other, from each instant on that has so many."""
+    """Costs of all blocks of consecutive instants, one block from each instant that has enough instants after it."""
 
     cost: FloatArray  # (groups, blocks, 8) mm²; the last group is filled up with inf
     bound: FloatArray  # (blocks, groups) mm²: the lowest of each group
@@ -62,9 +62,9 @@ class Blocks(NamedTuple):
 
 @compiled
 def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shifts: FloatArray, block: int) -> Blocks:
-    """Σ‖estimate(t) − reference(t − shift)‖² over every `block` instants, for rising `shifts`.
+    """Σ‖estimate(t) − reference(t − shift)‖² over every `block` consecutive instants, for rising `shifts` in s.
 
-    Of rising `time` (n,) and `estimate` (n, d); the reference reaches to every shift of each instant.
+    `time` (n,) rises, `estimate` is (n, d); the reference must cover every shift of each instant.
     """
     count, groups = len(shifts), (len(shifts) + _GROUP - 1) // _GROUP
     blocks = len(time) - block + 1
@@ -98,9 +98,12 @@ def _squared_distances(
     estimate: FloatArray,
     shifts: FloatArray,
     quadratic: FloatArray,
-    found: FloatArray,
+    distances: FloatArray,
 ) -> None:
-    """One instant's squared distance at each shift, from segment `begin` on: in each a quadratic of time."""
+    """Writes one instant's squared distance at each shift into `distances`, starting at segment `begin`.
+
+    Within a segment the squared distance is a quadratic of time.
+    """
     last, end = len(segments.time) - 2, begin
     while end < last and segments.time[end + 1] <= time - shifts[0]:
         end += 1
@@ -119,7 +122,7 @@ def _squared_distances(
         until = segments.time[segment + 1] if segment < end else np.inf
         while wanted < until:
             since = wanted - segments.time[segment]
-            found[shift] = quadratic[0, segment] + since * (quadratic[1, segment] + since * quadratic[2, segment])
+            distances[shift] = quadratic[0, segment] + since * (quadratic[1, segment] + since * quadratic[2, segment])
             shift -= 1
             if shift < 0:
                 return
@@ -128,7 +131,7 @@ def _squared_distances(
 
 @compiled
 def _into_groups(running: FloatArray, cost: FloatArray, bound: FloatArray) -> bool:
-    """One block's costs into its groups and their bounds; whether they are all the same but for round-off."""
+    """Writes one block's costs by group and their bounds; returns whether all costs are the same up to round-off."""
     lowest, highest = np.inf, -np.inf
     for group in range(len(bound)):
         least = np.inf
@@ -142,13 +145,13 @@ def _into_groups(running: FloatArray, cost: FloatArray, bound: FloatArray) -> bo
 
 @compiled
 def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArray:
-    """The best shift, in steps from the first, of the blocks that each row of `picks` (resamples, k) names.
+    """The best shift (resamples,), in steps from the first, of each resample: a row of block numbers `picks` (…, k).
 
-    NaN where every one of them is still: any shift fits then.
+    NaN where all its blocks are still, since any shift fits then.
     """
     groups, count = len(blocks.cost), len(blocks.total)
     scale = blocks.total.max()
-    found, bound, cost = np.full(len(picks), np.nan), np.empty(groups), np.empty(groups * _GROUP)
+    best_shift, bound, cost = np.full(len(picks), np.nan), np.empty(groups), np.empty(groups * _GROUP)
     for row in range(len(picks)):
         own = picks[row]
         if np.all(blocks.still[own]):
@@ -166,13 +169,13 @@ def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArra
         for group in ((at - 1) // _GROUP, (at + 1) // _GROUP):
             if 0 <= group < groups and bound[group] < np.inf:
                 _costs_of(blocks, group, own, cost)
-        found[row] = best(cost[:count], scale)
-    return found
+        best_shift[row] = best(cost[:count], scale)
+    return best_shift
 
 
 @compiled
 def _summed(rows: FloatArray, picks: npt.NDArray[np.int64], total: FloatArray) -> None:
-    """Σ of the rows that `picks` names."""
+    """Writes the sum of the rows numbered `picks` into `total`."""
     total[:] = 0.0
     fours = len(picks) - len(picks) % 4
     for at in range(0, fours, 4):  # four at once: the sum is loaded and stored a quarter as often
@@ -187,7 +190,7 @@ def _summed(rows: FloatArray, picks: npt.NDArray[np.int64], total: FloatArray) -
 
 @compiled
 def _costs_of(blocks: Blocks, group: int, picks: npt.NDArray[np.int64], cost: FloatArray) -> float:
-    """A resample's costs at one group of shifts, and the lowest of them."""
+    """Writes a resample's costs at one group of shifts; returns the lowest of them."""
     own = cost[group * _GROUP : (group + 1) * _GROUP]
     _summed(blocks.cost[group], picks, own)
     return float(own.min())
@@ -195,7 +198,7 @@ def _costs_of(blocks: Blocks, group: int, picks: npt.NDArray[np.int64], cost: Fl
 
 @compiled
 def _first_of_lowest(cost: FloatArray, count: int, scale: float) -> int:
-    """Where a stretch of shifts fits equally well but for round-off: the first of them."""
+    """The index of the lowest of the first `count` costs; the first of those that are equal up to round-off."""
     enough = cost[:count].min() + _ROUND_OFF * scale
     at = 0
     while cost[at] > enough:

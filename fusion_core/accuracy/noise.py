@@ -1,4 +1,4 @@
-"""A sensor's noise from a stretch in which the hand is still, as the paper set its two noise SDs."""
+"""A sensor's noise, measured while the hand is still; the paper found its two noise SDs in the same way."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ _EDGE_S = 0.1  # a hand that has just stopped, or is about to start, is slow but
 
 
 def still_by_acceleration(acceleration: Samples, shortest_s: float = 1.0) -> tuple[float, float] | None:
-    """The longest stretch (begin, end) in s in which the accelerations vary little; None if there is none.
+    """The longest stretch (begin, end) in s in which the accelerations hardly vary; None if there is none.
 
-    Little: an SD over 0.5 s below twice the twentieth part's, so that the phone's own noise sets the scale.
+    That is where the SD over 0.5 s is below twice the 5th percentile of all such SDs, so the phone's own noise sets
+    the scale.
     """
     if len(acceleration) < 3 or np.ptp(acceleration.time) < 2 * shortest_s:
         return None
@@ -30,9 +31,9 @@ def still_by_acceleration(acceleration: Samples, shortest_s: float = 1.0) -> tup
     return longest(stretches(middle, spread < 2 * np.percentile(spread, 5), shortest_s))
 
 
-def longest(found: Iterable[tuple[float, float]]) -> tuple[float, float] | None:
-    """The longest of some stretches; None if there is none."""
-    return max(found, key=lambda stretch: stretch[1] - stretch[0], default=None)
+def longest(stretches_s: Iterable[tuple[float, float]]) -> tuple[float, float] | None:
+    """The longest of some stretches (begin, end) in s; None if there are none."""
+    return max(stretches_s, key=lambda stretch: stretch[1] - stretch[0], default=None)
 
 
 def _moving_sd(value: FloatArray, span: int) -> FloatArray:
@@ -48,10 +49,11 @@ def _moving_sd(value: FloatArray, span: int) -> FloatArray:
 
 
 def residuals(samples: Samples, begin: float, end: float) -> FloatArray:
-    """What is left of the readings in a stretch once a slow drift (a parabola an axis) is taken off, (n, d).
+    """The readings (n, d) in the stretch from `begin` to `end` s, less a slow drift: a parabola per axis.
 
-    The first and last 0.1 s of the stretch are left out: there the hand is already, or still, accelerating.
-    Scaled by √(n / (n − 3)), so that their root mean square estimates the SD. Empty with fewer than 10 readings.
+    The first and last 0.1 s of the stretch are left out, because the hand may already or still be accelerating there.
+    The residuals are scaled by √(n / (n − 3)), so that their root mean square estimates the SD. Empty with fewer than
+    10 readings.
     """
     inside = (samples.time >= begin + _EDGE_S) & (samples.time <= end - _EDGE_S)
     value = samples.value[inside]

@@ -5,16 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fusion_core.compilation import compiled
-from fusion_core.kalman.event_steps import (
-    JERK_PSD,
-    History,
-    Model,
-    Readings,
-    begin,
-    insert,
-    oldest_needed,
-    write_expected,
-)
+from fusion_core.kalman.event_history import JERK_PSD, History, Model, Readings
+from fusion_core.kalman.event_steps import begin, insert, oldest_needed, write_prediction
 from fusion_core.kalman.motion import position_step
 from fusion_core.kalman.smoothing_steps import smoothed_at
 from fusion_core.samples import FloatArray
@@ -22,6 +14,7 @@ from fusion_core.samples import FloatArray
 
 @compiled
 def _shift_down(history: History, first: int, count: int) -> None:
+    """Moves the rows first:count to the top of the history, which makes room at its end."""
     for row in range(first, count):
         history.time[row - first] = history.time[row]
         history.sensor[row - first] = history.sensor[row]
@@ -33,7 +26,7 @@ def _shift_down(history: History, first: int, count: int) -> None:
 
 
 @compiled
-def arrive(
+def insert_reading(
     model: Model,
     history: History,
     span: tuple[int, int],
@@ -43,9 +36,9 @@ def arrive(
     coupling: FloatArray,
     history_s: float,
 ) -> tuple[int, int]:
-    """A reading put into `history`, whose rows in use are `span`; returns those that are in use with it.
+    """Inserts a reading into `history`, whose rows in use are `span` (oldest, count); returns the new span.
 
-    The first must be a position. One that comes too late changes nothing.
+    The first reading must be a position. One that comes too late changes nothing.
     """
     oldest, count = span
     if count == 0:
@@ -72,11 +65,11 @@ def replay(
     lag_s: float,
     constants: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean and SD (n, dimension) at `times`, which rise, of readings in order of arrival, the first a position.
+    """Mean and SD (n, dimension) at rising `times`, from readings in order of arrival, the first of them a position.
 
-    With `lag_s` above 0 each is of the position that long before its time, in view of all that has arrived.
-    `constants` takes mean (n, constants) and covariance (n, constants, constants) of these, unless they are empty.
-    `history` is room to work in: more rows than readings ever stand in `history_s`.
+    With `lag_s` above 0 each estimate is of the position `lag_s` before its time, given all that has arrived.
+    Unless they are empty, `constants` are filled with the mean (n, constants) and covariance (n, constants, constants)
+    of the constants. `history` is working memory: it needs more rows than there are readings in any `history_s`.
     """
     dimension = len(model.axes)
     mean, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
@@ -86,7 +79,7 @@ def replay(
         while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
             time, sensor = readings.time[upcoming], readings.sensor[upcoming]
             value, coupling = readings.value[upcoming], readings.coupling[upcoming]
-            oldest, count = arrive(model, history, (oldest, count), time, sensor, value, coupling, history_s)
+            oldest, count = insert_reading(model, history, (oldest, count), time, sensor, value, coupling, history_s)
             upcoming += 1
         if count > 0:
             if len(constants[0]):
@@ -99,7 +92,7 @@ def replay(
                     mean[index], sd[index] = smoothed_at(model, history, oldest, count, wanted)
                 continue
             noise = position_step(model.motion, max(wanted - recent[row], 0.0), adapted[row, JERK_PSD], of_position)
-            write_expected(
+            write_prediction(
                 model.states, model.axes, history.mean, history.covariance, row, of_position, noise, mean, sd, index
             )
     return mean, sd

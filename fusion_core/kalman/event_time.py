@@ -1,4 +1,4 @@
-"""The event-time path of Kalman fusion: every reading at the time it was measured, whenever it arrives."""
+"""The event-time path of Kalman fusion: every reading is used at the time it was measured, whenever it arrives."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ import numpy as np
 
 from fusion_core.estimator import unknown
 from fusion_core.kalman import event_replay, event_steps
-from fusion_core.kalman.event_steps import History, Model, Readings
+from fusion_core.kalman.event_history import History, Model, Readings, empty_history
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 
-_COMPILED: set[tuple[int, ...]] = set()  # what this process has compiled, or read from where it is kept
+_COMPILED: set[tuple[int, ...]] = set()  # the signatures that this process has compiled or loaded from the cache
 
 
 @dataclass(frozen=True)
 class Recent:
-    """The recent readings with the moments after each; `waiting` holds those from before the first position."""
+    """The recent readings with the moments after each.
+
+    `waiting` are readings that arrived before the first position, `too_late` counts those left out as too late.
+    """
 
     history: History | None = None
     waiting: tuple[tuple[str, Sample], ...] = ()
@@ -29,7 +32,7 @@ class Recent:
 
 @dataclass(frozen=True)
 class EventTime:
-    """The estimator's steps over a history of readings; `in_body_frame` says where the bias is constant."""
+    """The filter over a history of readings. `in_body_frame`: the bias is constant in the phone's frame."""
 
     sensors: Mapping[str, Sensor]
     model: Model
@@ -38,7 +41,7 @@ class EventTime:
 
     @property
     def dimension(self) -> int:
-        """Of the position."""
+        """The number of the position's axes."""
         return len(self.model.axes)
 
     @cached_property
@@ -46,26 +49,26 @@ class EventTime:
         return {name: index for index, name in enumerate(self.sensors)}
 
     def _coupling(self, name: str, rotation: FloatArray | None) -> FloatArray:
-        """How a bias enters a reading, (d, constants) or (n, d, constants): turned; not at all without a bias."""
+        """How the bias enters one reading (d, constants) or n readings (n, d, constants): rotated, or not at all."""
         if not self.model.biased[self._index[name]]:
-            return self._nothing
+            return self._no_coupling
         if rotation is None or not self.in_body_frame:
-            return self._as_it_is
+            return self._unrotated
         return np.ascontiguousarray(rotation)
 
     @cached_property
-    def _nothing(self) -> FloatArray:
+    def _no_coupling(self) -> FloatArray:
         return np.zeros((self.dimension, len(self.model.constants)))
 
     @cached_property
-    def _as_it_is(self) -> FloatArray:
+    def _unrotated(self) -> FloatArray:
         return np.eye(self.dimension, len(self.model.constants))
 
-    def _row(self, capacity: int) -> History:
-        return event_steps.empty_history(capacity, self.dimension, len(self.model.constants), len(self.model.states))
+    def _empty_history(self, capacity: int) -> History:
+        return empty_history(capacity, self.dimension, len(self.model.constants), len(self.model.states))
 
-    def _whole(self, name: str, value: FloatArray) -> FloatArray:
-        """A reading's values at their axes of the position, (…, d)."""
+    def _on_all_axes(self, name: str, value: FloatArray) -> FloatArray:
+        """A sensor's values (…, d) with those of the axes it sees in their places, and zeros elsewhere."""
         sensor = self.sensors[name]
         if sensor.axes is None:
             return np.ascontiguousarray(value, dtype=np.float64)
@@ -74,46 +77,51 @@ class EventTime:
         return whole
 
     def start(self) -> Recent:
-        """Nothing seen. What a reading needs is compiled by now."""
+        """The state before any reading. The steps are compiled now, so that no reading waits for the compiler."""
         if self._signature not in _COMPILED:
             _COMPILED.add(self._signature)
-            self._try_out()
+            self._compile()
         return Recent()
 
     @property
     def _signature(self) -> tuple[int, ...]:
-        """What compiled code depends on."""
+        """The sizes that compiled code depends on."""
         return len(self.model.states), len(self.model.axes), len(self.model.constants)
 
-    def _try_out(self) -> None:
-        history = self._row(1)
+    def _compile(self) -> None:
+        """Calls each step once."""
+        history = self._empty_history(1)
         history.time[0] = history.sensor[0] = 0
         value, coupling = np.zeros(self.dimension), np.zeros((self.dimension, len(self.model.constants)))
         history.value[0], history.coupling[0] = value, coupling
         event_steps.begin(self.model, history)
-        event_steps.inserted(self.model, history, self._row(2), 0.01, 0, value, coupling, self.history_s)
-        event_steps.expect(self.model, history, 0, 0.01)
+        event_steps.insert_into_copy(
+            self.model, history, self._empty_history(2), 0.01, 0, value, coupling, self.history_s
+        )
+        event_steps.predict_position(self.model, history, 0, 0.01)
 
     def update(self, state: Recent, sensor: str, sample: Sample) -> Recent:
-        """The reading put in at its measurement time, and what came after it gone through again."""
+        """The state with the reading inserted in order of measurement; later readings are processed again."""
         if state.history is None:
             return self._first(state, sensor, sample)
         return self._next(state, state.history, sensor, sample)
 
     def _next(self, state: Recent, history: History, sensor: str, sample: Sample) -> Recent:
-        room, index = self._row(len(history.time) + 1), self._index[sensor]
-        value, coupling = self._whole(sensor, sample.value), self._coupling(sensor, sample.rotation)
-        oldest = event_steps.inserted(self.model, history, room, sample.time, index, value, coupling, self.history_s)
+        room, index = self._empty_history(len(history.time) + 1), self._index[sensor]
+        value, coupling = self._on_all_axes(sensor, sample.value), self._coupling(sensor, sample.rotation)
+        oldest = event_steps.insert_into_copy(
+            self.model, history, room, sample.time, index, value, coupling, self.history_s
+        )
         if oldest < 0:
             return replace(state, too_late=state.too_late + 1)
         return Recent(History._make([column[oldest:] for column in room]), (), state.too_late)
 
     def _first(self, state: Recent, sensor: str, sample: Sample) -> Recent:
-        """Start at the first position; other readings wait for it."""
+        """Starts at the first position; readings that arrive before it wait."""
         if sensor != position_sensor(self.sensors):
             waiting = [w for w in state.waiting if w[1].time > sample.time - self.history_s]
             return Recent(None, (*waiting, (sensor, sample)), state.too_late)
-        first = self._row(1)
+        first = self._empty_history(1)
         first.time[0], first.sensor[0] = sample.time, self._index[sensor]
         first.value[0], first.coupling[0] = sample.value, self._coupling(sensor, sample.rotation)
         event_steps.begin(self.model, first)
@@ -124,16 +132,16 @@ class EventTime:
         return started
 
     def predict(self, state: Recent, time: float) -> tuple[FloatArray, FloatArray]:
-        """The newest moments, moved on to `time`."""
+        """Mean and SD (d,) of the position at `time`, predicted from the newest moments."""
         if state.history is None:
             return unknown(self.dimension)
-        found: tuple[FloatArray, FloatArray] = event_steps.expect(
+        moments: tuple[FloatArray, FloatArray] = event_steps.predict_position(
             self.model, state.history, len(state.history.time) - 1, time
         )
-        return found
+        return moments
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray, lag_s: float = 0.0) -> Track:
-        """The same steps in one compiled loop; with `lag_s`, of the position that long before each time."""
+        """The same steps in one compiled loop; with `lag_s` above 0, of the position `lag_s` before each time."""
         biases = len(self.model.constants)
         nothing = np.empty((0, biases)), np.empty((0, biases, biases))
         return Track(times, *self._run(*self._readings(samples), times, lag_s, nothing))
@@ -141,9 +149,10 @@ class EventTime:
     def constants(
         self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray], times: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Mean (n, constants) and covariance (n, constants, constants) of the constants as known at `times`.
+        """Mean (n, constants) and covariance (n, constants, constants) of the constants, given what has arrived.
 
-        `couplings` (m, d, constants), by sensor, say how far each enters its m readings. NaN before the first position.
+        `couplings` has, for each sensor, (m, d, constants): what each constant contributes to its m readings. NaN
+        before the first position.
         """
         count = len(self.model.constants)
         mean, covariance = np.full((len(times), count), np.nan), np.full((len(times), count, count), np.nan)
@@ -158,7 +167,7 @@ class EventTime:
         lag_s: float,
         constants: tuple[FloatArray, FloatArray],
     ) -> tuple[FloatArray, FloatArray]:
-        """Mean and SD at `times`, in any order; `constants` are filled if there is room for them, for rising times."""
+        """Mean and SD (n, d) at `times`, in any order; fills `constants` unless they are empty (rising times only)."""
         order = np.argsort(times, kind="stable")
         mean, sd = np.full((2, len(times), self.dimension), np.nan)
         room, rising = self._room(readings), np.asarray(times, dtype=np.float64)[order]
@@ -168,31 +177,37 @@ class EventTime:
         return mean, sd
 
     def _room(self, readings: Readings) -> History:
-        """More rows than of the readings ever stand in the history."""
-        return self._row(2 * _most_within(np.sort(readings.time), self.history_s) + 8)
+        """A history with more rows than the readings need at any time."""
+        return self._empty_history(2 * _most_within(np.sort(readings.time), self.history_s) + 8)
 
     def in_order(self, samples: Mapping[str, Samples]) -> tuple[Readings, FloatArray, History]:
-        """The readings as they are taken in one by one, when each is, and room for them to be taken into."""
+        """All readings in order of arrival, when each is used (n,) in s, and an empty history for them."""
         readings, arrival = self._readings(samples)
         return readings, arrival, self._room(readings)
 
     def filtered(self, samples: Mapping[str, Samples]) -> History | None:
-        """All readings from the first position on in order of measurement, with the moments after each."""
+        """All readings from the first position on, in order of measurement, with the moments after each.
+
+        None without a position.
+        """
         readings, _ = self._readings(samples)
         if len(readings.time) == 0:
             return None
         by_time = np.argsort(readings.time[1:], kind="stable") + 1
         later = by_time[readings.time[by_time] >= readings.time[0]]
         rows = np.concatenate([[0], later])
-        history = self._row(len(rows))
+        history = self._empty_history(len(rows))
         for column, read in zip(history[:4], readings, strict=True):
             column[:] = read[rows]
         event_steps.begin(self.model, history)
-        event_steps.take_in(self.model, history, 1, len(rows))
+        event_steps.update_rows(self.model, history, 1, len(rows))
         return history
 
     def with_constants(self, initial_sd: FloatArray, walk: FloatArray) -> EventTime:
-        """The same filter with other constants than a bias: their SD before any reading, and per √s (constants,)."""
+        """The same filter with other constants than a bias.
+
+        `initial_sd` (constants,) is their SD before any reading, `walk` (constants,) that of their random walk per √s.
+        """
         model = self.model._replace(
             constants=(0,) * len(initial_sd),
             initial_constant_variance=np.square(initial_sd, dtype=np.float64),
@@ -203,7 +218,7 @@ class EventTime:
     def _readings(
         self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray] | None = None
     ) -> tuple[Readings, FloatArray]:
-        """All readings in order of arrival from the first position on, those that waited for it after it."""
+        """All readings in order of arrival from the first position on, followed by those that waited for it."""
         names = [name for name in self.sensors if name in samples and len(samples[name])]
         count, begin = sum(len(samples[name]) for name in names), 0
         value, coupling = (
@@ -215,7 +230,7 @@ class EventTime:
             stream, part = samples[name], slice(begin, begin + len(samples[name]))
             begin = part.stop
             rows.time[part], rows.sensor[part], arrival[part] = stream.time, self._index[name], stream.arrival
-            rows.value[part] = self._whole(name, stream.value)
+            rows.value[part] = self._on_all_axes(name, stream.value)
             rows.coupling[part] = couplings[name] if couplings else self._coupling(name, stream.rotation)
         order = np.argsort(arrival, kind="stable")
         order = self._from_first(rows.time[order], rows.sensor[order], order)
@@ -224,7 +239,7 @@ class EventTime:
         return chosen, np.maximum(arrival[order], begins)
 
     def _from_first(self, time: FloatArray, sensor: Any, order: Any) -> Any:
-        """The order without what came before the first position, but for what was measured after it."""
+        """`order` from the first position on; readings that arrived before it are kept if measured after it."""
         positions = np.flatnonzero(sensor == self._index[position_sensor(self.sensors)])
         if len(positions) == 0:
             return order[:0]
@@ -236,7 +251,7 @@ class EventTime:
 
 
 def _most_within(time: FloatArray, span_s: float) -> int:
-    """The largest number of readings that stand within a span."""
+    """The largest number of readings within any stretch of `span_s` seconds."""
     if len(time) == 0:
         return 0
     return int(np.max(np.arange(len(time)) + 1 - np.searchsorted(time, time - span_s, side="left")))

@@ -10,13 +10,13 @@ import numpy as np
 
 from fusion_core.estimator import replay_loop, unknown
 from fusion_core.kalman import fixed_gain_steps
-from fusion_core.kalman.event_steps import SAME_S
+from fusion_core.kalman.event_history import SAME_S
 from fusion_core.kalman.fixed_gain_steps import Gains, Rows, Schedule
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 
-_WHOLE = 1e-6  # of a ratio of rates, what counts as no fraction
-_RING = 1024  # rows that a batch may go back
+_WHOLE = 1e-6  # how far a ratio of rates may be from a whole number, relative to it
+_RING = 1024  # rows that a batch keeps for late readings; a power of two
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,11 @@ class Recent:
 
 @dataclass(frozen=True)
 class FixedGain:
-    """Fusion with settled gains. Raises ValueError for other sensors than a tracker and an accelerometer with rates."""
+    """Fusion with the gains that the filter settles to.
+
+    Raises ValueError unless the sensors are one tracker and one accelerometer of all axes, both with a rate, the
+    accelerometer's a multiple of the tracker's.
+    """
 
     sensors: Mapping[str, Sensor]
     jerk_psd_mm2_s5: float
@@ -75,7 +79,7 @@ class FixedGain:
         return self.sensors[self._imu_name]
 
     def _after_s(self, frame_time: float, acceleration_time: float | None) -> float:
-        """Where in the cycle accelerations fall, from the first frame and the first acceleration measured after it."""
+        """How long after a frame the next acceleration is measured, in s, from the first frame and acceleration."""
         period_s = 1.0 / float(self._imu.rate_hz or 1.0)
         if acceleration_time is None:
             return period_s
@@ -84,7 +88,7 @@ class FixedGain:
 
     def _gains(self, after_s: float) -> Gains:
         imu_rate_hz, tracker_rate_hz = float(self._imu.rate_hz or 1.0), float(self._tracker.rate_hz or 1.0)
-        return fixed_gain_steps.settled(
+        return fixed_gain_steps.settled_gains(
             Schedule(
                 self.jerk_psd_mm2_s5,
                 self.bias_psd,
@@ -102,7 +106,7 @@ class FixedGain:
         return Recent()
 
     def update(self, state: Recent, sensor: str, sample: Sample) -> Recent:
-        """The reading put in at its measurement time, and what came after it gone through again."""
+        """The state with the reading inserted in order of measurement; later readings are processed again."""
         is_frame = sensor == self._tracker_name
         if state.rows is None:
             if is_frame:
@@ -112,13 +116,14 @@ class FixedGain:
         count = len(state.rows.time)
         room = fixed_gain_steps.empty_rows(count + 1, self._tracker.dimension)
         value = np.ascontiguousarray(sample.value, dtype=np.float64)
-        if fixed_gain_steps.inserted(self._gains(state.after_s), state.rows, room, sample.time, is_frame, value) == 0:
+        gains = self._gains(state.after_s)
+        if fixed_gain_steps.insert_into_copy(gains, state.rows, room, sample.time, is_frame, value) == 0:
             return replace(state, too_late=state.too_late + 1)
         oldest = max(int(np.searchsorted(room.time, room.time[-1] - self.history_s, side="right")) - 1, 0)
         return replace(state, rows=Rows._make(column[oldest:] for column in room))
 
     def _first(self, state: Recent, sample: Sample) -> Recent:
-        """Start at the first frame; accelerations wait for it."""
+        """The state at the first frame, with the accelerations that waited for it."""
         rows = fixed_gain_steps.empty_rows(1, self._tracker.dimension)
         rows.time[0], rows.is_frame[0], rows.value[0], rows.mean[0, 0] = sample.time, True, sample.value, sample.value
         later = [reading for reading in state.waiting if reading.time > sample.time]
@@ -129,17 +134,17 @@ class FixedGain:
         return started
 
     def predict(self, state: Recent, time: float) -> tuple[FloatArray, FloatArray]:
-        """The newest mean, moved on to `time`, with the settled SD."""
+        """The newest mean, moved on to `time`, with the SD that the filter settles to."""
         if state.rows is None:
             return unknown(self._tracker.dimension)
         newest = len(state.rows.time) - 1
-        found: tuple[FloatArray, FloatArray] = fixed_gain_steps.expect_one(
+        moments: tuple[FloatArray, FloatArray] = fixed_gain_steps.predict_position(
             self._gains(state.after_s), state.rows, newest, time
         )
-        return found
+        return moments
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-        """One compiled loop where both streams are in order; otherwise the plain one."""
+        """By one compiled loop where both streams are in order of measurement; otherwise by the plain loop."""
         frames, accelerations = samples.get(self._tracker_name), samples.get(self._imu_name)
         times = np.asarray(times, dtype=np.float64)
         if frames is None or accelerations is None or not len(frames) or not _rising(times):
@@ -157,10 +162,12 @@ class FixedGain:
 
 
 def _rising(times: FloatArray) -> bool:
+    """Whether no time is before the one before it."""
     return bool(np.all(times[1:] >= times[:-1]))
 
 
 def _latest(samples: Samples) -> float:
+    """The largest delay between measurement and arrival, in s."""
     return float(np.max(samples.arrival - samples.time, initial=0.0))
 
 

@@ -1,8 +1,9 @@
-"""The fixed-gain path of Kalman fusion, compiled: for regular streams, whose gains settle and need no recomputing.
+"""The fixed-gain path of Kalman fusion, compiled: the gains of regular streams settle, so they are computed once.
 
-One tracker and one accelerometer at stated rates, the bias in the tracker's frame: then the axes are independent and
-alike, and the gains are those of one axis in the cycle of frame and accelerations that repeats. They stand in a table
-by the number of accelerations since the newest frame. Times are still the true ones; only the gains are nominal.
+With one tracker and one accelerometer at stated rates, and the bias in the tracker's frame, the axes are independent
+and have the same gains. Frames and accelerations come in a cycle that repeats, so a gain depends only on the number of
+accelerations since the newest frame, and a table holds them all. The times of readings are still the measured ones;
+only the gains assume the stated rates.
 """
 
 from __future__ import annotations
@@ -14,18 +15,18 @@ import numpy as np
 import numpy.typing as npt
 
 from fusion_core.compilation import compiled
-from fusion_core.kalman.event_steps import SAME_S
+from fusion_core.kalman.event_history import SAME_S
 from fusion_core.kalman.motion import add_wiener_noise
 from fusion_core.samples import FloatArray
 
 STATES = 4  # position, velocity, acceleration and bias of one axis
 _MOST_CYCLES = 200_000
 _SETTLED = 1e-14  # relative change of the covariance over a cycle
-_WITHOUT_FRAMES_S = 2.0  # how far the table goes on where no frame comes
+_WITHOUT_FRAMES_S = 2.0  # the table covers this much time without a frame
 
 
 class Schedule(NamedTuple):
-    """What repeats: accelerations `period_s` apart, the first of them `after_s` after a frame."""
+    """The cycle that repeats: `per_frame` accelerations `period_s` apart, the first of them `after_s` after a frame."""
 
     jerk_psd_mm2_s5: float
     bias_psd: float
@@ -37,7 +38,10 @@ class Schedule(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """Settled gains (k, 4), row 0 of a frame, row k of the k-th acceleration after it; covariances (k, 4, 4) after."""
+    """Settled gains (n, 4): row 0 is a frame's, row k that of the k-th acceleration after it.
+
+    `covariance` (n, 4, 4) is that of the state after the reading of each row.
+    """
 
     axes: tuple[int, ...]  # for its length alone, which the compiler then knows
     gain: FloatArray
@@ -46,8 +50,8 @@ class Gains(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def settled(schedule: Schedule, dimension: int) -> Gains:
-    """The gains of a schedule, by running its covariance until a cycle no longer changes it."""
+def settled_gains(schedule: Schedule, dimension: int) -> Gains:
+    """The gains of a schedule, found by repeating its cycle until the covariance no longer changes."""
     count = schedule.per_frame + int(np.ceil(_WITHOUT_FRAMES_S / schedule.period_s))
     gain, covariance = np.empty((count + 1, STATES)), np.empty((count + 1, STATES, STATES))
     _settle(schedule, gain, covariance)
@@ -63,21 +67,22 @@ def _settle(schedule: Schedule, gain: FloatArray, covariance: FloatArray) -> Non
     for _ in range(_MOST_CYCLES):
         before = now.copy()
         for k in range(schedule.per_frame):
-            now = _moved(schedule, now, schedule.after_s if k == 0 else schedule.period_s)
-            now = _updated(now, of_acceleration, schedule.imu_variance, gains)
-        now = _moved(schedule, now, schedule.period_s - schedule.after_s)
-        now = _updated(now, of_position, schedule.tracker_variance, gains)
+            now = _predict(schedule, now, schedule.after_s if k == 0 else schedule.period_s)
+            now = _correct(now, of_acceleration, schedule.imu_variance, gains)
+        now = _predict(schedule, now, schedule.period_s - schedule.after_s)
+        now = _correct(now, of_position, schedule.tracker_variance, gains)
         if np.abs(now - before).max() <= _SETTLED * np.abs(now).max():
             break
     gain[0], covariance[0] = gains, now
     for k in range(1, len(gain)):
-        now = _moved(schedule, now, schedule.after_s if k == 1 else schedule.period_s)
-        now = _updated(now, of_acceleration, schedule.imu_variance, gains)
+        now = _predict(schedule, now, schedule.after_s if k == 1 else schedule.period_s)
+        now = _correct(now, of_acceleration, schedule.imu_variance, gains)
         gain[k], covariance[k] = gains, now
 
 
 @compiled
-def _moved(schedule: Schedule, covariance: FloatArray, dt: float) -> FloatArray:
+def _predict(schedule: Schedule, covariance: FloatArray, dt: float) -> FloatArray:
+    """The covariance (4, 4) of one axis `dt` seconds later."""
     transition = np.eye(STATES)
     transition[0, 1] = transition[1, 2] = dt
     transition[0, 2] = dt * dt / 2.0
@@ -88,8 +93,8 @@ def _moved(schedule: Schedule, covariance: FloatArray, dt: float) -> FloatArray:
 
 
 @compiled
-def _updated(covariance: FloatArray, observed: FloatArray, noise_variance: float, gains: FloatArray) -> FloatArray:
-    """The covariance after a reading; its gains go into `gains`."""
+def _correct(covariance: FloatArray, observed: FloatArray, noise_variance: float, gains: FloatArray) -> FloatArray:
+    """The covariance after a reading, whose gains (4,) are written into `gains`."""
     column = covariance @ observed
     precision = 1.0 / (observed @ column + noise_variance)
     gains[:] = column * precision
@@ -107,7 +112,7 @@ class Rows(NamedTuple):
 
 
 def empty_rows(count: int, dimension: int) -> Rows:
-    """Room for `count` readings."""
+    """Room for `count` readings, all zeros."""
     return Rows(
         np.zeros(count),
         np.zeros(count, np.bool_),
@@ -118,8 +123,8 @@ def empty_rows(count: int, dimension: int) -> Rows:
 
 
 @compiled(inline="always")
-def _take_in(gains: Gains, rows: Rows, row: int, before: int) -> None:
-    """The mean of a row from that of the row `before` and its reading."""
+def _update_row(gains: Gains, rows: Rows, row: int, before: int) -> None:
+    """Computes the mean of a row from that of the row `before` and its own reading."""
     dt = max(rows.time[row] - rows.time[before], 0.0)
     half = dt * dt / 2.0
     frame = rows.is_frame[row]
@@ -140,8 +145,8 @@ def _take_in(gains: Gains, rows: Rows, row: int, before: int) -> None:
 
 
 @compiled
-def inserted(gains: Gains, rows: Rows, room: Rows, time: float, is_frame: bool, value: FloatArray) -> int:
-    """`rows` copied into `room`, which has one more, with one more reading. Where it went; 0 if it was too late."""
+def insert_into_copy(gains: Gains, rows: Rows, copy: Rows, time: float, is_frame: bool, value: FloatArray) -> int:
+    """Copies `rows` into `copy`, which has one row more, and inserts a reading; returns its row, 0 if too late."""
     count = len(rows.time)
     at = count
     while at > 0 and rows.time[at - 1] > time + SAME_S:
@@ -150,18 +155,20 @@ def inserted(gains: Gains, rows: Rows, room: Rows, time: float, is_frame: bool, 
         return 0
     for row in range(count):
         to = row if row < at else row + 1
-        room.time[to], room.is_frame[to], room.value[to] = rows.time[row], rows.is_frame[row], rows.value[row]
+        copy.time[to], copy.is_frame[to], copy.value[to] = rows.time[row], rows.is_frame[row], rows.value[row]
         if row < at:
-            room.mean[to], room.since[to] = rows.mean[row], rows.since[row]
-    room.time[at], room.is_frame[at], room.value[at] = time, is_frame, value
+            copy.mean[to], copy.since[to] = rows.mean[row], rows.since[row]
+    copy.time[at], copy.is_frame[at], copy.value[at] = time, is_frame, value
     for row in range(at, count + 1):
-        _take_in(gains, room, row, row - 1)
+        _update_row(gains, copy, row, row - 1)
     return at
 
 
 @compiled(inline="always")
-def expect(gains: Gains, rows: Rows, row: int, time: float, mean: FloatArray, sd: FloatArray, index: int) -> None:
-    """Writes position and SD at `time`, from the mean of a row, into row `index` of `mean` and `sd`."""
+def write_prediction(
+    gains: Gains, rows: Rows, row: int, time: float, mean: FloatArray, sd: FloatArray, index: int
+) -> None:
+    """Writes the position at `time`, predicted from a row, and its SD into row `index` of `mean` and `sd`."""
     dt = max(time - rows.time[row], 0.0)
     half = dt * dt / 2.0
     which = min(rows.since[row], gains.covariance.shape[0] - 1)
@@ -175,16 +182,21 @@ def expect(gains: Gains, rows: Rows, row: int, time: float, mean: FloatArray, sd
 
 
 @compiled
-def expect_one(gains: Gains, rows: Rows, row: int, time: float) -> tuple[FloatArray, FloatArray]:
-    """Mean and SD (dimension,) at `time`, from the mean of a row."""
+def predict_position(gains: Gains, rows: Rows, row: int, time: float) -> tuple[FloatArray, FloatArray]:
+    """Mean and SD (dimension,) of the position at `time`, predicted from the mean of a row."""
     mean, sd = np.empty((1, rows.value.shape[1])), np.empty((1, rows.value.shape[1]))
-    expect(gains, rows, row, time, mean, sd, 0)
+    write_prediction(gains, rows, row, time, mean, sd, 0)
     return mean[0], sd[0]
 
 
 @compiled(inline="always")
-def _put_in(gains: Gains, ring: Rows, last: int, time: float, is_frame: bool, value: FloatArray, at: int) -> int:
-    """One more reading at its time, the newest row being `last` − 1; how many rows it went back."""
+def _insert_into_ring(
+    gains: Gains, ring: Rows, last: int, time: float, is_frame: bool, value: FloatArray, at: int
+) -> int:
+    """Inserts a reading in order of measurement; the newest row was `last` − 1. Returns how many rows it went back.
+
+    The ring's length is a power of two, so that `row & mask` is the row's place in it.
+    """
     mask, row, back = len(ring.time) - 1, last, 0
     while ring.time[(row - 1) & mask] > time + SAME_S and back < mask:
         to, of = row & mask, (row - 1) & mask
@@ -196,7 +208,7 @@ def _put_in(gains: Gains, ring: Rows, last: int, time: float, is_frame: bool, va
     for axis in range(len(gains.axes)):
         ring.value[row & mask, axis] = value[at, axis]
     for again in range(row, last + 1):
-        _take_in(gains, ring, again & mask, (again - 1) & mask)
+        _update_row(gains, ring, again & mask, (again - 1) & mask)
     return back
 
 
@@ -208,10 +220,11 @@ def replay(
     times: FloatArray,
     ring: Rows,
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Mean and SD (n, dimension) at `times`, which rise, of streams (time, arrival, value) that are in order of both.
+    """Mean and SD (n, dimension) at rising `times`, from streams (time, arrival, value) in order of both.
 
-    `ring` is a power of two of rows; the last result is false where a reading went back by more than that. The first
-    frame's arrival is the start; accelerations measured after it count from then on.
+    The number of `ring`'s rows is a power of two; the third result is false where a reading went back by more rows than
+    that, and the estimates cannot be used. The filter starts when the first frame arrives, with the accelerations that
+    were measured after it.
     """
     dimension, mask = frames[2].shape[1], len(ring.time) - 1
     mean, sd, whole = np.empty((len(times), dimension)), np.empty((len(times), dimension)), True
@@ -235,13 +248,15 @@ def replay(
                 break
             last += 1
             if frame_at <= force_at:
-                whole &= _put_in(gains, ring, last, frames[0][frame], True, frames[2], frame) < mask
+                whole &= _insert_into_ring(gains, ring, last, frames[0][frame], True, frames[2], frame) < mask
                 frame += 1
             else:
-                whole &= _put_in(gains, ring, last, accelerations[0][force], False, accelerations[2], force) < mask
+                whole &= (
+                    _insert_into_ring(gains, ring, last, accelerations[0][force], False, accelerations[2], force) < mask
+                )
                 force += 1
         if last < 0:
             mean[index], sd[index] = np.nan, np.nan
         else:
-            expect(gains, ring, last & mask, now, mean, sd, index)
+            write_prediction(gains, ring, last & mask, now, mean, sd, index)
     return mean, sd, whole

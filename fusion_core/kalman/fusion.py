@@ -11,7 +11,7 @@ import numpy as np
 
 from fusion_core.checks import require_not_negative, require_one_of, require_positive
 from fusion_core.estimator import require_reading, require_readings
-from fusion_core.kalman.event_steps import Model
+from fusion_core.kalman.event_history import Model
 from fusion_core.kalman.event_time import EventTime
 from fusion_core.kalman.fixed_gain import FixedGain
 from fusion_core.kalman.motion import Matern72, Prior, Wiener
@@ -28,12 +28,12 @@ class FusionKalman:
     The motion's prior is a Wiener-process acceleration of `jerk_psd_mm2_s5` or, with `prior="matern72"`, a process of
     `signal_sd_mm` and `length_scale_s` about an unknown constant. The bias is a random walk of
     `bias_walk_mm_s2_per_sqrt_s`, in the phone's own frame where readings carry their rotation (there it is constant),
-    or in the tracker's. A late reading is put in at the time it was measured and what came after is gone through
-    again; readings later than `history_s` are left out and counted in the state.
+    or in the tracker's. A late reading is inserted in order of measurement and later readings are processed again;
+    readings later than `history_s` are left out and counted in the state.
 
     A position further off than `gate_sd` standard deviations is left out, three in a row at most (0: no gate). With
-    `adaptation` above 0, the noise of the accelerations grows where positions surprise more than they should, and
-    the jerk follows what the accelerations show; 0 leaves both as stated.
+    `adaptation` above 0, the noise of the accelerations grows where positions are further off than the filter expects,
+    and the jerk follows what the accelerations show; 0 leaves both as stated.
 
     `path="fixed_gain"` is for a regular stream of one tracker and one accelerometer at their stated `rate_hz`: the
     gains that the filter settles to, without gate or adaptation, the bias in the tracker's frame.
@@ -70,7 +70,7 @@ class FusionKalman:
         require_one_of("bias_frame", self.bias_frame, ("body", "tracker"))
         require_one_of("path", self.path, ("event_time", "fixed_gain"))
         require_covered(self.sensors, "history_s", self.history_s)
-        _ = self.steps  # what does not fit together is an error now, not at the first reading
+        _ = self.steps  # so that sensors or settings that do not fit are an error now, not at the first reading
 
     @property
     def _prior(self) -> Prior:
@@ -129,18 +129,18 @@ class FusionKalman:
         return self.event_time
 
     def start(self) -> Any:
-        """Nothing seen."""
+        """The state before any reading."""
         return self.steps.start()
 
     def update(self, state: Any, sensor: str, sample: Sample) -> Any:
-        """The reading put in at its measurement time, and what came after it gone through again."""
+        """The state with the reading inserted in order of measurement; later readings are processed again."""
         if sensor not in self.sensors:
             return state
         require_reading(sensor, self.sensors[sensor], sample)
         return self.steps.update(state, sensor, sample)
 
     def predict(self, state: Any, time: float) -> tuple[FloatArray, FloatArray]:
-        """What is known from the newest reading, moved on to `time`."""
+        """Mean and SD (d,) of the position at `time`, predicted from the newest reading."""
         return self.steps.predict(state, time)
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
@@ -150,7 +150,7 @@ class FusionKalman:
 
 
 def _operator(name: str, sensor: Sensor, states: int) -> FloatArray:
-    """The sum of one axis's states that a sensor observes."""
+    """The weights (states,) of the sum of one axis's states that a sensor observes."""
     observed = np.zeros(states)
     for term in sensor.terms:
         if term.at_s != 0:
@@ -160,7 +160,7 @@ def _operator(name: str, sensor: Sensor, states: int) -> FloatArray:
 
 
 def _gate(gate_sd: float, dimension: int) -> float:
-    """The squared innovation of `dimension` axes that is as rare as `gate_sd` standard deviations of one."""
+    """The squared innovation of `dimension` axes that is as rare as `gate_sd` standard deviations of one axis."""
     if gate_sd == 0:
         return float(np.inf)
     from scipy.special import chdtri, ndtr

@@ -49,7 +49,7 @@ class Wiener:
         )
 
     def motion(self) -> Motion:
-        """No constant to return to."""
+        """The motion for the compiled steps, which does not return to a constant."""
         return Motion(np.zeros((1, 3, 3)), 0.0, np.zeros((3, 3)), self.jerk_psd_mm2_s5, False)
 
     def initial_covariance(self, position_variance_mm2: float) -> FloatArray:
@@ -90,7 +90,7 @@ class Matern72:
         return np.asarray(solve_continuous_lyapunov(self._drift(), -noise), dtype=np.float64)
 
     def motion(self) -> Motion:
-        """The process's four eigenvalues are all −λ, so its transition is a cubic times a decay."""
+        """The motion for the compiled steps: all eigenvalues are −λ, so the transition is a cubic times a decay."""
         powers = np.zeros((4, 5, 5))
         powers[:, :4, :4] = _series(self._drift() + self._rate * np.eye(4))
         stationary = np.zeros((5, 5))
@@ -98,7 +98,7 @@ class Matern72:
         return Motion(powers, self._rate, stationary, 0.0, True)
 
     def initial_covariance(self, position_variance_mm2: float) -> FloatArray:
-        """Covariance (5, 5) once the first position has been seen: the constant is it less the process."""
+        """Covariance (5, 5) once the first position has been seen; the constant is that position less the process."""
         process = self._stationary()
         covariance = np.zeros((5, 5))
         covariance[:4, :4] = process
@@ -121,7 +121,11 @@ def _series(nilpotent: FloatArray) -> FloatArray:
 
 @compiled
 def add_wiener_noise(density: float, dt: float, noise: FloatArray, apart: int, axis: int) -> None:
-    """The process noise of position, velocity and acceleration, whose rows stand `apart` from `axis` on."""
+    """Adds the process noise over `dt` s to position, velocity and acceleration of one axis, in place.
+
+    Their rows in `noise` are `axis`, `axis + apart` and `axis + 2·apart`. Bar-Shalom, Li and Kirubarajan (2001),
+    section 6.2.3, with the jerk's spectral density `density`.
+    """
     speed, rate, squared = apart + axis, 2 * apart + axis, dt * dt
     noise[axis, axis] += density * squared * squared * dt / 20.0
     noise[axis, speed] += density * squared * squared / 8.0
@@ -155,7 +159,7 @@ def step(motion: Motion, dt: float, jerk_psd: float, transition: FloatArray, noi
 
 @compiled
 def position_step(motion: Motion, dt: float, jerk_psd: float, of_position: FloatArray) -> float:
-    """Writes the position's row of the transition over `dt` seconds; returns its process noise."""
+    """Writes the position's row (states,) of the transition over `dt` seconds; returns the position's process noise."""
     if not motion.anchored:
         of_position[0], of_position[1], of_position[2] = 1.0, dt, dt * dt / 2.0
         return max(motion.jerk_psd_mm2_s5, jerk_psd) * dt * dt * dt * dt * dt / 20.0
@@ -168,7 +172,7 @@ def position_step(motion: Motion, dt: float, jerk_psd: float, of_position: Float
 
 @compiled
 def _anchored(motion: Motion, dt: float, transition: FloatArray) -> None:
-    """A cubic times a decay for the process; what it leaves of the position goes back to the constant."""
+    """Writes the transition: a cubic times a decay for the process, and the rest of the position from the constant."""
     moving = len(transition) - 1
     decay = np.exp(-motion.decay * dt)
     transition[:] = 0.0
@@ -184,7 +188,7 @@ def _anchored(motion: Motion, dt: float, transition: FloatArray) -> None:
 
 @compiled
 def _stationary_noise(stationary: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
-    """What keeps the stationary covariance as it is: Q = P − F P Fᵀ, for all states but the constant."""
+    """Writes the noise that keeps a stationary process stationary: Q = P − F P Fᵀ, for all states but the constant."""
     moving = stationary.shape[0] - 1
     noise[:] = 0.0
     for row in range(moving):

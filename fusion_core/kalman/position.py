@@ -56,14 +56,14 @@ class PositionKalman:
         return None
 
     def update(self, state: Moments | None, sensor: str, sample: Sample) -> Moments | None:
-        """One Kalman step a frame; other sensors change nothing."""
+        """One Kalman step per frame; readings of other sensors change nothing."""
         if sensor != position_sensor(self.sensors):
             return state
         noise_variance, value = self._tracker.noise_sd**2, np.ascontiguousarray(sample.value, dtype=np.float64)
         if state is None:
             return Moments(sample.arrival, *position_steps.begin(value, noise_variance, *self._initial_sd))
         step_s = sample.arrival - state.time
-        mean, covariance = position_steps.moved(state.mean, state.covariance, step_s, self.jerk_psd_mm2_s5)
+        mean, covariance = position_steps.predict(state.mean, state.covariance, step_s, self.jerk_psd_mm2_s5)
         position_steps.correct(mean, covariance, value, noise_variance)
         return Moments(sample.arrival, mean, covariance)
 
@@ -76,7 +76,7 @@ class PositionKalman:
         if state is None:
             return unknown(self._tracker.dimension)
         step_s = max(time - state.time, 0.0) + self.ahead_s
-        mean, sd = position_steps.ahead(state.mean, state.covariance, step_s, self.jerk_psd_mm2_s5)
+        mean, sd = position_steps.predict_position(state.mean, state.covariance, step_s, self.jerk_psd_mm2_s5)
         return mean, np.full(self._tracker.dimension, sd)
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:

@@ -1,4 +1,4 @@
-"""The position-only Kalman filter, compiled: one axis' covariance serves all, since they have the same sensor."""
+"""The position-only Kalman filter, compiled. All axes have the same sensor and so share one covariance."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fusion_core.samples import FloatArray
 def begin(
     value: FloatArray, noise_variance: float, speed_sd: float, acceleration_sd: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (3, d) and covariance (3, 3) at the first frame."""
+    """Mean (3, d) and covariance (3, 3) of position, velocity and acceleration at the first frame."""
     mean, covariance = np.zeros((3, len(value))), np.zeros((3, 3))
     mean[0] = value
     covariance[0, 0], covariance[1, 1], covariance[2, 2] = noise_variance, speed_sd**2, acceleration_sd**2
@@ -21,8 +21,10 @@ def begin(
 
 
 @compiled
-def moved(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float) -> tuple[FloatArray, FloatArray]:
-    """Both `dt` seconds on, by the Wiener-process-acceleration model."""
+def predict(
+    mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float
+) -> tuple[FloatArray, FloatArray]:
+    """Mean (3, d) and covariance (3, 3) `dt` seconds later, by the Wiener-process-acceleration model."""
     transition = np.eye(3)
     transition[0, 1] = transition[1, 2] = dt
     transition[0, 2] = dt * dt / 2.0
@@ -33,7 +35,7 @@ def moved(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: 
 
 @compiled
 def correct(mean: FloatArray, covariance: FloatArray, value: FloatArray, noise_variance: float) -> None:
-    """A frame taken in, in place. Joseph's form keeps the covariance symmetric and positive."""
+    """Corrects mean and covariance by a frame, in place. Joseph's form keeps the covariance symmetric and positive."""
     gain = covariance[:, 0] / (covariance[0, 0] + noise_variance)
     innovation = value - mean[0]
     keep = np.eye(3)
@@ -45,9 +47,11 @@ def correct(mean: FloatArray, covariance: FloatArray, value: FloatArray, noise_v
 
 
 @compiled
-def ahead(mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float) -> tuple[FloatArray, float]:
+def predict_position(
+    mean: FloatArray, covariance: FloatArray, dt: float, jerk_psd_mm2_s5: float
+) -> tuple[FloatArray, float]:
     """Position (d,) and its SD `dt` seconds after the newest frame."""
-    later, spread = moved(mean, covariance, dt, jerk_psd_mm2_s5)
+    later, spread = predict(mean, covariance, dt, jerk_psd_mm2_s5)
     return later[0], np.sqrt(spread[0, 0])
 
 
@@ -61,7 +65,7 @@ def replay(
     jerk_psd_mm2_s5: float,
     ahead_s: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean and SD (n, d) at `times`, which rise, of frames (m, d) in order of arrival."""
+    """Mean and SD (n, d) at rising `times`, from frames (m, d) in order of arrival."""
     shown, sd = np.full((len(times), value.shape[1]), np.nan), np.full((len(times), value.shape[1]), np.nan)
     mean, covariance, upcoming = np.zeros((3, value.shape[1])), np.zeros((3, 3)), 0
     for index in range(len(times)):
@@ -70,10 +74,10 @@ def replay(
                 mean, covariance = begin(value[0], noise_variance, initial_sd[0], initial_sd[1])
             else:
                 dt = arrival[upcoming] - arrival[upcoming - 1]
-                mean, covariance = moved(mean, covariance, dt, jerk_psd_mm2_s5)
+                mean, covariance = predict(mean, covariance, dt, jerk_psd_mm2_s5)
                 correct(mean, covariance, value[upcoming], noise_variance)
             upcoming += 1
         if upcoming > 0:
             dt = max(times[index] - arrival[upcoming - 1], 0.0) + ahead_s
-            shown[index], sd[index] = ahead(mean, covariance, dt, jerk_psd_mm2_s5)
+            shown[index], sd[index] = predict_position(mean, covariance, dt, jerk_psd_mm2_s5)
     return shown, sd

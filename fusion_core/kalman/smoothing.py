@@ -1,4 +1,4 @@
-"""Estimates that wait: a display may lag on purpose, and afterwards all readings are known."""
+"""Estimates that use later readings: all of them (`smooth`), or those that arrive within a fixed lag (`fixed_lag`)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from fusion_core.samples import FloatArray, Samples, Track
 
 
 def smooth(estimator: FusionKalman, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-    """The position at `times` in view of every reading, before and after (Rauch, Tung and Striebel 1965).
+    """The position at `times` (n,) in s, given every reading before and after it (Rauch, Tung and Striebel 1965).
 
-    Not causal: a reference where a study has none, never an estimate to be shown. NaN outside the readings. Memory
-    grows with the readings, about 1.3 kB each. Raises ValueError for an estimator on its fixed-gain path.
+    Returns mean and SD (n, d) in mm; NaN outside the readings. Not causal: use it as a reference where a study has
+    none, never as an estimate to be shown. Memory grows by about 1.3 kB a reading. Raises ValueError for an estimator
+    on its fixed-gain path.
     """
     steps = _event_time(estimator)
     require_readings(estimator.sensors, samples)
@@ -32,9 +33,10 @@ def smooth(estimator: FusionKalman, samples: Mapping[str, Samples], times: Float
 
 
 def fixed_lag(estimator: FusionKalman, samples: Mapping[str, Samples], times: FloatArray, lag_s: float) -> Track:
-    """The position `lag_s` before each of `times`, from what had arrived by then: steadier, and late by that much.
+    """The position `lag_s` before each of `times` (n,) in s, from what had arrived at that time.
 
-    Raises ValueError for a lag that the estimator's history does not cover, or its fixed-gain path.
+    Returns mean and SD (n, d) in mm: steadier than the estimate of "now", and late by `lag_s`. Raises ValueError for
+    a negative lag, one that the estimator's history does not cover, and an estimator on its fixed-gain path.
     """
     steps = _event_time(estimator)
     require_readings(estimator.sensors, samples)

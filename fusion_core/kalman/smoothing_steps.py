@@ -1,11 +1,12 @@
-"""Smoothing, compiled: what later readings say of an earlier moment (Rauch, Tung and Striebel 1965)."""
+"""Smoothing, compiled: what later readings say about an earlier instant (Rauch, Tung and Striebel 1965)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fusion_core.compilation import compiled
-from fusion_core.kalman.event_steps import JERK_PSD, History, Model, whole_step
+from fusion_core.kalman.event_history import JERK_PSD, History, Model
+from fusion_core.kalman.event_prediction import whole_step
 from fusion_core.samples import FloatArray
 
 
@@ -29,11 +30,13 @@ def step_back(
     later_mean: FloatArray,
     later_covariance: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Filtered moments in view of smoothed moments `dt` seconds later."""
+    """Smoothed mean and covariance of a row, from its filtered ones and the smoothed ones `dt` seconds later."""
     transition, noise = _step(model, dt, jerk_psd)
     expected = transition @ covariance @ transition.T + noise
     for state in range(len(mean)):
-        expected[state, state] += 1e-12 * (1.0 + expected[state, state])  # a step of no length has no noise
+        expected[state, state] += 1e-12 * (
+            1.0 + expected[state, state]
+        )  # invertible where dt is 0: such a step has no noise
     gain = np.linalg.solve(expected, transition @ covariance).T
     smoothed = mean + gain @ (later_mean - transition @ mean)
     spread = covariance + gain @ (later_covariance - expected) @ gain.T
@@ -70,21 +73,21 @@ def smoothed_at(model: Model, history: History, oldest: int, count: int, time: f
 
 @compiled
 def smooth(model: Model, history: History, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean and SD (n, dimension) at `times`, which rise, in view of all rows; NaN outside them."""
+    """Mean and SD (n, dimension) at rising `times`, given all rows; NaN outside them."""
     dimension = len(model.axes)
-    found, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
+    position, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
     count, index = len(history.time), len(times) - 1
     mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
     while index >= 0 and times[index] >= history.time[count - 1]:
         if times[index] == history.time[count - 1]:
-            found[index], sd[index] = mean[:dimension], np.sqrt(np.diag(covariance)[:dimension])
+            position[index], sd[index] = mean[:dimension], np.sqrt(np.diag(covariance)[:dimension])
         index -= 1
     for row in range(count - 2, -1, -1):
         while index >= 0 and times[index] >= history.time[row]:
-            found[index], sd[index] = _at(model, history, row, times[index], mean, covariance)
+            position[index], sd[index] = _at(model, history, row, times[index], mean, covariance)
             index -= 1
         dt = history.time[row + 1] - history.time[row]
         mean, covariance = step_back(
             model, history.mean[row], history.covariance[row], dt, history.adapted[row, JERK_PSD], mean, covariance
         )
-    return found, sd
+    return position, sd

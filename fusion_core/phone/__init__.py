@@ -1,1 +1,1 @@
-"""The phone in the hand: how it is turned (`orientation`), and how its sensor sits on it (`calibration`)."""
+"""The phone in the hand: its orientation (`orientation`), and how its sensor is mounted on it (`calibration`)."""

@@ -1,4 +1,4 @@
-"""How a phone's sensor sits on the body that the tracker sees: mounting error and lever arm, from its motion."""
+"""How a phone's sensor is mounted on the body that the tracker sees: mounting error and lever arm, from its motion."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ _LEVER_ARM_SD_MM = 100.0
 
 @dataclass(frozen=True)
 class Calibration:
-    """`mounting_rad` (3,): a small rotation of the accelerometer's axes; `lever_arm_mm` (3,): from it to the point
-    that the tracker sees, in the body's frame; each with its SD.
+    """How a phone's accelerometer is mounted, each estimate with its SD.
+
+    `mounting_rad` (3,) is a small rotation of the accelerometer's axes; `lever_arm_mm` (3,) goes from the accelerometer
+    to the point that the tracker sees, in the body's frame.
     """
 
     mounting_rad: FloatArray
@@ -38,7 +40,7 @@ class Body:
     gravity_mm_s2: FloatArray
 
     def acceleration(self) -> Samples:
-        """In the tracker's frame: a = R f + g. At rest f points up and a is zero."""
+        """Accelerations (n, 3) in mm/s² in the tracker's frame: a = R f + g. At rest f points up and a is zero."""
         value = np.einsum("nij,nj->ni", self.rotation, self.force_mm_s2) + self.gravity_mm_s2
         return Samples(self.time, self.arrival, value, self.rotation)
 
@@ -46,10 +48,10 @@ class Body:
 def calibrate(
     tracker: Samples, tracker_sensor: Sensor, body: Body, acceleration_sensor: Sensor, until_s: float
 ) -> Calibration | None:
-    """What has arrived by `until_s` says of mounting and lever arm; None without a position by then.
+    """Mounting and lever arm, from what has arrived by `until_s`; None without a position by then. Causal.
 
-    Both enter the readings linearly, a rotation by δ as R(f × δ) in an acceleration and an arm r as R r in a
-    position, so they are constants of the fusion filter beside its bias, and their SDs come with them. Causal.
+    Both enter the readings linearly, a rotation by δ as R(f × δ) in an acceleration and an arm r as R r in a position.
+    So they are constants of the fusion filter beside its bias, which also gives their SDs.
     """
     force, turned = body.force_mm_s2, body.rotation
     coupling = np.zeros((len(force), 3, 9))
@@ -70,8 +72,8 @@ def calibrate(
     return Calibration(mean[0, 3:6], sd[3:6], mean[0, 6:], sd[6:])
 
 
-def mounted(rotation: FloatArray, mounting_rad: FloatArray) -> FloatArray:
-    """Body-to-tracker rotations (n, 3, 3) of the accelerometer's own axes."""
+def with_mounting(rotation: FloatArray, mounting_rad: FloatArray) -> FloatArray:
+    """Rotations (n, 3, 3) from the accelerometer's axes to the tracker's frame, given the body's and the mounting."""
     from scipy.spatial.transform import Rotation
 
     turned: FloatArray = rotation @ Rotation.from_rotvec(mounting_rad).as_matrix()

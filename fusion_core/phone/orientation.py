@@ -17,7 +17,7 @@ _LEVEL_BIAS_WALK_MM_S2 = 30.0
 def rotate(quaternion_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
     """Vectors (n, 3) turned by unit quaternions (n, 4) or (4,), scalar last: body to tracker frame.
 
-    Quaternions are brought to unit length first; ValueError for one of length zero.
+    Quaternions are brought to unit length first. Raises ValueError for one of length zero.
     """
     quaternion = np.broadcast_to(quaternion_xyzw, (len(vectors), 4))
     length = np.linalg.norm(quaternion, axis=1, keepdims=True)
@@ -36,29 +36,29 @@ def rotations(quaternion_xyzw: FloatArray) -> FloatArray:
     return np.stack(columns, axis=2)
 
 
-def carried(
+def carry_forward(
     time: FloatArray, quaternion_xyzw: FloatArray, angular_velocity_rad_s: FloatArray, longest_s: float = 1.0
 ) -> FloatArray:
-    """Orientations (n, 4) with the unknown ones (NaN) carried on from the last known by the gyroscope (n, 3).
+    """Orientations (n, 4) in which unknown ones (NaN) follow from the last known one by the gyroscope (n, 3) in rad/s.
 
-    For up to `longest_s`, in which a gyroscope drifts by a degree or two; beyond it they stay unknown. `time` (n,)
-    rises.
+    For up to `longest_s`, in which a gyroscope drifts by a degree or two; after that they stay unknown. `time` (n,) in
+    s rises.
     """
     from scipy.spatial.transform import Rotation
 
-    found = quaternion_xyzw.copy()
-    known: npt.NDArray[np.bool_] = np.isfinite(found[:, 3])
+    filled = quaternion_xyzw.copy()
+    known: npt.NDArray[np.bool_] = np.isfinite(filled[:, 3])
     last = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
     for row in np.flatnonzero(~known & (last >= 0)):
         step_s = time[row] - time[row - 1]
-        if time[row] - time[last[row]] <= longest_s and np.isfinite(found[row - 1, 3]):
+        if time[row] - time[last[row]] <= longest_s and np.isfinite(filled[row - 1, 3]):
             mid = (angular_velocity_rad_s[row - 1] + angular_velocity_rad_s[row]) / 2
-            found[row] = (Rotation.from_quat(found[row - 1]) * Rotation.from_rotvec(mid * step_s)).as_quat()
-    return found
+            filled[row] = (Rotation.from_quat(filled[row - 1]) * Rotation.from_rotvec(mid * step_s)).as_quat()
+    return filled
 
 
-def level(gravity_mm_s2: FloatArray) -> FloatArray:
-    """The least rotation (4,) that turns a frame whose z points up into the tracker's, where gravity is as given."""
+def level_rotation(gravity_mm_s2: FloatArray) -> FloatArray:
+    """The smallest rotation (4,) from a frame whose z points up to the tracker's, in which gravity (3,) is as given."""
     from scipy.spatial.transform import Rotation
 
     up = -gravity_mm_s2 / np.linalg.norm(gravity_mm_s2)
@@ -73,12 +73,12 @@ def level(gravity_mm_s2: FloatArray) -> FloatArray:
 def heading(
     tracker: Samples, tracker_sensor: Sensor, acceleration: Samples, acceleration_sensor: Sensor
 ) -> tuple[FloatArray, FloatArray]:
-    """By what angle about the vertical, and SD (n,) in rad, accelerations are turned against the tracker.
+    """The angle about the vertical between accelerations and tracker, and its SD, (n,) each in rad, from the motion.
 
-    Both in frames whose z points up, positions (m, 3) in mm and accelerations (n, 3) in mm/s² without gravity. What
-    is known at the arrival of each acceleration, from the motion itself: the cosine and sine of the angle enter an
-    acceleration linearly, so they are constants of the fusion filter beside its bias. NaN before the first position;
-    the SD is large until the hand has moved.
+    Both are in frames whose z points up: positions (m, 3) in mm, accelerations (n, 3) in mm/s² without gravity. Each
+    angle is what is known when an acceleration arrives. The cosine and sine of the angle enter an acceleration
+    linearly, so they are constants of the fusion filter beside its bias. NaN before the first position; the SD is large
+    until the hand has moved.
     """
     east, north = acceleration.value[:, 0], acceleration.value[:, 1]
     coupling = np.zeros((len(acceleration), 3, 5))
@@ -102,7 +102,7 @@ def heading(
     return angle, np.sqrt(variance) / length
 
 
-def headed(quaternion_xyzw: FloatArray, angle_rad: FloatArray) -> FloatArray:
+def turn_about_vertical(quaternion_xyzw: FloatArray, angle_rad: FloatArray) -> FloatArray:
     """Orientations (n, 4) turned about the vertical by angles (n,)."""
     from scipy.spatial.transform import Rotation
 
@@ -113,5 +113,5 @@ def headed(quaternion_xyzw: FloatArray, angle_rad: FloatArray) -> FloatArray:
 
 
 def nearest(time: FloatArray, wanted: FloatArray) -> npt.NDArray[np.int64]:
-    """The index of the newest of rising times that is not after each wanted one; 0 where there is none."""
+    """For each of the times `wanted` (m,), the index of the newest of rising `time` (n,) not after it; 0 if none is."""
     return np.maximum(np.searchsorted(time, wanted, side="right") - 1, 0)

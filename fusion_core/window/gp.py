@@ -18,14 +18,14 @@ from fusion_core.window.kernels import IntArray
 
 _ACCELERATION = 2
 _MEANS = {"zero": weights.ZERO, "constant": weights.CONSTANT, "window": weights.WINDOW}
-_MOST_SETS = 64  # of patterns
-_MOST_PATTERNS = 4096  # of regular windows whose weights are remembered
+_MOST_SETS = 64  # sets of patterns whose stacked weights are remembered
+_MOST_PATTERNS = 4096  # patterns of regular windows whose weights are remembered
 Pattern = tuple[int, int, int, int]
 """A regular window: how many positions and other readings, and how many ns ago the newest of each was measured."""
 
 
 class Schedule(NamedTuple):
-    """The windows to come: `spans` (4, n) and `which` (n,) of the patterns' `weights` (k, m), −1 where irregular."""
+    """The windows to come: their `spans` (4, n), and `which` row (n,) of `weights` (k, m) each uses; −1: irregular."""
 
     spans: IntArray
     which: IntArray
@@ -36,7 +36,7 @@ class Schedule(NamedTuple):
 
 @dataclass(frozen=True)
 class Window:
-    """The samples in the window: positions by measurement time, everything else since the oldest of them."""
+    """The samples in the window: the newest positions by measurement time, and other readings since the oldest one."""
 
     positions: tuple[Sample, ...] = ()
     others: tuple[tuple[str, Sample], ...] = ()
@@ -93,7 +93,7 @@ class WindowGP:
         return self.sensors[self._tracker].dimension
 
     def _terms(self, name: str) -> tuple[Term, ...]:
-        """What a sensor observes, with the paper's second difference where it is asked for."""
+        """What a sensor observes; accelerations as the paper's second difference if `derivative` says so."""
         sensor = self.sensors[name]
         if sensor.order != _ACCELERATION or self.derivative == "exact":
             return sensor.terms
@@ -112,10 +112,10 @@ class WindowGP:
 
     def _gains(self, time: FloatArray, now: FloatArray, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         """As `gains`, of readings at `time` (n, m) when it is `now` (n,)."""
-        found: tuple[FloatArray, FloatArray] = weights.gains(
+        weights_and_variance: tuple[FloatArray, FloatArray] = weights.gains(
             self._prior, time, now, np.array([self._index[name] for name in names], np.int64)
         )
-        return found
+        return weights_and_variance
 
     @cached_property
     def _index(self) -> dict[str, int]:
@@ -153,9 +153,9 @@ class WindowGP:
         return self._trimmed(replace(state, positions=tuple(positions[-self.window :])), sample.arrival)
 
     def _trimmed(self, state: Window, now: float) -> Window:
-        """Without what can no longer count: readings older than the oldest position and than the horizon.
+        """The window without readings that are older than the oldest position or the horizon, and so cannot count.
 
-        Until the window is full an older frame may still arrive, and what came before the first frame waits.
+        Until the window is full, an older frame may still arrive, so readings before the oldest position are kept.
         """
         oldest = state.positions[0].time if len(state.positions) == self.window else -np.inf
         since = max(oldest, now - self.horizon_s)
@@ -164,7 +164,7 @@ class WindowGP:
         return replace(state, others=tuple(other for other in state.others if other[1].time >= since))
 
     def predict(self, state: Window, time: float) -> tuple[FloatArray, FloatArray]:
-        """The position at `time`, from the window."""
+        """Mean and SD (d,) in mm of the position at `time`, from the readings in the window."""
         if not state.positions:
             return unknown(self._dimension)
         since = max(state.positions[0].time, time - self.horizon_s)
@@ -172,7 +172,7 @@ class WindowGP:
         readings += [(name, sample) for name, sample in state.others if sample.time >= since]
         mean, sd = np.empty(self._dimension), np.empty(self._dimension)
         origin = state.positions[-1].value if self.mean != "zero" else np.zeros(self._dimension)
-        for axes in self._alike:
+        for axes in self._axes_alike:
             chosen = readings
             if self._partial:
                 chosen = [(name, sample) for name, sample in readings if axes[0] in self._sees[name]]
@@ -182,7 +182,7 @@ class WindowGP:
             if len(axes) == self._dimension and not self._partial:
                 values = np.array([sample.value for _, sample in chosen])
             else:
-                values = np.array([sample.value[self._place[name][axes]] for name, sample in chosen])
+                values = np.array([sample.value[self._own_axis[name][axes]] for name, sample in chosen])
             mean[axes] = origin[axes] + weights @ (values - constant[:, None] * origin[axes])
             sd[axes] = np.sqrt(variance)
         return mean, sd
@@ -193,95 +193,95 @@ class WindowGP:
 
     @cached_property
     def _partial(self) -> bool:
-        """Does a sensor name the axes it sees?"""
+        """Whether some sensor sees only the axes that it names."""
         return any(sensor.axes is not None for sensor in self.sensors.values())
 
     @cached_property
-    def _place(self) -> dict[str, IntArray]:
-        """Where each axis of the position stands among a sensor's own."""
-        found = {}
+    def _own_axis(self) -> dict[str, IntArray]:
+        """For each sensor, which of its own axes each axis of the position is (d,)."""
+        own_axis = {}
         for name, axes in self._sees.items():
-            found[name] = np.zeros(self._dimension, np.int64)
-            found[name][list(axes)] = np.arange(len(axes))
-        return found
+            own_axis[name] = np.zeros(self._dimension, np.int64)
+            own_axis[name][list(axes)] = np.arange(len(axes))
+        return own_axis
 
     @cached_property
     def _constant(self) -> dict[str, float]:
-        """What each sensor reads of a hand that stays at 1 mm."""
+        """What each sensor would read if the hand stayed at 1 mm."""
         return {name: sum(t.weight for t in self._terms(name) if t.derivative == 0) for name in self.sensors}
 
     @cached_property
-    def _alike(self) -> list[list[int]]:
-        """Axes that the same sensors see, and that therefore have the same weights."""
+    def _axes_alike(self) -> list[list[int]]:
+        """Groups of axes that the same sensors see; the axes of a group have the same weights."""
         groups: dict[tuple[str, ...], list[int]] = {}
         for axis in range(self._dimension):
             groups.setdefault(tuple(name for name, axes in self._sees.items() if axis in axes), []).append(axis)
         return list(groups.values())
 
     def _weights(self, names: tuple[str, ...], measured: FloatArray, now: float) -> tuple[FloatArray, FloatArray]:
-        """Weights and variance of one window: those of its pattern where it is regular."""
+        """Weights (m,) and variance of one window; a regular window's are looked up by its pattern."""
         if self._regular_names is not None:
             n_positions = names.count(self._tracker)
             rates = [float(self.sensors[name].rate_hz or 0.0) for name in self._regular_names]
             if regular.is_regular(measured, n_positions, rates[0], rates[-1]):
                 newest = int(regular.in_ns(now - measured[n_positions - 1]))
                 last = int(regular.in_ns(now - measured[-1])) if len(names) > n_positions else 0
-                return self._of_pattern((n_positions, len(names) - n_positions, newest, last))
+                return self._weights_of_pattern((n_positions, len(names) - n_positions, newest, last))
         weights, variance = self._gains(measured[None, :], np.array([now]), names)
         return weights[0], variance[0]
 
     @cached_property
     def _regular_names(self) -> tuple[str, ...] | None:
-        """The tracker and the one other sensor, if they are all and have rates; None where paths do not differ."""
+        """The tracker and at most one other sensor, where regular windows can be looked up; None where they cannot."""
         names = (self._tracker, *(name for name in self.sensors if name != self._tracker))
         rated = all(sensor.rate_hz is not None for sensor in self.sensors.values())
-        return names if self.path == "auto" and len(names) <= 2 and rated and len(self._alike) == 1 else None
+        return names if self.path == "auto" and len(names) <= 2 and rated and len(self._axes_alike) == 1 else None
 
     @cached_property
-    def _patterns(self) -> dict[Pattern, tuple[FloatArray, FloatArray]]:
+    def _known_patterns(self) -> dict[Pattern, tuple[FloatArray, FloatArray]]:
         return {}
 
-    def _of_pattern(self, pattern: Pattern) -> tuple[FloatArray, FloatArray]:
-        """Weights and variance of a regular window, remembered: they depend on nothing else."""
-        found = self._patterns.get(pattern)
-        if found is None:
+    def _weights_of_pattern(self, pattern: Pattern) -> tuple[FloatArray, FloatArray]:
+        """Weights (m,) and variance of a regular window. They depend on the pattern alone, so they are remembered."""
+        known = self._known_patterns.get(pattern)
+        if known is None:
             names = self._regular_names or ()
             n_positions, n_others, newest, last = pattern
             lag = -newest * 1e-9 - np.arange(n_positions)[::-1] / float(self.sensors[names[0]].rate_hz or 1.0)
             if n_others:
                 steps = np.arange(n_others)[::-1] / float(self.sensors[names[-1]].rate_hz or 1.0)
                 lag = np.concatenate([lag, -last * 1e-9 - steps])
-            found = self.gains(lag, (names[0],) * n_positions + (names[-1],) * n_others)
-            if len(self._patterns) < _MOST_PATTERNS:
-                self._patterns[pattern] = found
-        return found
+            known = self.gains(lag, (names[0],) * n_positions + (names[-1],) * n_others)
+            if len(self._known_patterns) < _MOST_PATTERNS:
+                self._known_patterns[pattern] = known
+        return known
 
     @cached_property
-    def _stacked(self) -> dict[bytes, tuple[FloatArray, FloatArray]]:
+    def _known_pattern_sets(self) -> dict[bytes, tuple[FloatArray, FloatArray]]:
         return {}
 
-    def _of_patterns(self, patterns: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Weights (k, m), padded with zeros, and SDs (k,) of regular windows; the sets met before are remembered."""
+    def _weights_of_patterns(self, patterns: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Weights (k, m), padded with zeros, and SDs (k,) of k patterns of regular windows; remembered by the set."""
         key = patterns.tobytes()
-        found = self._stacked.get(key)
-        if found is None:
+        known = self._known_pattern_sets.get(key)
+        if known is None:
             weights = np.zeros((len(patterns), int(patterns[:, :2].sum(axis=1).max(initial=1))))
             spread = np.empty(len(patterns))
             for row, (n_positions, n_others, newest, last) in enumerate(patterns.tolist()):
-                one, variance = self._of_pattern((n_positions, n_others, newest, last))
-                weights[row, : len(one)], spread[row] = one, np.sqrt(variance)
-            found = weights, spread
-            if len(self._stacked) < _MOST_SETS:
-                self._stacked[key] = found
-        return found
+                of_pattern, variance = self._weights_of_pattern((n_positions, n_others, newest, last))
+                weights[row, : len(of_pattern)], spread[row] = of_pattern, np.sqrt(variance)
+            known = weights, spread
+            if len(self._known_pattern_sets) < _MOST_SETS:
+                self._known_pattern_sets[key] = known
+        return known
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
-        """All windows at once; streams whose readings overtake each other, or are many, take the plain loop."""
+        """All windows at once; more than one other stream, or readings out of order, take the plain loop."""
         require_readings(self.sensors, samples)
         used = {name: samples[name] for name in self.sensors if name in samples}
         names = [name for name in used if name != self._tracker]
         in_order = all(np.all(stream.time[1:] >= stream.time[:-1]) for stream in used.values())
-        if not in_order or len(names) > 1 or self._tracker not in used or len(self._alike) > 1:
+        if not in_order or len(names) > 1 or self._tracker not in used or len(self._axes_alike) > 1:
             return replay_loop(self, samples, times)
         times = np.asarray(times, dtype=np.float64)
         frames = used[self._tracker]
@@ -306,15 +306,15 @@ class WindowGP:
         return Track(times, mean, sd)
 
     def _spans(self, frames: Samples, others: Samples, times: FloatArray) -> IntArray:
-        found: IntArray = regular.spans(
+        spans: IntArray = regular.spans(
             times, frames.time, frames.arrival, others.time, others.arrival, self.window, self.horizon_s
         )
-        return found
+        return spans
 
     def schedule(self, samples: Mapping[str, Samples], times: FloatArray) -> Schedule:
-        """What is known of the windows at rising `times` before any value is: it depends on when readings arrive alone.
+        """The windows at rising `times`: what depends on the readings' times alone, before any value is known.
 
-        For a tracker and at most one other sensor, the readings of neither overtaking each other.
+        For a tracker and at most one other sensor, whose readings do not overtake each other.
         """
         names = [name for name in self.sensors if name != self._tracker]
         frames = samples[self._tracker]
@@ -324,7 +324,7 @@ class WindowGP:
         if self._regular_names is not None:
             rates = [float(self.sensors[name].rate_hz or 1.0) for name in self._regular_names]
             which, patterns = regular.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
-            weights, _ = self._of_patterns(patterns)
+            weights, _ = self._weights_of_patterns(patterns)
         sensors = (self._index[self._tracker], self._index[names[0]] if names else 0)
         return Schedule(spans, which, weights, sensors, self._prior)
 
@@ -337,11 +337,11 @@ class WindowGP:
         mean: FloatArray,
         sd: FloatArray,
     ) -> IntArray:
-        """Fills the rows of regular windows by the weights of their patterns; returns the rows that are left."""
+        """Fills the rows of regular windows by the weights of their patterns; returns the indices of the other rows."""
         names = self._regular_names or ()
         rates = [float(self.sensors[name].rate_hz or 1.0) for name in names]
         which, patterns = regular.patterns(times, frames.time, others.time, spans, rates[0], rates[-1])
-        weights, spread = self._of_patterns(patterns)
+        weights, spread = self._weights_of_patterns(patterns)
         regular.apply(
             which,
             spans,

@@ -18,19 +18,19 @@ _POSITION = (Term(1.0),)
 
 
 class Covariances(NamedTuple):
-    """The terms whose sum is a covariance, for each pair of s sensors, the last of which is the position itself."""
+    """The terms whose sum is the covariance of two readings, for each pair of s sensors; the last is the position."""
 
     inverse_scale_s2: float
     begins: IntArray  # (s, s + 1): those of sensors i and j are begins[i, j] : begins[i, j + 1]
     shift_s: FloatArray  # (terms,): what is added to the lag
     polynomial: FloatArray  # (terms, 5): coefficients of its rising powers, in the units of the two readings
-    shared: FloatArray  # (s,): variance of what all readings of a sensor are off by
+    shared: FloatArray  # (s,): variance of the bias that all readings of a sensor share
 
 
 def covariances(
     sensors: Sequence[Sequence[Term]], signal_variance_mm2: float, inverse_scale_s2: float, shared: Sequence[float]
 ) -> Covariances:
-    """Those of sensors that observe sums of terms, paper eqs. (3) and (10)."""
+    """The covariances of sensors that each observe a sum of terms: eqs. (3) and (10) of the paper."""
     observed = [*sensors, _POSITION]
     begins = np.zeros((len(observed), len(observed) + 1), np.int64)
     shifts: list[float] = []
@@ -49,11 +49,11 @@ def covariances(
 
 def _polynomial(order: int, inverse_scale_s2: float) -> FloatArray:
     """p with dᵒʳᵈᵉʳ/dtᵒʳᵈᵉʳ exp(−w t²) = p(t)·exp(−w t²), (5,): each derivative makes p′ − 2wt·p of p."""
-    found = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    polynomial = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
     for _ in range(order):
-        slope = np.append(np.arange(1, 5) * found[1:], 0.0)
-        found = slope - 2 * inverse_scale_s2 * np.append(0.0, found[:-1])
-    return found
+        slope = np.append(np.arange(1, 5) * polynomial[1:], 0.0)
+        polynomial = slope - 2 * inverse_scale_s2 * np.append(0.0, polynomial[:-1])
+    return polynomial
 
 
 @compiled
@@ -67,7 +67,7 @@ def covariance(
     other: int,
     lag: float,
 ) -> float:
-    """A reading of one sensor with one of another, or its own, `lag` s before it; without the noise.
+    """Covariance of a reading of sensor `own` with one of sensor `other` taken `lag` s before it; without the noise.
 
     cov(f⁽ⁱ⁾(t), f⁽ʲ⁾(t')) = (−1)ʲ k⁽ⁱ⁺ʲ⁾(t − t') with k of eq. (3), without a factor ½: exact in place of the paper's
     second difference (18). Takes the fields of `Covariances` one by one: handing on the whole costs ten times as much.

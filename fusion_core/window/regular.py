@@ -1,4 +1,4 @@
-"""The compiled steps of the sliding window: which readings stand in it, whether they are regular, their sum."""
+"""Regular windows, compiled: which readings are in a window, whether they keep to the rates, and their weighted sum."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 from fusion_core.window.kernels import IntArray
 
-_REGULAR_NS = 2.0  # stamps in whole ns keep to a rate no better
-_MOST_PATTERNS = 256  # in one batch; windows of others are computed one by one
+_REGULAR_NS = 2.0  # stamps in whole ns cannot keep to a rate more exactly
+_MOST_PATTERNS = 256  # in one batch; windows of further patterns are computed one by one
 
 
 @compiled
 def in_ns(seconds: float) -> int:
-    """To the nearest nanosecond."""
+    """Seconds as whole nanoseconds, rounded to the nearest."""
     return int(np.rint(seconds * 1e9))
 
 
 @compiled
 def is_regular(measured: FloatArray, n_positions: int, tracker_rate_hz: float, other_rate_hz: float) -> bool:
-    """Do all steps of a window, first of positions and then of other readings, keep to the rates?"""
+    """Whether all steps of a window keep to the rates; `measured`: times in s of positions, then of other readings."""
     for row in range(1, len(measured)):
         if row != n_positions:
             rate_hz = tracker_rate_hz if row < n_positions else other_rate_hz
@@ -39,8 +39,11 @@ def spans(
     window: int,
     horizon_s: float,
 ) -> IntArray:
-    """Rows (first, last, begin, end) by time: positions first:last and other readings begin:end are in its window."""
-    found = np.zeros((4, len(times)), np.int64)
+    """Which readings are in the window at each of `times`: positions first:last and other readings begin:end.
+
+    Returns (4, n): first, last, begin and end for each time.
+    """
+    window_spans = np.zeros((4, len(times)), np.int64)
     last, begin, end = 0, 0, 0
     for index in range(len(times)):
         now = times[index]
@@ -57,13 +60,14 @@ def spans(
                 begin -= 1
             while begin < end and other_time[begin] < since:
                 begin += 1
-        found[0, index], found[1, index], found[2, index], found[3, index] = first, last, begin, end
-    return found
+        window_spans[0, index], window_spans[1, index] = first, last
+        window_spans[2, index], window_spans[3, index] = begin, end
+    return window_spans
 
 
 @compiled
 def _runs(time: FloatArray, rate_hz: float) -> IntArray:
-    """How many steps in a row, up to each reading, keep to the rate."""
+    """For each reading, how many steps in a row before it keep to the rate."""
     runs, period_s, run = np.zeros(len(time), np.int64), 1.0 / rate_hz, 0
     for row in range(1, len(time)):
         regular = abs(time[row] - time[row - 1] - period_s) <= _REGULAR_NS * 1e-9
@@ -81,9 +85,14 @@ def patterns(
     tracker_rate_hz: float,
     other_rate_hz: float,
 ) -> tuple[IntArray, IntArray]:
-    """Each window's pattern, −1 where it has none, and the patterns (k, 4): counts, and ages of the newest in ns."""
+    """The pattern of each window (n,), −1 for an irregular one, and the k different patterns (k, 4).
+
+    A pattern is the number of positions and of other readings, and the ages of the newest of each in ns.
+    """
     which, known = np.full(len(times), -1), np.empty((_MOST_PATTERNS, 4), np.int64)
-    follows = np.zeros(_MOST_PATTERNS, np.int64)  # patterns come round in the same order: the one that came after it
+    follows = np.zeros(
+        _MOST_PATTERNS, np.int64
+    )  # the pattern that last came after each: patterns recur in the same order, so this is a good guess
     frame_runs, other_runs = _runs(frame_time, tracker_rate_hz), _runs(other_time, other_rate_hz)
     count, before = 0, 0
     for index in range(len(times)):
@@ -96,9 +105,9 @@ def patterns(
         newest = in_ns(times[index] - frame_time[last - 1])
         newest_other = in_ns(times[index] - other_time[end - 1]) if end > begin else 0
         row = follows[before]
-        if count == 0 or not _is(known[row], last - first, end - begin, newest, newest_other):
+        if count == 0 or not _same_pattern(known[row], last - first, end - begin, newest, newest_other):
             row = 0
-            while row < count and not _is(known[row], last - first, end - begin, newest, newest_other):
+            while row < count and not _same_pattern(known[row], last - first, end - begin, newest, newest_other):
                 row += 1
             if row == _MOST_PATTERNS:
                 continue
@@ -112,7 +121,7 @@ def patterns(
 
 
 @compiled(inline="always")
-def _is(pattern: IntArray, positions: int, others: int, newest: int, newest_other: int) -> bool:
+def _same_pattern(pattern: IntArray, positions: int, others: int, newest: int, newest_other: int) -> bool:
     return bool(
         pattern[2] == newest and pattern[3] == newest_other and pattern[0] == positions and pattern[1] == others
     )
@@ -129,7 +138,10 @@ def apply(
     mean: FloatArray,
     sd: FloatArray,
 ) -> None:
-    """The weighted sums of regular windows into their rows; `frames` and `others` (d, n)."""
+    """Writes the weighted sums of regular windows into their rows of `mean` and `sd` (n, d).
+
+    `frames` and `others` are values (d, m), `weights` (k, m) and `spread` (k,) the weights and SD of each pattern.
+    """
     for index in range(len(which)):
         pattern = which[index]
         if pattern < 0:

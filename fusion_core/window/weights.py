@@ -1,4 +1,4 @@
-"""The weights of a window's readings in the estimate of "now", compiled: eqs. (19) to (24), a Cholesky factor each."""
+"""The weights of a window's readings in the estimate of "now", compiled: eqs. (19) to (24) by a Cholesky factor."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ ZERO, CONSTANT, WINDOW = 0, 1, 2  # the mean of the prior
 
 
 class Prior(NamedTuple):
-    """What is known before any reading; arrays are by sensor, in the order of the estimator's."""
+    """What is assumed before any reading; arrays (sensors,) are in the order of the estimator's sensors."""
 
     signal_variance_mm2: float
     mean: int
     covariances: Covariances
     noise_variance: FloatArray
-    constant: FloatArray  # what each reads of a hand that stays at 1 mm
+    constant: FloatArray  # what each sensor would read if the hand stayed at 1 mm
     is_tracker: npt.NDArray[np.bool_]
 
 
 @compiled
 def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Weights (n, m) and variance (n,) of n windows of m readings at `time` (n, m) in s, when it is `now` (n,).
+    """Weights (n, m) and variance (n,) in mm² of n windows of m readings at `time` (n, m), when it is `now` (n,), in s.
 
-    `sensor` (m,) says whose readings they are.
+    `sensor` (m,) is each reading's sensor, as an index into `prior`.
     """
     count, size = time.shape
     weights, variance = np.empty((count, size)), np.empty(count)
@@ -55,7 +55,7 @@ def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> 
             for row in range(size):
                 if prior.is_tracker[sensor[row]]:
                     weights[index, row] += missing / positions
-        variance[index] = max(variance[index], 0.0)  # round-off may leave less
+        variance[index] = max(variance[index], 0.0)  # round-off may leave it below 0
     return weights, variance
 
 
@@ -63,7 +63,7 @@ def gains(prior: Prior, time: FloatArray, now: FloatArray, sensor: IntArray) -> 
 def _covariances(
     prior: Prior, time: FloatArray, now: float, sensor: IntArray, among: FloatArray, with_now: FloatArray
 ) -> None:
-    """Readings among themselves, the lower triangle, and with the position now."""
+    """Writes the covariances of readings among themselves (lower triangle of `among`) and with the position now."""
     inverse_scale, begins, shift, polynomial, shared = prior.covariances
     noise, position = prior.noise_variance, len(prior.noise_variance)
     for row in range(len(time)):
@@ -76,11 +76,11 @@ def _covariances(
         with_now[row] = covariance(inverse_scale, begins, shift, polynomial, shared, own, position, at - now)
 
 
-@compiled(fastmath={"reassoc", "contract"})  # or sums of products take a step each
+@compiled(fastmath={"reassoc", "contract"})  # otherwise the additions could not run in parallel
 def _solve(
     among: FloatArray, first: FloatArray, second: FloatArray, of_first: FloatArray, of_second: FloatArray
 ) -> None:
-    """Solutions for two right-hand sides by Cholesky's factor; by least squares where round-off leaves none."""
+    """Solves for two right-hand sides by a Cholesky factor; by least squares if `among` is singular to round-off."""
     size = len(first)
     factor = among.copy()
     for row in range(size):

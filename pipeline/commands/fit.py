@@ -62,7 +62,7 @@ def _lines(
                 f"# {row.where}.{row.key} ran off to {_short(row.fitted.value)}, which is no figure of it but a sign"
                 f" that the data contradict the rest of study.yaml; {_short(row.stated)} was kept."
             )
-        elif not row.fitted.told:
+        elif not row.fitted.identified:
             yield (
                 f"# {row.where}.{row.key} cannot be fitted from these data: anything from {_short(row.fitted.low)} to"
                 f" {_short(row.fitted.high)} fits; {_short(row.stated)} was kept."
@@ -101,7 +101,7 @@ def _of_checks(rows: Sequence[Row]) -> Iterator[str]:
 
 def _block(parameters: Sequence[Parameter]) -> Iterator[str]:
     """YAML, section by section, each value with its interval."""
-    fitted = [row for row in parameters if row.taken]
+    fitted = [row for row in parameters if row.usable]
     for section in dict.fromkeys(row.where.split(".", 1)[0] for row in fitted):
         yield f"{section}:"
         for where in dict.fromkeys(row.where for row in fitted if row.where.startswith(f"{section}.")):

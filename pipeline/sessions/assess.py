@@ -1,4 +1,4 @@
-"""One session's facts: accuracy against the reference, agreement with the display, sensor noise, trials, movements."""
+"""One session's figures: accuracy, agreement with the display, sensor noise, trials and movements."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors
 from pipeline.sessions.phone import described
 from pipeline.sessions.recording import SETTLED_S, Recording, Shown
-from pipeline.sessions.trials import coordinates, selections_by_trial, told, with_movements
+from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -29,7 +29,7 @@ _PERCENT_OF_SD = (*range(25, 200, 25), 196, *range(200, 401, 50))  # at which er
 
 
 def run(work: Work) -> Outcome:
-    """One session's accuracy, agreement, noise, trials, selections and movements, and what figures of it show."""
+    """Write one session's accuracy, agreement, noise, trials, selections and movements, and its figures' tables."""
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
@@ -56,8 +56,8 @@ def run(work: Work) -> Outcome:
 
 
 def _tracks(study: Study, table: pa.Table) -> dict[str, Shown]:
-    """What each estimator would have shown."""
-    found = {}
+    """What each estimator would have shown, by its name."""
+    shown = {}
     for name in study.estimators:
         rows = table.filter(pc.equal(table["estimator"], name))
         if len(rows):
@@ -65,8 +65,8 @@ def _tracks(study: Study, table: pa.Table) -> dict[str, Shown]:
                 np.column_stack([rows[column.format(axis)].to_numpy() for axis in study.axes])
                 for column in ("{}_mm", "sd_{}_mm")
             )
-            found[name] = Shown(rows["time_ns"].to_numpy(), mean, sd)
-    return found
+            shown[name] = Shown(rows["time_ns"].to_numpy(), mean, sd)
+    return shown
 
 
 def accuracy_row(
@@ -74,11 +74,11 @@ def accuracy_row(
 ) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
     study, tracker = work.study, work.study.tracker
-    found = _on_grid(study, loaded, named, shown)
-    if named is None or tracker is None or found is None:
+    on_grid = _on_grid(study, loaded, named, shown)
+    if named is None or tracker is None or on_grid is None:
         return None
     name, reference = named
-    time, mean, sd, truth = found
+    time, mean, sd, truth = on_grid
     random = recording.seeded(work.session.id, estimator)
     lag = accuracy.lag(time, mean, reference, random)
     return {
@@ -100,7 +100,10 @@ def accuracy_row(
 def _on_grid(
     study: Study, loaded: Recording, named: tuple[str, Samples] | None, shown: Shown
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """Time in s, mean, stated SD and reference (n, d) on the grid of accuracy; None where there is none."""
+    """Time (n,) in s, mean, stated SD and reference (n, d) in mm, where accuracy is judged; None if nowhere.
+
+    That is from 1 s after the first frame's arrival on, wherever the reference is known.
+    """
     tracker = study.tracker
     if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
         return None
@@ -119,12 +122,12 @@ def calibration_rows(
     reference: tuple[str, Samples] | None,
     tracks: Mapping[str, Shown],
 ) -> Iterator[Row]:
-    """How many errors are within k stated SDs, on the grid of accuracy; nothing for one that states no SD."""
+    """How many errors are within k stated SDs, where accuracy is judged; no rows for an estimator that states no SD."""
     for name, shown in tracks.items():
-        found = _on_grid(study, loaded, reference, shown)
-        if found is None:
+        on_grid = _on_grid(study, loaded, reference, shown)
+        if on_grid is None:
             continue
-        _, mean, sd, truth = found
+        _, mean, sd, truth = on_grid
         error, known = np.abs(mean - truth), sd > 0
         for percent in _PERCENT_OF_SD if known.any() else ():
             within = int(np.sum(error[known] <= percent / 100 * sd[known]))
@@ -150,7 +153,7 @@ def selection_rows(work: Work, events: Sequence[Row]) -> Iterator[Row]:
 
 
 def _agreement(work: Work, loaded: Recording) -> list[Row]:
-    """How far what the log says was shown is from the replay of the estimator it says it showed."""
+    """How far the logged display is from the replay of the estimator that the condition displays."""
     shown = work.study.shown.get(work.session.condition or "")
     if shown is None or loaded.display is None:
         return []
@@ -192,7 +195,7 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pa
 
 
 def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
-    """The longest stretch in which the hand is still, by the reference; by the accelerations where there is none."""
+    """The longest stretch (begin, end) in s in which the hand is still, by the reference, else by the accelerations."""
     if loaded.reference is not None:
         return noise.longest(accuracy.slow_stretches(loaded.reference, shortest_s=1.0))
     name = study.stream_of_kind("acceleration")
@@ -201,7 +204,7 @@ def _still(study: Study, loaded: Recording) -> tuple[float, float] | None:
 
 
 class _Trial(NamedTuple):
-    """A trial: the number it goes by, its start and its first selection as events, and where its target was, in mm."""
+    """A trial: its number, its start and its first selection as events, and its target by axis in mm."""
 
     number: int
     start: Row
@@ -210,7 +213,7 @@ class _Trial(NamedTuple):
 
 
 def _trials(events: Sequence[Row]) -> Iterator[_Trial]:
-    """Each trial; its target is as the selection or, failing that, the start has it."""
+    """Each trial; its target is that of the selection, or of the start where the selection has none."""
     starts, selections = selections_by_trial(events)
     first: dict[int, Row] = {}
     for selection, place in selections:
@@ -259,7 +262,7 @@ def _squared_error(where: Row, target: Row) -> float | None:
 
 def _movements(work: Work, loaded: Recording, events: Sequence[Row]) -> pd.DataFrame:
     """The session's movements from target to target, and the hand's path of each as far as it is known."""
-    trials = told(events, loaded.origin_ns)
+    trials = trial_table(events, loaded.origin_ns)
     if trials.empty:
         return tables.frame("movements", [])
     trials = with_movements(trials)
@@ -276,13 +279,16 @@ def _movements(work: Work, loaded: Recording, events: Sequence[Row]) -> pd.DataF
 
 
 def _hand(study: Study, loaded: Recording) -> Samples | None:
-    """The best that is known of where the hand was: the reference, else what was displayed, else the tracker."""
+    """Where the hand was, as far as is known: the reference, else what was displayed, else the tracker."""
     tracked = loaded.samples[study.tracker] if study.tracker is not None else None
-    return next((one for one in (loaded.reference, loaded.display, tracked) if one is not None and len(one)), None)
+    candidates = (loaded.reference, loaded.display, tracked)
+    return next((samples for samples in candidates if samples is not None and len(samples)), None)
 
 
 def _of_path(study: Study, path: movements.Path, before: FloatArray, target: FloatArray) -> Row:
-    """What a trial's path says: the straight way is from where the hand was, the task's way from target to target."""
+    """The figures of a trial's path. The shortest way starts where the hand was, or along the task's path at the
+    previous target.
+    """
     line = np.array(study.task.path_mm if study.task is not None else ())
     place = dict(zip("xyz", zip(before, target, strict=True), strict=True))
     axes: list[str] = [axis for axis in study.axes if np.isfinite(place[axis][1])]

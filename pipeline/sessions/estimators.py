@@ -38,9 +38,9 @@ def sensors(study: Study) -> dict[str, Sensor]:
 
 
 def build_estimator(study: Study, name: str, where: str | None = None) -> Estimator:
-    """The study's estimator of that name; PipelineError that says which key or value is wrong.
+    """The study's estimator of that name. Raises PipelineError, saying which key or value is wrong.
 
-    `where` is where its settings stand, if not in study.yaml.
+    `where` names the place of its settings, if that is not study.yaml.
     """
     settings = study.estimators[name]
     where = where or f"study.yaml: estimators.{name}"
@@ -62,7 +62,7 @@ def build_estimator(study: Study, name: str, where: str | None = None) -> Estima
 
 @cache
 def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
-    """What turns a parameter of study.yaml into the type its dataclass states."""
+    """For each parameter, what turns a value of study.yaml into the type in the estimator's dataclass."""
     from typing import get_type_hints
 
     strict = ConfigDict(allow_inf_nan=False)

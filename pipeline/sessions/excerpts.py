@@ -1,4 +1,4 @@
-"""What figures of one session show: its liveliest seconds, how far estimators are ahead, and what arrived when."""
+"""Tables for figures of one session: the seconds with most movement, the estimators' lead, and what arrived when."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _STRETCH_NS = 1_000_000_000  # at the least
 
 
 def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
-    """The table `excerpts`: the stretch and axis in which the tracker moves most; `raw` is the tracker once more."""
+    """The table `excerpts`: the stretch and axis in which the tracker moves most. `raw`, the tracker, is left out."""
     name = study.stream_of_kind("position")
     if name is None or len(loaded.samples[name]) == 0:
         return tables.frame("excerpts", [])
@@ -51,15 +51,15 @@ def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, 
 def _cut(
     begin: float, kind: str, name: str, time: FloatArray, value: FloatArray, sd: FloatArray | None = None
 ) -> pd.DataFrame:
-    """What of a signal is in the stretch."""
+    """The part of a signal that is in the stretch."""
     inside = (time >= begin) & (time <= begin + EXCERPT_S)
     spread = np.full(len(time), np.nan) if sd is None else sd
-    found = {"time_s": time[inside], "value": value[inside], "sd": spread[inside]}
-    return pd.DataFrame(found).assign(kind=kind, name=name)
+    columns = {"time_s": time[inside], "value": value[inside], "sd": spread[inside]}
+    return pd.DataFrame(columns).assign(kind=kind, name=name)
 
 
 def _liveliest(tracker: Samples) -> tuple[int, float]:
-    """Axis, and beginning of the stretch, in which the tracker covers most ground."""
+    """The axis and the begin (s) of the stretch with the largest range of positions."""
     best = (-1.0, 0, float(tracker.arrival[0]))
     last = max(tracker.arrival[-1] - EXCERPT_S, tracker.arrival[0])
     for begin in np.arange(tracker.arrival[0], last + 1e-9, 0.5):
@@ -74,7 +74,7 @@ def _liveliest(tracker: Samples) -> tuple[int, float]:
 
 
 def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
-    """The table `lead_curves`: each estimator's cross-correlation with the tracker, within half a second."""
+    """The table `lead_curves`: each estimator's cross-correlation with the tracker, at leads within ±0.5 s."""
     name = study.tracker
     parts = [tables.frame("lead_curves", [])]
     if name is None or len(loaded.samples[name]) == 0:
@@ -93,7 +93,7 @@ def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[s
 
 
 def rates(ingested: Path) -> Iterator[dict[str, Any]]:
-    """Rows of `stream_rates`: what arrived of each stream, stretch by stretch, over the whole session."""
+    """Rows of `stream_rates`: how many messages of each stream arrived in each stretch of the session."""
     columns = ["session", "stream", "arrival_ns"]
     arrived = pd.concat([tables.read(name, ingested)[columns] for name in ("positions", "readings", "imu")])
     if arrived.empty:

@@ -1,4 +1,4 @@
-"""What a study's recordings say its parameters are: fitted on the first part of each session, scored on the rest."""
+"""Fits a study's parameters to its recordings: on the first part of each session; scored on the rest."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ import numpy as np
 
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, WindowGP
 from fusion_core.accuracy import interpolate, rmse
-from fusion_core.likelihood import Fitted, foretold, foretold_by, maximise
+from fusion_core.likelihood import Fitted, log_likelihood_by_replay, maximise, position_log_likelihood
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
 from pipeline.sessions.recording import SETTLED_S, Recording
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 
-_IMU_PRIOR = 0.7  # SD of the logarithm: a factor of two. Smooth motion alone cannot tell an accelerometer's noise
+_IMU_PRIOR = (
+    0.7  # SD of the logarithm: a factor of two. A smooth motion alone does not determine an accelerometer's noise
+)
 _FREE = float("inf")
 _FARTHEST = 100.0  # times what is stated, or a hundredth of it
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One fitted figure: where it stands in study.yaml, what stands there now, and what the data say."""
+    """One fitted parameter: its section and key in study.yaml, the value stated there, and the fitted one."""
 
     where: str
     key: str
@@ -33,14 +35,14 @@ class Parameter:
 
     @property
     def at_bound(self) -> bool:
-        """Has the search run off, so that it says nothing but that the data are not as the model has them?"""
+        """Whether the search ran away from the stated value, which only shows that the model does not fit the data."""
         farthest = _FARTHEST if self.where.startswith("streams.") else _FARTHEST**2  # variances among them
         return not 1 / farthest < self.fitted.value / self.stated < farthest
 
     @property
-    def taken(self) -> bool:
-        """Is it to be believed?"""
-        return self.fitted.told and not self.at_bound
+    def usable(self) -> bool:
+        """Whether the data determine it and the search did not run away."""
+        return self.fitted.identified and not self.at_bound
 
 
 @dataclass(frozen=True)
@@ -96,22 +98,22 @@ def _begin(study: Study, loaded: Recording) -> float:
 
 
 def _part(samples: Mapping[str, Samples], since: float, until: float) -> dict[str, Samples]:
-    """What arrived in a stretch."""
-    found = {}
+    """The samples that arrived from `since` until `until`, in s."""
+    part = {}
     for name, stream in samples.items():
         kept = (stream.arrival >= since) & (stream.arrival < until)
         rotation = None if stream.rotation is None else stream.rotation[kept]
-        found[name] = Samples(stream.time[kept], stream.arrival[kept], stream.value[kept], rotation)
-    return found
+        part[name] = Samples(stream.time[kept], stream.arrival[kept], stream.value[kept], rotation)
+    return part
 
 
 def _late(study: Study, samples: Mapping[str, Samples], latency_s: float | None) -> dict[str, Samples]:
-    """With the tracker's readings measured as long before their stamps as `latency_s` says."""
-    found, name = dict(samples), study.tracker or ""
+    """The samples with the tracker's times of measurement shifted to a latency of `latency_s`; None: as stated."""
+    shifted, name = dict(samples), study.tracker or ""
     if latency_s is not None:
         by = latency_s - study.sensor_streams[name].latency_s
-        found[name] = replace(found[name], time=found[name].time - by)
-    return found
+        shifted[name] = replace(shifted[name], time=shifted[name].time - by)
+    return shifted
 
 
 def _sensors(study: Study, parts: Sequence[Mapping[str, Samples]]) -> list[Parameter]:
@@ -133,41 +135,41 @@ def _sensors(study: Study, parts: Sequence[Mapping[str, Samples]]) -> list[Param
         latency = float(values[2]) if len(wanted) > 2 else None
         used = {name: changed[name] for name in plain.sensors}
         filter_ = replace(plain, sensors=used, jerk_psd_mm2_s5=float(values[-2]), bias_walk_mm_s2_per_sqrt_s=values[-1])
-        return np.concatenate([foretold(filter_, _late(study, part, latency)) for part in parts])
+        return np.concatenate([position_log_likelihood(filter_, _late(study, part, latency)) for part in parts])
 
-    found = maximise(blocks, [row[2] for row in wanted] + own, [row[3] for row in wanted] + [_FREE, _FREE])
-    return [Parameter(where, key, value, one) for (where, key, value, _), one in zip(wanted, found, strict=False)]
+    fitted = maximise(blocks, [row[2] for row in wanted] + own, [row[3] for row in wanted] + [_FREE, _FREE])
+    return [Parameter(where, key, value, fit) for (where, key, value, _), fit in zip(wanted, fitted, strict=False)]
 
 
 def _plain(study: Study) -> FusionKalman:
-    """The study's first fusion_kalman, or one of defaults, without gate and adaptation: likelihood needs one model."""
+    """The study's first fusion_kalman, or a default one, without gate and adaptation: a likelihood needs one model."""
     used = {n: s for n, s in sensors(study).items() if not any(term.at_s for term in s.terms)}
     built = (build_estimator(study, name) for name in study.estimators)
-    found = next((one for one in built if isinstance(one, FusionKalman)), FusionKalman(used))
-    return replace(found, gate_sd=0.0, adaptation=0.0, path="event_time", prior="wiener")
+    first = next((estimator for estimator in built if isinstance(estimator, FusionKalman)), FusionKalman(used))
+    return replace(first, gate_sd=0.0, adaptation=0.0, path="event_time", prior="wiener")
 
 
 def _with(stated: Mapping[str, Sensor], fitted: Sequence[Parameter]) -> dict[str, Sensor]:
     """The sensors with their fitted noise."""
-    found = dict(stated)
+    with_fitted = dict(stated)
     for row in fitted:
         name = row.where.removeprefix("streams.")
-        if row.key.startswith("noise") and row.taken:
-            found[name] = replace(found[name], noise_sd=row.fitted.value)
-    return found
+        if row.key.startswith("noise") and row.usable:
+            with_fitted[name] = replace(with_fitted[name], noise_sd=row.fitted.value)
+    return with_fitted
 
 
 def _estimator(
     name: str, stated: Estimator, used: dict[str, Sensor], parts: Sequence[Mapping[str, Samples]]
 ) -> tuple[list[Parameter], Estimator]:
-    """The fitted parameters of one estimator, and the estimator with those that the data tell."""
+    """The fitted parameters of one estimator, and the estimator with those that the data determine."""
     where = f"estimators.{name}"
     if isinstance(stated, FusionKalman) and stated.prior == "wiener":
         plain = replace(stated, sensors=used, gate_sd=0.0, adaptation=0.0, path="event_time")
         keys = ["jerk_psd_mm2_s5", "bias_walk_mm_s2_per_sqrt_s"]
-        score: Any = foretold
+        score: Any = position_log_likelihood
     elif isinstance(stated, WindowGP):
-        plain, score = replace(stated, sensors=used), foretold_by  # type: ignore[assignment]
+        plain, score = replace(stated, sensors=used), log_likelihood_by_replay  # type: ignore[assignment]
         keys = ["signal_variance_mm2", "inverse_scale_s2"]
     else:
         return [], stated
@@ -177,10 +179,10 @@ def _estimator(
         tried = replace(plain, **dict(zip(keys, map(float, values), strict=True)))  # type: ignore[arg-type]
         return np.concatenate([score(tried, part) for part in parts])
 
-    found = maximise(blocks, start, [_FREE] * len(keys))
-    rows = [Parameter(where, key, value, one) for key, value, one in zip(keys, start, found, strict=True)]
-    told = {row.key: row.fitted.value for row in rows if row.taken}
-    return rows, replace(stated, sensors=used, **told)  # type: ignore[arg-type]
+    fitted = maximise(blocks, start, [_FREE] * len(keys))
+    rows = [Parameter(where, key, value, fit) for key, value, fit in zip(keys, start, fitted, strict=True)]
+    identified = {row.key: row.fitted.value for row in rows if row.usable}
+    return rows, replace(stated, sensors=used, **identified)  # type: ignore[arg-type]
 
 
 def _scores(
@@ -191,7 +193,7 @@ def _scores(
     times: FloatArray,
     samples: Mapping[str, Samples],
 ) -> list[Score]:
-    """Each estimator as stated and as fitted, on `samples` of the fitted latency, at `times` that were not fitted."""
+    """Each estimator's RMSE as stated and as fitted, at `times` after the fitted part; with the fitted latency."""
     if loaded.reference is None:
         return []
     truth = interpolate(loaded.reference, times)
@@ -207,7 +209,7 @@ def _scores(
 
 
 def _gravity(recordings: Mapping[str, Recording], first_s: float) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Minus the mean specific force in the tracker's frame: over a session a hand stays where it is."""
+    """Gravity by phone: minus the mean specific force in the tracker's frame, as a hand's mean acceleration is zero."""
     means: dict[str, list[FloatArray]] = {}
     for loaded in recordings.values():
         for name, phone in loaded.phones.items():

@@ -1,4 +1,4 @@
-"""A log to tables, decoded once: the only place that turns SI into the house's millimetres."""
+"""Decodes a log into tables, once. This is the only place that turns SI units into millimetres."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def run(work: Work) -> Outcome:
     if study.events is not None:
         wanted.append(Wanted(study.events.topic, "events"))
     log = read_log(session.path, wanted)
-    participant, condition = _who(session, log, study)
+    participant, condition = _participant_and_condition(session, log, study)
     in_part = list(log.faults)
     quality: list[Row] = []
     left_out: list[Row] = []
@@ -88,26 +88,32 @@ def run(work: Work) -> Outcome:
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
 
-def _who(session: Session, log: Log, study: Study) -> tuple[str, str]:
-    """Participant and condition, by the file's name and the log's facts, which must agree."""
-    said: dict[str, str] = {}
+def _participant_and_condition(session: Session, log: Log, study: Study) -> tuple[str, str]:
+    """Participant and condition, by the file's name and the log's metadata, which must agree.
+
+    Raises SessionError where they do not, or where neither says.
+    """
+    ids: dict[str, str] = {}
     for what, by_name in (("participant", session.participant), ("condition", session.condition)):
         fact = log.facts.get(what)
         by_fact = unicodedata.normalize("NFC", fact) if fact else None
         if by_name and by_fact and by_name != by_fact:
             raise SessionError(f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them')
-        found = by_name or by_fact
-        if not found:
+        known = by_name or by_fact
+        if not known:
             raise SessionError(f"neither its name nor its metadata says which {what} it is")
-        said[what] = found
-    if said["condition"] not in study.conditions:
-        hint = did_you_mean(said["condition"], study.conditions)
-        raise SessionError(f'condition "{said["condition"]}" is not in study.yaml{hint}')
-    return said["participant"], said["condition"]
+        ids[what] = known
+    if ids["condition"] not in study.conditions:
+        hint = did_you_mean(ids["condition"], study.conditions)
+        raise SessionError(f'condition "{ids["condition"]}" is not in study.yaml{hint}')
+    return ids["participant"], ids["condition"]
 
 
 def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings | None:
-    """The stream's readings. A sensor that is missing, empty, unreadable or set back ends the session's use."""
+    """The stream's readings; None for a stream that cannot be used, with the reason in `in_part`.
+
+    Raises SessionError where a sensor is missing, empty or unreadable, or its clock was set back.
+    """
     readings = log.topics.get(stream.topic)
     fault = None
     if readings is None:
@@ -118,7 +124,9 @@ def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings
     else:
         back = clock_went_back(readings)
         if back is not None:
-            fault = f'stream "{name}": the clock went backwards by {back:.3f} s, so times cannot be told'
+            fault = (
+                f'stream "{name}": the clock went backwards by {back:.3f} s, so the times of its messages are unknown'
+            )
     if fault is None:
         return readings
     if stream.kind in _NEEDED:
@@ -128,7 +136,7 @@ def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings
 
 
 def _nearest(topic: str, log: Log) -> str:
-    """The topic of the log that was probably meant, and all that there are."""
+    """The end of an error: the topic of the log that was probably meant, and all topics that it has."""
     names = sorted(log.types or log.topics)
     if not names:
         return "; it has no topic at all"
@@ -139,7 +147,7 @@ def _nearest(topic: str, log: Log) -> str:
 
 
 def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
-    """Without readings that are not finite or of another day, and a note of what was left out or will be."""
+    """The readings that are finite and of the same day as the others, and notes about those left out or late."""
     width = 3 if stream.kind != "acceleration" else 6
     finite = np.isfinite(readings.values[:, :width]).all(axis=1)
     notes = [] if finite.all() else [f"{int((~finite).sum())} samples left out: NaN or infinite"]
@@ -169,7 +177,7 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
 
 
 def _table(session: str, name: str, stream: Stream, readings: Readings) -> pa.Table:
-    """A stream's rows, in order of arrival, in millimetres."""
+    """A stream's rows of its table, in order of arrival, in millimetres."""
     order = np.lexsort((readings.stamp_ns, readings.arrival_ns))
     columns: dict[str, Any] = {
         "session": session,

@@ -1,4 +1,4 @@
-"""What a log's topics could be in a study: which stream each is, what study.yaml would say of it, and its checks."""
+"""Suggests how a log's topics could be used in a study: as which streams, with which keys in study.yaml; and checks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.sessions.checks import Finding, checked
-from pipeline.sessions.checks.agreement import told
+from pipeline.sessions.checks.agreement import see_one_movement
 from pipeline.sessions.checks.force import gravity_seen_mm_s2
 from pipeline.sessions.checks.noise import noise_sd
 from pipeline.sessions.checks.of_log import of_log
@@ -27,15 +27,15 @@ _NEEDS: Mapping[Content, str] = {
     "acceleration": "sensor_msgs/msg/Imu",
     "events": "steadyhand.Event in JSON",
 }
-_USABLE_SHARE = 0.5  # of a topic's messages: with fewer that can be read it is something else
+_USABLE_SHARE = 0.5  # of a topic's messages: if fewer can be read, the topic holds something else
 _LATE_MIN_S = 0.03
 _G_MM_S2 = 9806.65
-_ALONG_DEG = 5.0  # gravity that is so near to an axis is along it
+_ALONG_DEG = 5.0  # gravity this close to an axis is taken to be along it
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic: its type, what it is usable as, else why not, and its readings if it is usable."""
+    """A topic: its type, the content it can be used as and its readings; or `why_not` if it cannot be used."""
 
     name: str
     type: MessageType
@@ -48,7 +48,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Inspection:
-    """The topics of a log, the streams it could have in study.yaml (as its keys and values), and what is checked."""
+    """The topics of a log, the streams it could have in study.yaml (as keys and values), and the checks' findings."""
 
     topics: tuple[Topic, ...]
     streams: Mapping[str, Mapping[str, Any]]
@@ -57,12 +57,12 @@ class Inspection:
 
     @property
     def usable(self) -> bool:
-        """Is there anything that a study could use?"""
+        """Whether there is anything that a study could use."""
         return bool(self.streams) or self.events is not None
 
 
 def inspected(path: Path, counted: Log) -> Inspection:
-    """A log looked at again, with what its topics can be read as; `counted` is the log with nothing wanted."""
+    """Reads a log again, now with its topics decoded; `counted` is the log as read without decoding."""
     decoded = _decoded(path, counted)
     topics = tuple(_topic(name, counted, decoded.get(name)) for name in sorted(counted.types))
     streams = _streams(topics)
@@ -75,7 +75,7 @@ def inspected(path: Path, counted: Log) -> Inspection:
 
 
 def _decoded(path: Path, counted: Log) -> dict[str, tuple[Content, Readings]]:
-    """Each topic as the content that its type has, else as the first that most of its messages can be read as."""
+    """Each topic's readings, as the content of its type or else the first that most of its messages can be read as."""
     found: dict[str, tuple[Content, Readings]] = {}
     for content in _CONTENTS:
         wanted = [
@@ -106,7 +106,7 @@ def _topic(name: str, counted: Log, decoded: tuple[Content, Readings] | None) ->
 
 
 def _streams(topics: Iterable[Topic]) -> dict[str, dict[str, Any]]:
-    """Names and kinds by what the topics are called: a reference, a display, or else the tracker and the phone."""
+    """Streams by the topics' names: a reference or display if the name says so, otherwise the tracker and the phone."""
     found: dict[str, dict[str, Any]] = {}
     for topic in topics:
         if topic.content not in ("position", "acceleration"):
@@ -136,7 +136,7 @@ def _study(streams: Mapping[str, Mapping[str, Any]], events: str | None) -> Stud
 
 
 def _measured(streams: dict[str, dict[str, Any]], recorded: Recorded) -> dict[str, dict[str, Any]]:
-    """With gravity, noise and the tracker's lag as this log has them."""
+    """The streams with gravity, the noise and the tracker's lag as measured in this log."""
     for imu in recorded.imus:
         streams[imu.name]["gravity_mm_s2"] = _gravity(imu)
     motion, tracker = recorded.motion, recorded.tracker
@@ -144,7 +144,7 @@ def _measured(streams: dict[str, dict[str, Any]], recorded: Recorded) -> dict[st
         measured = noise_sd(positions.times, positions.value_mm) if positions.kind == "position" else None
         if measured:
             streams[positions.name]["noise_sd_mm"] = float(f"{measured:.2g}")
-    if tracker is not None and motion is not None and told(motion) and motion.lag_s.value > _LATE_MIN_S:
+    if tracker is not None and motion is not None and see_one_movement(motion) and motion.lag_s.value > _LATE_MIN_S:
         streams[tracker.name] |= {"stamp": "arrival", "latency_s": round(motion.lag_s.value, 2)}
     elif tracker is not None:
         streams[tracker.name] |= {"stamp": "measurement"}
@@ -152,7 +152,7 @@ def _measured(streams: dict[str, dict[str, Any]], recorded: Recorded) -> dict[st
 
 
 def _gravity(imu: Imu) -> list[float]:
-    """Along the nearest axis where it is near to one, 9806.65 mm/s² long; down z where the log does not tell."""
+    """Gravity, 9806.65 mm/s² long: along the nearest axis if close to one; along −z if the log does not show it."""
     seen = gravity_seen_mm_s2(imu)
     if seen is None or not np.any(seen):
         return [0.0, 0.0, -_G_MM_S2]

@@ -10,9 +10,9 @@ import numpy.typing as npt
 from pipeline.statistics.arrays import FloatArray
 
 CUTOFF_HZ = 5.0
-GAP_S = 1.0 / CUTOFF_HZ  # what lies further apart than a period of the fastest motion that is kept is not one path
+GAP_S = 1.0 / CUTOFF_HZ  # a longer gap splits a path: it is a period of the fastest motion that is kept
 SEQUENCE_MIN = 5
-PAUSE_MAX_S = 1.0  # a trial that begins later after the last selection need not begin where that was
+PAUSE_MAX_S = 1.0  # if a trial begins later after the last selection, the hand may have moved in between
 _STEP_S = 0.01
 _PASSES = 2  # there and back
 _SETTLING = 50  # steps by which a path is mirrored at its ends before it is filtered
@@ -24,10 +24,10 @@ _PROMINENCE_MIN = 0.1  # of the trial's peak speed
 
 @dataclass(frozen=True)
 class Aimed:
-    """Movements (n,) from one target to the next, in mm; NaN where one cannot be told.
+    """Movements (n,) from one target to the next, in mm; NaN where a figure is unknown.
 
-    `amplitude_mm` between the targets, `moved_mm` what was covered along that axis, `along_mm` how far along it the
-    selection was beyond the target.
+    `amplitude_mm` is the distance between the targets, `moved_mm` the distance covered along that axis, and `along_mm`
+    how far along it the selection was beyond the target.
     """
 
     amplitude_mm: FloatArray
@@ -46,10 +46,10 @@ class Path:
 def aimed(target_mm: FloatArray, selected_mm: FloatArray, left_mm: FloatArray, pause_s: FloatArray) -> Aimed:
     """The movements of successive trials: targets, selections, and where each trial was left, all (n, d).
 
-    The axis of a movement leads from the target before to its own (ISO 9241-411). The first of a session, and one whose
-    target is where the last one was, have none. `pause_s` (n,) lies between the trial before and this; after more than
-    1 s it is not known where the movement began. A coordinate is NaN where it is missing; an axis on which this target
-    has none does not count.
+    The axis of a movement goes from the previous target to its own (ISO 9241-411). The first movement of a session, and
+    one whose target is where the previous one was, have none. `pause_s` (n,) is the time between the previous trial and
+    this one; after more than 1 s it is unknown where the movement began. A missing coordinate is NaN; an axis on which
+    the target has no coordinate does not count.
     """
     before, left = previous(target_mm), previous(left_mm)
     counts = ~np.isnan(target_mm)
@@ -78,7 +78,7 @@ def throughputs(
 
     W_e = 4.133 SD of the deviations along the axis, A_e the mean distance covered along it, ID_e = log₂(A_e/W_e + 1),
     and throughput ID_e over the mean movement time (ISO 9241-411; Soukoreff and MacKenzie 2004, equations 2 to 5). A
-    sequence without spread, distance or time has none.
+    sequence without spread, distance or time has no throughput.
     """
     figures = np.column_stack([amplitude_mm, moved_mm, along_mm, duration_s])
     known = figures[np.isfinite(figures).all(axis=1)]
@@ -92,7 +92,7 @@ def throughputs(
 
 
 def _of_one_amplitude(amplitude_mm: FloatArray) -> list[npt.NDArray[np.intp]]:
-    """The rows of each sequence: the most amplitudes within 10 % of one, then the most of what is left."""
+    """The rows of each sequence: the largest set of amplitudes within 10 % of one, then the largest of the others."""
     order = np.argsort(amplitude_mm, kind="stable")
     found = []
     while len(order):
@@ -107,10 +107,10 @@ def _of_one_amplitude(amplitude_mm: FloatArray) -> list[npt.NDArray[np.intp]]:
 
 
 def smoothed(time_s: FloatArray, position_mm: FloatArray) -> list[Path]:
-    """The hand's path (n,), (n, d) without what is faster than 5 Hz, one for each stretch without a gap over 0.2 s.
+    """The hand's paths, low-passed at 5 Hz, one for each stretch without a gap over 0.2 s; from (n,) s and (n, d) mm.
 
-    A Butterworth filter of second order, forwards and backwards and so without phase, whose cut-off is corrected for
-    the two passes (Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2), at 100 Hz.
+    By a second-order Butterworth filter at 100 Hz, applied forwards and backwards and so without phase, whose cut-off
+    is corrected for the two passes (Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2).
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -129,7 +129,7 @@ def smoothed(time_s: FloatArray, position_mm: FloatArray) -> list[Path]:
 
 
 def between(paths: list[Path], begin_s: float, end_s: float) -> Path | None:
-    """The path from one instant to another; None where a gap over 0.2 s lies in it or at its ends."""
+    """The path from one instant (s) to another; None where there is a gap over 0.2 s in it or at its ends."""
     for path in paths:
         begin, end = max(begin_s, float(path.time_s[0])), min(end_s, float(path.time_s[-1]))
         if begin - begin_s <= GAP_S and end_s - end <= GAP_S and begin < end:
@@ -146,7 +146,7 @@ def length_mm(points_mm: FloatArray) -> float:
 
 
 def route(line_mm: FloatArray, begin_mm: FloatArray, end_mm: FloatArray) -> FloatArray:
-    """The points (k, d) of the way along a line (n, d), from where it is nearest to one point to where to another."""
+    """The part (k, d) of a line (n, d) between its points nearest to `begin_mm` (d,) and to `end_mm` (d,)."""
     (leg, share), (last, end_share) = _place(line_mm, begin_mm), _place(line_mm, end_mm)
     if (leg, share) > (last, end_share):
         return route(line_mm, end_mm, begin_mm)[::-1]
@@ -155,7 +155,7 @@ def route(line_mm: FloatArray, begin_mm: FloatArray, end_mm: FloatArray) -> Floa
 
 
 def _place(line_mm: FloatArray, point_mm: FloatArray) -> tuple[int, float]:
-    """The leg of a line that is nearest to a point, the first of several, and at which share of that leg."""
+    """The line's leg that is nearest to a point (the first, if several are), and the share of the leg before it."""
     begin, leg = line_mm[:-1], np.diff(line_mm, axis=0)
     square = np.maximum(np.sum(leg**2, axis=1), np.finfo(float).tiny)
     share = np.clip(np.sum((point_mm - begin) * leg, axis=1) / square, 0.0, 1.0)
@@ -165,14 +165,14 @@ def _place(line_mm: FloatArray, point_mm: FloatArray) -> tuple[int, float]:
 
 
 def _point(line_mm: FloatArray, leg: int, share: float) -> FloatArray:
-    found: FloatArray = line_mm[leg] + share * (line_mm[leg + 1] - line_mm[leg])
-    return found
+    point: FloatArray = line_mm[leg] + share * (line_mm[leg + 1] - line_mm[leg])
+    return point
 
 
 def overshoot_mm(position_mm: FloatArray, route_mm: FloatArray) -> float:
     """How far the hand (n, d) was beyond the end of a route (k, d), along its last leg; 0 if never, NaN without a leg.
 
-    Only what comes after the hand was nearest to the last leg's begin counts, unless the route has no other leg.
+    If the route has several legs, only positions after the hand was nearest to the begin of the last leg count.
     """
     distinct = np.concatenate([[True], np.linalg.norm(np.diff(route_mm, axis=0), axis=1) > _ROUND_OFF])
     points = route_mm[distinct]

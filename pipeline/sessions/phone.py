@@ -1,4 +1,4 @@
-"""A phone's readings as accelerations in the tracker's frame: orientation known, carried on, or found; mounting."""
+"""A phone's readings as accelerations in the tracker's frame, by the logged orientation or by one found from motion."""
 
 from __future__ import annotations
 
@@ -7,8 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fusion_core import Samples, Sensor
-from fusion_core.phone.calibration import Body, Calibration, calibrate, mounted
-from fusion_core.phone.orientation import carried, headed, heading, level, nearest, rotate, rotations
+from fusion_core.phone.calibration import Body, Calibration, calibrate, with_mounting
+from fusion_core.phone.orientation import (
+    carry_forward,
+    heading,
+    level_rotation,
+    nearest,
+    rotate,
+    rotations,
+    turn_about_vertical,
+)
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns
@@ -23,10 +31,10 @@ IN_LOG, CARRIED, FOUND = "in_log", "carried", "found"
 
 @dataclass(frozen=True)
 class Phone:
-    """Accelerations of known orientation, and the sensor's counts by where that came from; `left_out` had none.
+    """Accelerations whose orientation is known; `origins` counts them by where it came from, `left_out` the others.
 
-    From `mounted_from_s` on the mounting is known: `calibrated` is the body with it, and `lever_arm_mm` (3,) leads
-    from the accelerometer to the point that the tracker sees.
+    From `mounted_from_s` on the mounting is known: `calibrated` is the body with it, and `lever_arm_mm` (3,) goes from
+    the accelerometer to the point that the tracker sees.
     """
 
     body: Body
@@ -62,17 +70,17 @@ def phone(rows: Columns, times: tuple[FloatArray, FloatArray], sensor: Sensor) -
 
 
 def aligned(imu: Imu, logged: FloatArray, stream: AccelerationStream, tracker: Tracker | None) -> Phone:
-    """Accelerations of known orientation, by those in the log (n, 4), NaN where unknown, or found with the tracker.
+    """A phone's accelerations with their orientations: `logged` (n, 4), NaN where unknown, or found from the motion.
 
-    Causal: each acceleration is what was known when it arrived.
+    Causal: each acceleration is based on what was known when it arrived.
     """
     gravity = np.array(stream.gravity_mm_s2)
     in_log, rising = np.isfinite(logged).all(axis=1), bool(np.all(np.diff(imu.time) >= 0))
     origin = CARRIED if in_log.any() else FOUND
     if origin == FOUND:
-        turned = _found(imu, gravity, tracker)
+        turned = _orientation_from_motion(imu, gravity, tracker)
     else:
-        turned = carried(imu.time, logged, imu.gyroscope_rad_s) if rising else logged
+        turned = carry_forward(imu.time, logged, imu.gyroscope_rad_s) if rising else logged
     known = np.isfinite(turned).all(axis=1)
     origins = {IN_LOG: int(in_log.sum()), origin: int((known & ~in_log).sum())}
     rotation = rotations(turned[known]) if known.any() else np.empty((0, 3, 3))
@@ -80,18 +88,18 @@ def aligned(imu: Imu, logged: FloatArray, stream: AccelerationStream, tracker: T
     return _with_mounting(Phone(body, origins, int((~known).sum())), stream, imu.sensor, tracker)
 
 
-def _found(imu: Imu, gravity: FloatArray, tracker: Tracker | None) -> FloatArray:
-    """Orientations (n, 4) where a log has none: tilt by VQF, heading from the motion; NaN until it is known."""
+def _orientation_from_motion(imu: Imu, gravity: FloatArray, tracker: Tracker | None) -> FloatArray:
+    """Orientations (n, 4) for a log without any: tilt by VQF, heading from the motion; NaN until both are known."""
     unknown = np.full((len(imu.time), 4), np.nan)
     if tracker is None or len(imu.time) < 2 or np.any(np.diff(imu.time) <= 0) or not len(tracker[0]):
         return unknown
     tilted = _tilt(imu)
-    up, down = level(gravity), np.array([0.0, 0.0, -float(np.linalg.norm(gravity))])
+    up, down = level_rotation(gravity), np.array([0.0, 0.0, -float(np.linalg.norm(gravity))])
     upright = Samples(imu.time, imu.arrival, rotate(tilted, imu.force_mm_s2) + down)
     positions = replace(tracker[0], value=rotate(up * np.array([-1.0, -1.0, -1.0, 1.0]), tracker[0].value))
     angle, sd = heading(positions, tracker[1], upright, imu.sensor)
     known = sd < _HEADING_SD_RAD
-    unknown[known] = _turned(up, headed(tilted[known], angle[known]))
+    unknown[known] = _turned(up, turn_about_vertical(tilted[known], angle[known]))
     return unknown
 
 
@@ -103,9 +111,10 @@ def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
 
 
 def _tilt(imu: Imu) -> FloatArray:
-    """Orientations (n, 4) but for the heading, by VQF (Laidig and Seel 2023), which wants a regular grid.
+    """Orientations (n, 4) up to the heading, by VQF (Laidig and Seel 2023), which needs a regular grid.
 
-    Each is that of the newest grid point, carried on to the reading by the gyroscope, so that none sees the future.
+    Each is that of the newest grid point before the reading, extrapolated by the gyroscope, so that none depends on
+    later readings.
     """
     from scipy.spatial.transform import Rotation
     from vqf import VQF
@@ -125,7 +134,7 @@ def _tilt(imu: Imu) -> FloatArray:
 
 
 def _with_mounting(found: Phone, stream: AccelerationStream, sensor: Sensor, tracker: Tracker | None) -> Phone:
-    """With what study.yaml says of the mounting, or what the first `calibrate_s` of the session do."""
+    """The phone with its mounting, as stated in study.yaml or as learned in the session's first `calibrate_s`."""
     from scipy.spatial.transform import Rotation
 
     body = found.body
@@ -136,7 +145,7 @@ def _with_mounting(found: Phone, stream: AccelerationStream, sensor: Sensor, tra
         learned = calibrate(*tracker, body, sensor, until_s)
         if learned is None:
             return found
-        turned = replace(body, rotation=mounted(body.rotation, learned.mounting_rad))
+        turned = replace(body, rotation=with_mounting(body.rotation, learned.mounting_rad))
         return replace(
             found, calibrated=turned, lever_arm_mm=learned.lever_arm_mm, mounted_from_s=until_s, calibration=learned
         )

@@ -1,4 +1,4 @@
-"""A session's tables as fusion_core knows them: samples, the reference, and the instants to be shown at."""
+"""A session's tables as inputs of fusion_core: samples, the reference, and the instants to be estimated at."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Columns
 
 SETTLED_S = 1.0
-"""After the first frame's arrival: what estimates say before it is neither scored nor shown."""
+"""Estimates in this time after the first frame's arrival are neither scored nor shown in figures."""
 
 SMOOTHED = "smoothed"  # the name of the reference that a study without one gets
 _AXES = ("x", "y", "z")
@@ -41,9 +41,10 @@ _AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Mounted:
-    """What is known of a phone's mounting from `from_s` on: samples that take it into account.
+    """Samples that take a phone's mounting into account, which is known from `from_s` on.
 
-    Positions are those of the accelerometer; `arm_mm` (n, d) at `time` leads from it back to what the tracker sees.
+    Their positions are those of the accelerometer; `arm_mm` (n, d) at `time` (n,) goes from it back to the point that
+    the tracker sees.
     """
 
     from_s: float
@@ -55,7 +56,7 @@ class Mounted:
 
 @dataclass(frozen=True)
 class Recording:
-    """One session. Times are seconds since `origin_ns`; `times` are the instants every estimator is asked for.
+    """One session. Times are seconds since `origin_ns`; `times` are the instants of every estimator's track.
 
     `samples` holds the sensors, the analysed axes only; `reference` is in the tracker's frame and clock; `phones` says
     where orientations came from.
@@ -80,7 +81,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Shown:
-    """What an estimator would have shown, as its table holds it: `time_ns` (n,), `mean` and `sd` (n, d) in mm."""
+    """What an estimator would have shown, as in the table `tracks`: `time_ns` (n,), `mean` and `sd` (n, d) in mm."""
 
     time_ns: np.ndarray[Any, np.dtype[np.int64]]
     mean: FloatArray
@@ -106,17 +107,17 @@ def load(study: Study, entry: Path) -> Recording:
         origin_ns,
         samples,
         _instants(study, imu, positions, origin_ns),
-        _only(study, ReferenceStream, whole),
-        _only(study, DisplayStream, whole),
+        _only_stream_of(study, ReferenceStream, whole),
+        _only_stream_of(study, DisplayStream, whole),
         phones,
         _mounted(study, samples, whole, phones),
     )
 
 
 def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
-    """The origin, and the streams of positions as `load` gives them, each with the axes that are analysed of it.
+    """The origin in ns, and the streams of positions as `load` gives them, each with its analysed axes.
 
-    Phones are left alone, and with them whatever their mounting would correct; so this is quick.
+    Phones are not read and their mounting is not corrected for, so this is quick.
     """
     table = tables.read_arrow("positions", entry)
     origin_ns = pc.min(table["arrival_ns"]).as_py() if len(table) else 0
@@ -130,7 +131,7 @@ def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
 
 
 def shown_axes(study: Study, name: str) -> tuple[str, ...]:
-    """The axes a stream of positions gives of those that are analysed."""
+    """Those of the analysed axes that a stream of positions has."""
     return tuple(study.axes_of(name)) if name in study.sensor_streams else tuple(study.axes)
 
 
@@ -149,7 +150,7 @@ def _times(rows: Columns, latency_s: float) -> tuple[Any, Any]:
 
 
 def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Samples]) -> dict[str, Phone]:
-    """Every stream of accelerations, all three axes."""
+    """The phone of every stream of accelerations, with all three axes."""
     tracker = None
     if study.tracker is not None:
         tracker = whole[study.tracker], _of_space(sensor(study, study.sensor_streams[study.tracker]))
@@ -166,19 +167,19 @@ def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Sample
 
 
 def _of_space(of_axes: Sensor) -> Sensor:
-    """The sensor of all three axes."""
+    """The same sensor with all three axes."""
     return Sensor(of_axes.operator, of_axes.noise_sd, of_axes.latency_s, 3, of_axes.rate_hz)
 
 
 def _of_axes(samples: Samples, study: Study, name: str) -> Samples:
-    """A sensor's readings, its own axes of those that are analysed."""
+    """A sensor's readings, with those of its axes that are analysed."""
     index = [_AXES.index(axis) for axis in study.axes_of(name)]
     rotation = None if samples.rotation is None else samples.rotation[:, index]
     return Samples(samples.time, samples.arrival, samples.value[:, index], rotation)
 
 
-def _only(study: Study, kind: type, whole: dict[str, Samples]) -> Samples | None:
-    """The one stream of a kind, of the analysed axes; None where there is none, or it is empty."""
+def _only_stream_of(study: Study, kind: type, whole: dict[str, Samples]) -> Samples | None:
+    """The only stream of a kind, with the analysed axes; None where there is none or it is empty."""
     index = [_AXES.index(axis) for axis in study.axes]
     for name, stream in study.streams.items():
         if isinstance(stream, kind) and len(whole[name]):
@@ -189,7 +190,7 @@ def _only(study: Study, kind: type, whole: dict[str, Samples]) -> Samples | None
 def _mounted(
     study: Study, samples: dict[str, Samples], whole: dict[str, Samples], phones: dict[str, Phone]
 ) -> Mounted | None:
-    """The samples as they are once the mounting of the first phone that says so is known."""
+    """The samples corrected for the mounting of the first phone whose mounting is known; None if there is none."""
     for name, found in phones.items():
         if found.calibrated is None or found.lever_arm_mm is None:
             continue
@@ -199,20 +200,20 @@ def _mounted(
         corrected[name] = _of_axes(found.calibrated.acceleration(), study, name)
         for stream, sensing in study.sensor_streams.items():
             if sensing.kind == "position":
-                moved = _less(whole[stream], found.calibrated, arm)
+                moved = _less_lever_arm(whole[stream], found.calibrated, arm)
                 corrected[stream] = _of_axes(moved, study, stream)
         return Mounted(found.mounted_from_s, name, corrected, found.calibrated.time, arm[:, index])
     return None
 
 
-def _less(positions: Samples, body: Body, arm: FloatArray) -> Samples:
-    """Positions less the lever arm as the body held it when each was measured."""
+def _less_lever_arm(positions: Samples, body: Body, arm: FloatArray) -> Samples:
+    """Positions less the lever arm, as the body was turned when each was measured."""
     value = positions.value - arm[nearest(body.time, positions.time)]
     return Samples(positions.time, positions.arrival, value)
 
 
 def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track:
-    """What the study's estimator of that name would have shown at `times`, which rise."""
+    """What the study's estimator of that name would have shown at rising `times` (n,) in s."""
     estimator: Estimator = build_estimator(study, name)
     track = estimator.replay(loaded.samples, times)
     known = loaded.mounted
@@ -227,14 +228,14 @@ def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track
 
 
 def tracked(study: Study, name: str, loaded: Recording) -> Shown:
-    """What it would have shown at every instant, from its first estimate on."""
+    """What the estimator would have shown at every instant of the recording, from its first estimate on."""
     track = show(study, name, loaded, loaded.times)
     known = np.isfinite(track.mean).all(axis=1)
     return Shown(loaded.to_ns(track.time[known]), track.mean[known], track.sd[known])
 
 
 def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
-    """What estimates are held against, and its name: the recorded reference, else all readings smoothed."""
+    """The reference that estimates are compared with, and its name: the recorded one, else all readings smoothed."""
     recorded = study.stream_of_kind("reference")
     if recorded is not None:
         return None if loaded.reference is None else (recorded, loaded.reference)
@@ -248,9 +249,8 @@ def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
 
 
 def _in_time(study: Study) -> dict[str, Sensor]:
-    """The sensors that observe one moment at a time, as a Kalman filter needs them."""
-    found = sensors(study)
-    return {name: one for name, one in found.items() if not any(term.at_s for term in one.terms)}
+    """The sensors that observe a single instant, as a Kalman filter needs them."""
+    return {name: sensor for name, sensor in sensors(study).items() if not any(term.at_s for term in sensor.terms)}
 
 
 def _instants(study: Study, imu: pa.Table, positions: pa.Table, origin_ns: int) -> FloatArray:
@@ -274,9 +274,9 @@ def samples(
     value: np.ndarray[Any, Any],
     origin_ns: int,
 ) -> Samples:
-    """The crossing into fusion_core: readings by arrival, in seconds since `origin_ns`, each reading once.
+    """Readings as fusion_core's samples: in order of arrival, in seconds since `origin_ns`, each reading once.
 
-    A reading whose stamp and values another one already had is a copy of it and left out (`quality` counts them).
+    A reading with the same stamp and values as an earlier one is a copy and is left out (`quality` counts them).
     """
     order = np.lexsort((time_ns, arrival_ns))
     time_ns, arrival_ns, value = time_ns[order], arrival_ns[order], value[order]

@@ -12,8 +12,8 @@ from pipeline.sessions.recording import Recording
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 
-_Held = tuple[Recording, tuple[str, Samples] | None]
-_last: dict[tuple[Path, str], _Held] = {}
+_Loaded = tuple[Recording, tuple[str, Samples] | None]
+_last: dict[tuple[Path, str], _Loaded] = {}
 
 
 def run(work: Work) -> Outcome:
@@ -30,8 +30,8 @@ def run(work: Work) -> Outcome:
     return Outcome()
 
 
-def _recording(study: Study, ingested: Path) -> _Held:
-    """A session's recording and reference: the last session's are held, for its other variants come next."""
+def _recording(study: Study, ingested: Path) -> _Loaded:
+    """A session's recording and reference; the last session's are kept, as its other variants usually come next."""
     key = ingested, study.model_dump_json(include={"streams", "axes"})
     if key not in _last:
         loaded = recording.load(study, ingested)

@@ -49,15 +49,15 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
 
 
 def _behind(stamp: IntArray) -> int:
-    """How many stamps are earlier than one before them."""
+    """How many stamps are earlier than the newest stamp before them."""
     return int(np.sum(stamp[1:] < np.maximum.accumulate(stamp)[:-1])) if len(stamp) > 1 else 0
 
 
 def clock_went_back(readings: Readings) -> float | None:
-    """By how many seconds a clock was set back in mid-stream, or None.
+    """By how many seconds a clock was set back during the recording; None if none was.
 
-    Late messages come singly; a clock that was set back runs, forwards, through the same times a second time.
-    Looked for in the recorder's clock by the order of the file, and in the sender's by the order of arrival.
+    Late messages come singly; a clock that was set back runs through the same times a second time. The recorder's clock
+    is checked in the order of the file, the sender's in order of arrival.
     """
     order = np.argsort(readings.arrival_ns, kind="stable")
     for times in (readings.arrival_ns, readings.stamp_ns[order]):

@@ -12,32 +12,32 @@ from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Row
 
-_TOLD = ["trial", "start_s", "selection_s", "left_s"]
+_EVENT_COLUMNS = ["trial", "start_s", "selection_s", "left_s"]
 
 
 def selections_by_trial(events: Sequence[Row]) -> tuple[list[Row], list[tuple[Row, int]]]:
-    """A session's trial_starts in order, and its selections, each with the place of its start among them, -1 for none.
+    """A session's trial_starts in order, and its selections, each with the index of its trial_start, -1 for none.
 
-    A selection belongs to the newest start before it, unless both name their trial and the names differ: then to the
-    one before that, if the newest start is of the very moment of the selection, or else to none.
+    A selection belongs to the newest start before it. If both name their trial and the names differ, it belongs to the
+    start before that if the newest start has the same time as the selection, and otherwise to none.
     """
     in_order = sorted(events, key=lambda event: event["time_ns"])  # stable
     starts = [event for event in in_order if event["type"] == "trial_start"]
     selections = [event for event in in_order if event["type"] == "selection"]
     times = [event["time_ns"] for event in starts]
-    found = []
+    with_start = []
     for selection in selections:
         place, own = int(np.searchsorted(times, selection["time_ns"], side="right")) - 1, selection["trial"]
         while place >= 0 and own is not None and starts[place]["trial"] not in (None, own):
             place = place - 1 if times[place] == selection["time_ns"] else -1
-        found.append((selection, place))
-    return starts, found
+        with_start.append((selection, place))
+    return starts, with_start
 
 
-def told(events: Sequence[Row], origin_ns: int) -> pd.DataFrame:
-    """A row a trial: trial, start_s, its first selection's time and place, its last one's (`left_`), and its target.
+def trial_table(events: Sequence[Row], origin_ns: int) -> pd.DataFrame:
+    """One row per trial: its number, start, target, and time and place of its first and last selection (`left_`).
 
-    Coordinates are in mm, times in s since `origin_ns`; NaN for what there is not.
+    Coordinates are in mm, times in s since `origin_ns`; NaN where something is missing.
     """
     starts, selections = selections_by_trial(events)
     by_trial: dict[int, list[Row]] = {}
@@ -56,12 +56,12 @@ def told(events: Sequence[Row], origin_ns: int) -> pd.DataFrame:
             row[f"selected_{axis}_mm"], row[f"left_{axis}_mm"] = first.get(f"{axis}_mm"), last.get(f"{axis}_mm")
         rows.append(row)
     places = [f"{what}_{axis}_mm" for what in ("target", "selected", "left") for axis in "xyz"]
-    found = pd.DataFrame(rows, columns=[*_TOLD, *places])
-    return found.astype({"trial": "Int64", **dict.fromkeys([*_TOLD[1:], *places], "float64")})
+    table = pd.DataFrame(rows, columns=[*_EVENT_COLUMNS, *places])
+    return table.astype({"trial": "Int64", **dict.fromkeys([*_EVENT_COLUMNS[1:], *places], "float64")})
 
 
 def with_movements(trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials of one session in their order, as `told` gives them, with duration_s and the columns of a movement."""
+    """Trials of one session, in order, from `trial_table`, with duration_s and the columns of a movement added."""
     duration_s = (trials["selection_s"] - trials["start_s"]).to_numpy(np.float64)
     pause_s = trials["start_s"].to_numpy(np.float64) - movements.previous(trials["left_s"].to_numpy(np.float64))
     target, selected, left = (coordinates(trials, what) for what in ("target", "selected", "left"))
@@ -72,6 +72,6 @@ def with_movements(trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def coordinates(trials: pd.DataFrame, what: str, axes: str = "xyz") -> FloatArray:
-    """Places (n, d) in mm of trials as `told` gives them: of a target, of what was selected or where it was left."""
-    found: FloatArray = trials[[f"{what}_{axis}_mm" for axis in axes]].to_numpy(np.float64)
-    return found
+    """Places (n, d) in mm from `trial_table`: of `what` = "target", "selected" or "left"."""
+    places: FloatArray = trials[[f"{what}_{axis}_mm" for axis in axes]].to_numpy(np.float64)
+    return places

@@ -29,7 +29,7 @@ Changes = Mapping[str, Mapping[str, Sequence[Any]]]
 
 
 def read_changes(texts: Sequence[str]) -> Changes:
-    """What `--set fusion.window=3,5` asks for; PipelineError that names the option and what is wrong with it."""
+    """The values that options such as `--set fusion.window=3,5` list. Raises PipelineError, naming the option."""
     changes: dict[str, dict[str, Sequence[Any]]] = {}
     for text in texts:
         target, equals, listed = text.partition("=")
@@ -43,7 +43,7 @@ def read_changes(texts: Sequence[str]) -> Changes:
         if not values:
             raise PipelineError(f'--set "{text}": names no value, such as 3,5,10')
         if any(values.count(value) > 1 for value in values):
-            raise PipelineError(f'--set "{text}": a value stands there twice')
+            raise PipelineError(f'--set "{text}": a value is listed twice')
         if key in changes.setdefault(estimator, {}):
             raise PipelineError(f'--set "{text}": {estimator}.{key} is set twice; list its values in one --set')
         changes[estimator][key] = values
@@ -51,14 +51,14 @@ def read_changes(texts: Sequence[str]) -> Changes:
 
 
 def read_estimators(path: Path | None) -> Mapping[str, Estimator]:
-    """The further estimators of a file; none without one."""
+    """The further estimators of a file; empty without a file."""
     return {} if path is None else parse(Estimators, read_yaml(path), path).estimators
 
 
 def variants(study: Study, changes: Changes, further: Mapping[str, Estimator], file: Path | None) -> list[Variant]:
-    """Every estimator with its own settings, and after it all combinations of what `changes` lists for it.
+    """Every estimator with its own settings, followed by all combinations of the values that `changes` lists for it.
 
-    `further` are those of `file`. Raises PipelineError for what study.yaml would not take either.
+    `further` are those of `file`. Raises PipelineError for settings that study.yaml could not have either.
     """
     for name in further:
         if name in study.estimators:
@@ -67,19 +67,19 @@ def variants(study: Study, changes: Changes, further: Mapping[str, Estimator], f
     for name, keys in changes.items():
         if name not in settings:
             key, values = next(iter(keys.items()))
-            asked = f"{name}.{key}={','.join(map(_shown, values))}"
-            raise PipelineError(f'--set "{asked}": there is no estimator "{name}"{did_you_mean(name, settings)}')
+            option = f"{name}.{key}={','.join(map(_shown, values))}"
+            raise PipelineError(f'--set "{option}": there is no estimator "{name}"{did_you_mean(name, settings)}')
     if not settings:
         raise PipelineError("study.yaml: estimators: there is none to replay; name some, or give --estimators FILE")
-    found = []
+    listed = []
     for name, own in settings.items():
         where = f"{file}: estimators.{name}" if name in further else f"study.yaml: estimators.{name}"
-        found.append(_variant(study, name, own, None, where))
+        listed.append(_variant(study, name, own, None, where))
         for changed in _combinations(changes.get(name, {})):
             label = f"{name}[{','.join(f'{key}={_shown(value)}' for key, value in changed.items())}]"
             content = {**own.model_dump(exclude_unset=True), **changed}
-            found.append(_variant(study, name, parse(Estimator, content, f"--set: {label}"), label, f"--set: {label}"))
-    return found
+            listed.append(_variant(study, name, parse(Estimator, content, f"--set: {label}"), label, f"--set: {label}"))
+    return listed
 
 
 def _combinations(keys: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
@@ -89,7 +89,7 @@ def _combinations(keys: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]
 
 
 def _variant(study: Study, name: str, settings: Estimator, label: str | None, where: str) -> Variant:
-    """A variant that can be built."""
+    """A variant, once it is certain that its estimator can be built."""
     alone = study.model_copy(update={"estimators": {name: settings}})
     try:
         for stream in settings.use or ():

@@ -17,9 +17,9 @@ import fusion_core
 # second adds to the position, and how often the step was taken from kept machine code.
 RUN = """
 import numpy as np
-from fusion_core.kalman.position_steps import moved
-_, covariance = moved(np.zeros((3, 1)), np.zeros((3, 3)), 1.0, 1.0)
-print(covariance[0, 0], sum(moved.stats.cache_hits.values()))
+from fusion_core.kalman.position_steps import predict
+_, covariance = predict(np.zeros((3, 1)), np.zeros((3, 3)), 1.0, 1.0)
+print(covariance[0, 0], sum(predict.stats.cache_hits.values()))
 """
 NOISE = "squared * squared * dt / 20.0"
 

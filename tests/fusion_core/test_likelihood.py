@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from fusion_core import FusionKalman, Samples, WindowGP
-from fusion_core.likelihood import foretold, foretold_by, maximise
+from fusion_core.likelihood import log_likelihood_by_replay, maximise, position_log_likelihood
 from pipeline.statistics.arrays import FloatArray
 from tests.fusion_core.kalman.test_kalman import IMU, TRACKER
 from tests.fusion_core.kalman.test_smoothing import small
@@ -25,8 +25,8 @@ def test_the_log_density_is_that_of_each_position_given_those_before() -> None:
         track = estimator.replay(at_once, np.array([np.nextafter(frame.time, -np.inf)]))
         spread = np.hypot(track.sd[0, 0], 8.0)
         expected += float(stats.norm.logpdf(frame.value[0], track.mean[0, 0], spread))
-    assert foretold(estimator, samples).sum() == pytest.approx(expected, abs=1e-6)
-    of_first = foretold_by(estimator, samples).sum()
+    assert position_log_likelihood(estimator, samples).sum() == pytest.approx(expected, abs=1e-6)
+    of_first = log_likelihood_by_replay(estimator, samples).sum()
     assert of_first == pytest.approx(expected, abs=1e-6)
 
 
@@ -69,13 +69,13 @@ def test_noise_and_latency_are_found_and_the_accelerometers_noise_is_not_told() 
             bias_walk_mm_s2_per_sqrt_s=0.0,
         )
         moved = Samples(tracker.arrival - late_s, tracker.arrival, tracker.value)
-        return foretold(estimator, {"tracker": moved, "imu": samples["imu"]})
+        return position_log_likelihood(estimator, {"tracker": moved, "imu": samples["imu"]})
 
     noise, _, late, imu = maximise(blocks, [8.0, 1e7, 0.07, 100.0], [np.inf, np.inf, np.inf, 0.7])
-    assert noise.low < 6.0 < noise.high and noise.told
+    assert noise.low < 6.0 < noise.high and noise.identified
     assert noise.value == pytest.approx(6.0, rel=0.1)
     assert late.value == pytest.approx(0.1, abs=0.003)
-    assert late.told
+    assert late.identified
     assert imu.low < 100.0 < imu.high
 
 
@@ -87,16 +87,16 @@ def test_a_parameter_that_nothing_depends_on_is_not_told() -> None:
         return np.asarray(stats.norm.logpdf(data, 0, values[0]).sum(axis=1))
 
     spread, idle = maximise(blocks, [1.0, 5.0], [np.inf, 0.7])
-    assert spread.told and spread.low < 3.0 < spread.high
+    assert spread.identified and spread.low < 3.0 < spread.high
     # σ̂ of n normal values has SD σ/√(2n): the interval of a model that is right
     assert (spread.high - spread.low) / 2 == pytest.approx(1.96 * 3.0 / np.sqrt(2 * data.size), rel=0.4)
-    assert not idle.told
+    assert not idle.identified
 
 
 def test_window_parameters_have_a_likelihood_too() -> None:
     samples, _ = regular()
     near, far = (WindowGP(RATED, inverse_scale_s2=w) for w in (4.0, 400.0))
-    assert foretold_by(near, samples).sum() > foretold_by(far, samples).sum()
+    assert log_likelihood_by_replay(near, samples).sum() > log_likelihood_by_replay(far, samples).sum()
 
 
 def test_a_start_at_zero_is_an_error() -> None:

@@ -23,7 +23,7 @@ MUTANTS = (
     Mutant("_BLOCK_S = 0.5  #", "_BLOCK_S = 0.05  #", _ACCURACY),
     Mutant("not 0 < whole < len(shifts) - 1", "not 0 <= whole <= len(shifts) - 1", _ACCURACY),
     Mutant("if scale - blocks.total.min() <= _FLAT * scale or", "if", _ACCURACY),
-    Mutant("np.percentile(found, [2.5, 97.5])", "np.percentile(found, [5, 95])", _ACCURACY),
+    Mutant("np.percentile(resampled, [2.5, 97.5])", "np.percentile(resampled, [5, 95])", _ACCURACY),
     Mutant("np.searchsorted(known, time - LAG_RANGE_S", "np.searchsorted(known, time", _ACCURACY),
     Mutant("inside & (gaps[begin] == gaps[np.minimum(end, len(known) - 1)])", "inside", _ACCURACY),
     Mutant("inside = (begin >= 0) & (end < len(known))", "inside = begin >= 0", _ACCURACY),
@@ -36,7 +36,7 @@ MUTANTS = (
     # The lead by cross-correlation.
     Mutant("circular[shifts] / (n - np.abs(shifts))", "circular[shifts] / n", _ACCURACY),
     Mutant("np.sum(a.conj() * b, axis=0)", "np.sum(a * b.conj(), axis=0)", _ACCURACY),
-    Mutant("fft.rfft((one - one.mean(axis=0)).T, length)", "fft.rfft(one.T, length)", _ACCURACY),
+    Mutant("fft.rfft((signal - signal.mean(axis=0)).T, length)", "fft.rfft(signal.T, length)", _ACCURACY),
     Mutant("fft.next_fast_len(2 * n - 1, real=True)", "fft.next_fast_len(n, real=True)", _ACCURACY),
     Mutant("np.searchsorted(tracker.arrival, grid", "np.searchsorted(tracker.time, grid", _ACCURACY),
     Mutant("peak in (0, int(inside.sum()) - 1)", "peak in (-1,)", _ACCURACY),

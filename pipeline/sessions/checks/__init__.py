@@ -1,6 +1,6 @@
-"""Nothing is believed that the data contradict: one session's readings against each other and against study.yaml.
+"""Checks one session's readings against each other and against study.yaml, to find mistakes in logging or settings.
 
-Each check is a pure function of `Recorded` and yields findings; docs/checks.md says what each sees and what to do.
+Each check is a pure function of `Recorded` and yields findings; docs/checks.md says what each finds and what to do.
 """
 
 from __future__ import annotations
@@ -44,17 +44,19 @@ CHECKS: tuple[Check, ...] = (
     events.span,
     events.selections,
 )
-"""In the order of a report: what a stream is by itself, then what streams say of each other."""
+"""In the order of a report: checks of single streams first, then those that compare streams."""
 
 
 def checked(recorded: Recorded) -> tuple[Finding, ...]:
-    """What every check finds, in their order."""
+    """The findings of all checks, in the order of CHECKS."""
     return tuple(finding for check in CHECKS for finding in check(recorded))
 
 
 def check_rows(session: str, recorded: Recorded) -> list[Row]:
     """Rows of the table `checks`."""
-    return [{"session": session, **asdict(one), "message": one.message or None} for one in checked(recorded)]
+    return [
+        {"session": session, **asdict(finding), "message": finding.message or None} for finding in checked(recorded)
+    ]
 
 
 __all__ = ["CHECKS", "Check", "Finding", "Recorded", "Status", "check_rows", "checked"]

@@ -26,8 +26,8 @@ _OVER_S = 0.2
 _UNITS = ((1000.0, "millimetres where metres are expected"), (100.0, "centimetres where metres are expected"))
 
 
-def told(motion: Compared | None) -> bool:
-    """Do both sensors see one movement, well enough to be held against each other?"""
+def see_one_movement(motion: Compared | None) -> bool:
+    """Whether both sensors see one movement, and see it well enough to be compared."""
     return motion is not None and motion.explained >= _EXPLAINED_MIN and motion.lag_s.width < 2 * _LAG_WIDE_S
 
 
@@ -37,17 +37,17 @@ def expected_lag_s(tracker: Positions, imu: Imu) -> float:
 
 
 def lag(recorded: Recorded) -> Iterator[Finding]:
-    """The lag between tracker and phone, held against `stamp` and `latency_s`.
+    """The lag between tracker and phone, compared with `stamp` and `latency_s`.
 
-    It cannot be told where the hand rests, or moves so regularly that it fits at several lags. A lag that both share is
-    not seen.
+    It stays unknown where the hand rests, or moves so regularly that several lags fit. A lag that both sensors share
+    cannot be seen.
     """
     tracker, imu = recorded.tracker, recorded.imu
     if tracker is None or imu is None:
         return
     motion, stated_s = recorded.motion, expected_lag_s(tracker, imu)
     expected = f"{_ms(stated_s)} by study.yaml"
-    if motion is None or not told(motion) or motion.lag_s.width > _LAG_WIDE_S:
+    if motion is None or not see_one_movement(motion) or motion.lag_s.width > _LAG_WIDE_S:
         yield Finding(LAG, "green", "cannot be told from this movement", expected)
         return
     found = _lag_text(motion.lag_s)
@@ -94,7 +94,7 @@ def size(recorded: Recorded) -> Iterator[Finding]:
     A factor below two is not seen: a lever arm between the two and noise bend the figure by a third.
     """
     tracker, imu, motion = recorded.tracker, recorded.imu, recorded.motion
-    if tracker is None or imu is None or motion is None or not told(motion):
+    if tracker is None or imu is None or motion is None or not see_one_movement(motion):
         return
     apart = max(motion.scale.low, 1 / max(motion.scale_most, 1e-12))
     status = graded(apart, _SIZE_AMBER, _SIZE_RED)
@@ -134,7 +134,7 @@ def frame(recorded: Recorded) -> Iterator[Finding]:
     axis along which nothing moves is not judged, nor a turn about the vertical where the log has no orientation.
     """
     tracker, imu, motion = recorded.tracker, recorded.imu, recorded.motion
-    if tracker is None or imu is None or motion is None or not told(motion):
+    if tracker is None or imu is None or motion is None or not see_one_movement(motion):
         return
     expected = "within 20°, not mirrored"
     if motion.mirrored >= _SURE:

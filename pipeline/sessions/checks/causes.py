@@ -1,4 +1,4 @@
-"""Which single mistake would explain that gravity does not cancel: each is undone in turn, and the mean looked at."""
+"""Which single mistake would explain that gravity does not cancel: each is undone in turn, and the mean examined."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class Cause:
 
 
 def causes(imu: Imu, motion: Compared | None) -> list[Cause]:
-    """Those that leave a mean below 0.7 m/s², the likeliest first.
+    """The mistakes without which the mean acceleration is below 0.7 m/s², the likeliest first.
 
-    A flipped accelerometer and a flipped `gravity_mm_s2` look alike here; against the tracker's movement they do not.
+    A flipped accelerometer and a flipped `gravity_mm_s2` look the same here; the tracker's movement tells them apart.
     """
     step = max(1, int(imu.oriented.sum()) // _AT_MOST)
     force = imu.force_m_s2[imu.oriented][::step]
     quaternion = imu.orientation_xyzw[imu.oriented][::step]
     gravity = np.array(imu.gravity_mm_s2) / 1e3 if imu.gravity_mm_s2 is not None else None
     flipped = motion is not None and motion.mirrored > 0.9 and motion.axes == "-x -y -z"
-    found = []
+    likely = []
     for text, tried_force, tried_turn, tried_gravity in _tried(force, quaternion, gravity):
         upright = turned(tried_turn, tried_force)
         if tried_gravity is None:
@@ -43,12 +43,12 @@ def causes(imu: Imu, motion: Compared | None) -> list[Cause]:
         else:
             left = float(np.linalg.norm(upright.mean(axis=0) + tried_gravity))
         if left < _EXPLAINS_M_S2:
-            found.append(Cause(text, left))
+            likely.append(Cause(text, left))
     if flipped:
-        found = [one for one in found if "sign is flipped" in one.text] or found
+        likely = [cause for cause in likely if "sign is flipped" in cause.text] or likely
     elif motion is not None and motion.explained > 0.3 and motion.mirrored < 0.1:
-        found = [one for one in found if "gravity_mm_s2" in one.text] or found
-    return found
+        likely = [cause for cause in likely if "gravity_mm_s2" in cause.text] or likely
+    return likely
 
 
 def _tried(

@@ -24,7 +24,7 @@ _EXPLAINS = 0.4  # of the distance that is left once a mistake is undone
 
 
 def targets(recorded: Recorded) -> Iterator[Finding]:
-    """The events' targets against those of the task; without a task, against where the hand ever was."""
+    """The events' targets compared with those of the task; without a task, with the places where the hand was."""
     if recorded.events is None:
         return
     there = recorded.events.target_mm[np.isfinite(recorded.events.target_mm[:, :2]).all(axis=1)]
@@ -106,10 +106,10 @@ def span(recorded: Recorded) -> Iterator[Finding]:
 
 
 def selections(recorded: Recorded) -> Iterator[Finding]:
-    """Where the events say a selection was against what was displayed then; the tracker where nothing was displayed.
+    """The recorded selections compared with what was displayed then, or with the tracker if nothing was displayed.
 
-    A clock, a unit or an axis that differs shows at once, because the hand is somewhere else a moment later. A display
-    that is late by less than the hand takes to move 10 mm is not told.
+    Another clock, unit or axis shows at once, because the hand is somewhere else a moment later. A display that is late
+    by less time than the hand takes to move 10 mm is not noticed.
     """
     events = recorded.events
     shown = recorded.of_kind("display") or recorded.of_kind("reference") or recorded.tracker
@@ -133,14 +133,14 @@ def selections(recorded: Recorded) -> Iterator[Finding]:
 
 
 def _limit(shown: Positions, time: FloatArray, at: FloatArray) -> float:
-    """How far off is not yet a contradiction: 10 mm, or for a sensor four times its noise."""
+    """How far apart they may be, in mm: 10 mm, or four times its noise for a sensor."""
     if shown.kind == "display":
         return _OFF_MM
     return max(_OFF_MM, 4.0 * float(np.sqrt(2.0)) * (shown.noise_sd_mm or 0.0))
 
 
 def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: float) -> str:
-    """The mistake that explains most of it, in words; "" where none does."""
+    """The mistake that explains most of the distance, in words; "" if none does."""
     shifts = np.array([float(np.mean(_apart(shown, time + shift, at))) for shift in _SHIFTS_S])
     best = _middle_of_lowest(shifts)
     tried = {
@@ -164,7 +164,7 @@ def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: f
 
 
 def _middle_of_lowest(cost: FloatArray) -> int:
-    """Where it is lowest; where it is as low for a while, as for a hand that rests, the middle of that."""
+    """The index of the lowest cost; the middle of a stretch that is equally low, as while the hand rests."""
     low = high = int(np.argmin(cost))
     enough = cost[low] + _AS_LOW_MM
     while low > 0 and cost[low - 1] <= enough:
@@ -181,7 +181,7 @@ def _within(shown: Positions, time: FloatArray) -> BoolArray:
 
 
 def _apart(shown: Positions, time: FloatArray, at: FloatArray) -> FloatArray:
-    """Distances (n,) in mm between points and what was there at some times."""
+    """Distances (n,) in mm between the points `at` (n, 2) and the displayed positions at `time` (n,)."""
     stamps, first = np.unique(shown.times.stamp_s - shown.times.late_s, return_index=True)
     value = shown.value_mm[first]
     there = np.column_stack([np.interp(time, stamps, value[:, axis]) for axis in (0, 1)])

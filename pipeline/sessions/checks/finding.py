@@ -1,4 +1,4 @@
-"""What a check says: one row of the table `checks`."""
+"""The result of a check: one row of the table `checks`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Finding:
 
 
 def of(check: str, stream: str) -> str:
-    """A check of one stream: `rate: tracker`. What stands before the colon is the same in every study."""
+    """The name of a check of one stream, such as `rate: tracker`; the part before the colon is the same everywhere."""
     return f"{check}: {stream}"
 
 

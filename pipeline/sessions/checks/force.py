@@ -85,10 +85,10 @@ def gravity_length(recorded: Recorded) -> Iterator[Finding]:
 
 
 def mean_acceleration(recorded: Recorded) -> Iterator[Finding]:
-    """What is left of the acceleration over a session: a hand that stays in the room has a mean near zero.
+    """The mean acceleration over a session, which is near zero for a hand that stays in the room.
 
-    Needs an orientation in the log. Where the phone never turns, a wrong orientation that is constant can hide behind
-    a gravity that was set by it. A heading that is wrong leaves the vertical as it is and is not seen here.
+    Needs an orientation in the log. If the phone never turns, a wrong but constant orientation is not noticed where
+    gravity_mm_s2 was set by it. A wrong heading does not change the vertical and is not noticed here either.
     """
     for imu in recorded.imus:
         if imu.oriented.sum() < 10 or float(np.median(np.linalg.norm(imu.force_m_s2, axis=1))) < _SMALL_M_S2:
@@ -111,7 +111,7 @@ def mean_acceleration(recorded: Recorded) -> Iterator[Finding]:
 
 
 def _without_gravity(imu: Imu) -> Iterator[Finding]:
-    """As long as nobody has said where gravity points: the upright force must point one way, and be g long."""
+    """Without a gravity_mm_s2: the force in the upright frame must have a constant direction and a length of g."""
     mean = imu.upright_m_s2.mean(axis=0)
     size = float(np.linalg.norm(mean))
     found, expected = f"the upright force is {size:.3g} m/s² long on average", "9.3 to 10.3 m/s²"
@@ -126,8 +126,8 @@ def gravity_seen_mm_s2(imu: Imu) -> FloatArray | None:
 
 
 def _likely(imu: Imu, recorded: Recorded | None) -> str:
-    """Which single mistakes would explain it, in words."""
-    found: list[Cause] = causes(imu, recorded.motion if recorded is not None else None)
-    if not found:
+    """The single mistakes that would explain it, in words."""
+    likely: list[Cause] = causes(imu, recorded.motion if recorded is not None else None)
+    if not likely:
         return "check the accelerometer's unit and axes, the orientation's order (x, y, z, w) and gravity_mm_s2"
-    return "; or ".join(one.text for one in found[:2])
+    return "; or ".join(cause.text for cause in likely[:2])

@@ -1,26 +1,27 @@
-"""One movement seen twice: a tracker's positions against a phone's accelerations, so that either can be doubted.
+"""One movement seen by two sensors: a tracker's positions compared with a phone's accelerations.
 
-Theory of operation. In one frame the accelerations are the second derivative of the positions. Neither can be used as
-it is: a tracker's noise, derived twice, drowns the movement, and an accelerometer's offset, summed twice, runs away.
-Both are therefore brought into one band by the same zero-phase filter H, on one grid:
+Theory of operation. In one frame the accelerations are the second derivative of the positions. Neither can be used
+directly: differentiating twice amplifies the tracker's noise beyond the movement, and integrating twice makes an
+accelerometer's offset grow without bound. So both are brought into one frequency band by the same zero-phase filter H,
+on one grid:
 
     positions      p(f) · H(f)                 H: 0.3 to 4 Hz, where hands move and neither sensor is at its worst
     accelerations  a(f) · H(f) / −(2πf)²       a position again, finite because H falls as f⁴ towards 0
 
 and p(t) ≈ A q(t − lag) with a 3 × 3 matrix A, the identity where all is well:
 
-- the lag is where |p|² is explained best by *any* A, so that a turned or mirrored frame does not move it;
+- the lag is where *any* A explains |p|² best, so that a turned or mirrored frame does not change it;
 - A's size is the ratio of the units, the sign of its determinant a reflection, its rotation a turn of the frame
   (the orthogonal Procrustes problem, by the singular values of the cross-products C = Σ p qᵀ).
 
-A direction in which nothing moves says nothing of the frame. Two to four times what C's diagonal comes to by
-chance (what A leaves of p, beside blocks of q it has nothing to do with) is added to it first: this decides where the
-data do not, and is nothing beside a movement that both saw.
+A direction in which nothing moves says nothing about the frame. So two to four times the size that C's diagonal has by
+chance (from p less A q, paired with unrelated blocks of q) is added to it first: that decides where the data do not,
+and is negligible beside a movement that both sensors saw.
 
 The errors of both sensors are correlated over time. Intervals come from resampling blocks of 2 s (a moving-block
-bootstrap), of which only cross-products are needed: everything after the filters is sums over blocks. What must hold:
-the same H for both, no phase in it, and no block that sees a gap. A periodic movement fits at several lags, and its
-interval then says so; a hand that rests tells nothing, and the interval is as wide as the search.
+bootstrap), of which only cross-products are needed: everything after the filters is sums over blocks. What must stay
+true: the same H for both, without phase, and no block with a gap in it. A periodic movement fits at several lags, which
+makes its interval wide; while a hand rests nothing is known, and the interval is as wide as the search.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Compared:
-    """What two sensors say of one movement. `lag_s`: how much later the positions' stamps are than the phone's.
+    """How two sensors' records of one movement compare. `lag_s`: how much later the positions' stamps are.
 
     `explained` is the share of the positions' variance in the band that the accelerations account for, `position_mm`
     and `acceleration_mm` its SD in either. `scale` is the positions' size over the accelerations', too
@@ -296,15 +297,15 @@ def _procrustes(
 
 
 def _flat(cross: FloatArray, heading_known: bool) -> bool:
-    """Does the movement have less than three dimensions? An estimated vertical errs with the movement."""
+    """Whether the movement has fewer than three dimensions; an estimated vertical, which errs, needs a higher limit."""
     strength = np.linalg.svd(cross, compute_uv=False)
     return bool(strength[2] < (_FLAT if heading_known else _FLAT_UPRIGHT) * strength[0])
 
 
-def _interval(found: FloatArray) -> Interval:
-    """The first, with the 2.5 and 97.5 percentile of the others."""
-    low, high = np.percentile(found[1:], [2.5, 97.5])
-    return Interval(float(found[0]), float(low), float(high))
+def _interval(values: FloatArray) -> Interval:
+    """The first value, with the 2.5 and 97.5 percentile of the others, which are its resamples."""
+    low, high = np.percentile(values[1:], [2.5, 97.5])
+    return Interval(float(values[0]), float(low), float(high))
 
 
 def _axes(cross: FloatArray) -> str:

@@ -1,11 +1,12 @@
-"""The sensors' noise, found in the readings themselves, against what study.yaml states.
+"""The sensors' noise as measured from the readings themselves, compared with what study.yaml states.
 
-Theory. A hand is slow beside a sensor's rate: over four successive readings its path is nearly a parabola, which the
-third difference takes away, while white noise of SD s leaves one of √20 s. What is left of the movement only adds, so
-stretches in which the steps are far larger than that are left out, and of the others the quietest quarter is looked at:
-a brisk hand that never pauses is not judged. Noise that is correlated from reading to reading, such as a filtered
-tracker's, leaves less and is not seen. A quarter chosen for being quiet is quieter than white noise is: by a
-seventh for windows of 30 readings of three axes and a quarter for one axis, as simulated; this is made good.
+Theory. A hand is slow compared with a sensor's rate: over four successive readings its path is nearly a parabola, which
+the third difference removes, while white noise of SD s gives a third difference of SD √20 s. What remains of the
+movement can only add to that, so stretches whose steps are far larger are left out, and of the others only the quietest
+quarter is used: a brisk hand that never pauses is not judged. Noise that is correlated from reading to reading, such as
+that of a filtered tracker, gives less and is not noticed. The quietest quarter is quieter than white noise on average:
+by simulation, by a seventh for windows of 30 readings of three axes and by a quarter for one axis. The result is
+corrected for that.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ _IMU = (4.0, 10.0)
 
 
 def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
-    """The tracker's noise against `noise_sd_mm`: understated it makes every filter believe too much.
+    """The tracker's noise compared with `noise_sd_mm`: if that is too small, every filter trusts the tracker too much.
 
-    Only above it: a tracker that smooths has a slow error, which is as large and leaves no scatter.
+    Only noise above the stated one is a finding: a tracker that smooths has slow errors, which do not scatter.
     """
     for positions in recorded.positions:
         if positions.noise_sd_mm is None:
@@ -55,7 +56,10 @@ def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
 
 
 def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
-    """The accelerometer's noise against `noise_sd_mm_s2`. Only above it: what is stated stands for tilt errors too."""
+    """The accelerometer's noise compared with `noise_sd_mm_s2`.
+
+    Only noise above the stated one is a finding: the stated SD also covers errors of tilt.
+    """
     for imu in recorded.imus:
         if imu.noise_sd_mm_s2 is None:
             continue
@@ -75,9 +79,9 @@ def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
 
 
 def noise_sd(times: Times, value: FloatArray) -> float | None:
-    """SD of the white noise per axis in the quietest quarter of the readings (n, d); None with fewer than 100.
+    """SD of the white noise per axis, from the quietest quarter of the readings (n, d); None with fewer than 100.
 
-    Repeated readings are left out, and so are unevenly spaced ones.
+    Repeated and unevenly spaced readings are left out.
     """
     stamp_s, first = np.unique(times.stamp_s, return_index=True)
     value = value[first]

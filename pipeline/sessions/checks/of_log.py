@@ -1,4 +1,4 @@
-"""A log's readings as the checks look at them."""
+"""A log's readings in the form that the checks take."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def of_log(log: Log, study: Study) -> Recorded:
 
 
 def times(readings: Readings, origin_ns: int, stream: Stream | None = None) -> Times:
-    """When they were stamped and arrived, and how late study.yaml says that the stamps are."""
+    """When readings were stamped and arrived, and how late the stamps are according to study.yaml."""
     late = stream is not None and (stream.stamp == "arrival" or stream.kind in ("reference", "display"))
     late_s = stream.latency_s if stream is not None and late else 0.0
     return Times(readings.stamp_ns, readings.arrival_ns, origin_ns, late_s)
@@ -97,13 +97,13 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
 
 
 def _unit(quaternion_xyzw: tuple[float, float, float, float]) -> FloatArray:
-    """A rotation of study.yaml (1, 4), which need not be of unit length there."""
+    """A rotation of study.yaml as a unit quaternion (1, 4); there it may have any length."""
     found: FloatArray = np.array([quaternion_xyzw]) / np.linalg.norm(quaternion_xyzw)
     return found
 
 
 def _sound(readings: Readings, figures: int) -> BoolArray:
-    """Where the first so many figures are numbers and the times are of one day with the others."""
+    """Which readings (n,) are usable: their first `figures` values are finite, and their times within a day of most."""
     found: BoolArray = np.all(np.isfinite(readings.values[:, :figures]), axis=1)
     for one in (readings.stamp_ns, readings.arrival_ns):
         found &= np.abs(one.astype(np.float64) - float(np.median(one))) <= _DAY_NS

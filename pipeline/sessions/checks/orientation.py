@@ -1,4 +1,4 @@
-"""Orientation and gyroscope: whether they describe one turning, and whether a quaternion is one."""
+"""Orientation and gyroscope: whether both describe the same turning, and whether quaternions have unit length."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _STRAY_SHARE = 0.001
 
 
 def gyroscope(recorded: Recorded) -> Iterator[Finding]:
-    """The gyroscope against the turning of the orientation; against that of gravity where the log has none.
+    """The gyroscope compared with how the orientation turns, or with how gravity turns if the log has no orientation.
 
-    A phone that does not turn says nothing. Without an orientation only degrees per second are told from rad/s.
+    A phone that does not turn is not judged. Without an orientation, only degrees instead of radians are noticed.
     """
     for imu in recorded.imus:
         if len(imu.force_m_s2) < 20:
@@ -138,7 +138,7 @@ def _against_gravity(imu: Imu) -> Iterator[Finding]:
 
 
 def _gravity_ratio(imu: Imu) -> tuple[float, float] | None:
-    """How much faster the gyroscope turns than the vertical, and their correlation; None where neither turns."""
+    """How much faster the gyroscope turns than the vertical, and their correlation; None if neither turns."""
     time, first = np.unique(imu.times.stamp_s, return_index=True)
     if len(time) < 50 or time[-1] - time[0] < 5.0:
         return None
@@ -167,7 +167,7 @@ def _running_mean(values: FloatArray, width: int) -> FloatArray:
 
 
 def length(recorded: Recorded) -> Iterator[Finding]:
-    """The length of the quaternions, as logged: 1 for a rotation, 0 for one that nobody filled in."""
+    """The length of the logged quaternions: 1 for a rotation, 0 if the driver did not set it."""
     for imu in recorded.imus:
         given = imu.orientation_length[np.isfinite(imu.orientation_length)]
         if not len(given):
@@ -195,9 +195,9 @@ def length(recorded: Recorded) -> Iterator[Finding]:
 
 
 def covariances(recorded: Recorded) -> Iterator[Finding]:
-    """A covariance of −1 tells the reader to disregard the values (sensor_msgs/Imu); here they are used all the same.
+    """A covariance of −1 says that the values are to be ignored (sensor_msgs/Imu); here they are still used.
 
-    Some drivers set it beside good values, so values that live are amber and only zeros are red.
+    Some drivers set it beside good values, so values that vary are amber, and only zeros are red.
     """
     for imu in recorded.imus:
         for what, disclaimed, values in (

@@ -1,4 +1,4 @@
-"""Who speaks on a topic: one sensor in one frame, or several."""
+"""Whether one sensor in one frame publishes on a topic, or several."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FAR_MM = 30.0
 
 
 def frame_ids(recorded: Recorded) -> Iterator[Finding]:
-    """The frame that the messages name; it is not used, but one that changes says that positions are of two frames."""
+    """The frame that the messages name. It is not used, but if it changes, the positions are in different frames."""
     for one in recorded.streams:
         names, number = one.frames.names, one.frames.number
         if not len(number):
@@ -40,9 +40,9 @@ def _named(name: str) -> str:
 
 
 def publishers(recorded: Recorded) -> Iterator[Finding]:
-    """Positions that go to and fro between two places: two nodes publish on one topic.
+    """Positions that alternate between two places: two nodes publish on one topic.
 
-    Seen where the two are 3 cm and more apart; two that agree are not told from one.
+    Noticed if the two are at least 3 cm apart; two nodes that agree cannot be distinguished from one.
     """
     for positions in recorded.positions:
         if len(positions.value_mm) < 50:

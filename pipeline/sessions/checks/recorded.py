@@ -1,4 +1,4 @@
-"""What the checks look at: one session's readings as its log has them, beside what study.yaml says of them."""
+"""The input of the checks: one session's readings as logged, and what study.yaml says about them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stamps: repeated, rounded, bunched, of another unit, or by a clock that was set."""
+"""Time stamps: repeated, rounded, bunched, in another unit, or from a clock that was set during the recording."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def irregularity(steps_s: FloatArray) -> float | None:
 
 
 def clock(recorded: Recorded) -> Iterator[Finding]:
-    """A clock that was set in mid-log: stamps and arrivals part for good, or both go back together."""
+    """A clock that was set during the recording: stamps and arrivals drift apart for good, or both go back together."""
     for name, times in _streams(recorded):
         parted = _parted(times)
         back = _back(times.arrival_ns)
@@ -172,9 +172,9 @@ def clock(recorded: Recorded) -> Iterator[Finding]:
 
 
 def _parted(times: Times) -> tuple[float, float] | None:
-    """When and by how much the delay of arrivals jumps, both sides steady; None where it does not.
+    """When and by how much (s) the delay of arrivals jumps from one steady level to another; None if it does not.
 
-    The delay's lower envelope is looked at: a busy network delays some messages, but a clock that was set all of them.
+    A busy network delays some messages, but a clock that was set shifts all of them, so the delay's range is compared.
     """
     order = np.argsort(times.arrival_ns, kind="stable")
     delay = (times.arrival_s - times.stamp_s)[order]
@@ -196,7 +196,7 @@ def _parted(times: Times) -> tuple[float, float] | None:
 
 
 def _back(arrival_ns: IntArray) -> tuple[int, float] | None:
-    """Where in the file the recorder's clock goes back and runs on from there, and by how many seconds."""
+    """The index at which the recorder's clock goes back and runs on from there, and by how many seconds."""
     step = np.diff(arrival_ns)
     for at in np.flatnonzero(step < -round(_STEP_S * 1e9)):
         following = arrival_ns[at + 1 : at + 6]

@@ -1,4 +1,4 @@
-"""What any log comes down to, whatever its format: readings per stream in SI, events, facts, and what was lost."""
+"""A log as the pipeline sees it, whatever its format: readings by topic in SI units, events, facts, and losses."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ def test_a_state_does_not_grow_with_what_it_has_seen() -> None:
 
 def test_compilation_happens_at_the_start() -> None:
     """Then no reading of a live session waits for it."""
-    steps: list[Any] = [event_steps.inserted, event_steps.expect, event_steps.begin]
+    steps: list[Any] = [event_steps.insert_into_copy, event_steps.predict_position, event_steps.begin]
     estimator = FusionKalman(SPACE)
     state = estimator.start()
     compiled = [len(step.signatures) for step in steps]

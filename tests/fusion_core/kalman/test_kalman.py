@@ -27,8 +27,8 @@ def test_sd_of_the_papers_prediction() -> None:
 def test_process_noise_adds_up_over_steps() -> None:
     """Two steps are one step of twice the length, mean and noise: the law a discretisation must keep."""
     mean, covariance = np.array([[3.0], [200.0], [-900.0]]), np.diag([64.0, 9e4, 1e6])
-    twice = position_steps.moved(*position_steps.moved(mean, covariance, 0.01, 1e6), 0.01, 1e6)
-    once = position_steps.moved(mean, covariance, 0.02, 1e6)
+    twice = position_steps.predict(*position_steps.predict(mean, covariance, 0.01, 1e6), 0.01, 1e6)
+    once = position_steps.predict(mean, covariance, 0.02, 1e6)
     np.testing.assert_allclose(twice[0], once[0], rtol=1e-12)
     np.testing.assert_allclose(twice[1], once[1], rtol=1e-12)
 

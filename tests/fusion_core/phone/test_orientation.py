@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fusion_core import Samples, Sensor
-from fusion_core.phone.calibration import Body, calibrate, mounted
-from fusion_core.phone.orientation import carried, headed, heading, level, rotate, rotations
+from fusion_core.phone.calibration import Body, calibrate, with_mounting
+from fusion_core.phone.orientation import carry_forward, heading, level_rotation, rotate, rotations, turn_about_vertical
 from pipeline.statistics.arrays import FloatArray
 
 TRACKER, IMU = Sensor("position", 8.0, 0.1), Sensor("acceleration", 100.0)
@@ -53,7 +53,7 @@ def test_a_gap_in_the_orientation_is_carried_on_by_the_gyroscope_for_a_second() 
     logged[:30] = np.nan  # before the first known one
     logged[100:150] = np.nan
     logged[200:350] = np.nan  # longer than a second
-    found = carried(time, logged, gyroscope)
+    found = carry_forward(time, logged, gyroscope)
     assert np.isnan(found[:30]).all()
     assert np.isnan(found[305:350]).all()
     for part in (slice(100, 150), slice(200, 299)):
@@ -65,7 +65,7 @@ def test_a_gap_in_the_orientation_is_carried_on_by_the_gyroscope_for_a_second() 
 @given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda g: sum(x * x for x in g) > 0.01))
 def test_level_turns_up_into_up(gravity: tuple[float, ...]) -> None:
     down = np.array(gravity)
-    up = rotate(level(down), np.array([[0.0, 0.0, 1.0]]))[0]
+    up = rotate(level_rotation(down), np.array([[0.0, 0.0, 1.0]]))[0]
     np.testing.assert_allclose(up, -down / np.linalg.norm(down), atol=1e-9)
 
 
@@ -81,7 +81,7 @@ def test_the_heading_is_found_from_the_motion(angle_deg: float) -> None:
     settled = time > 3
     assert sd[settled].max() < 0.1
     assert np.mean(np.abs(apart[settled]) < 1.96 * sd[settled]) > 0.85
-    turned = rotate(headed(np.array([[0.0, 0.0, 0.0, 1.0]]), np.array([angle])), off[:1])
+    turned = rotate(turn_about_vertical(np.array([[0.0, 0.0, 0.0, 1.0]]), np.array([angle])), off[:1])
     np.testing.assert_allclose(turned, Rotation.from_rotvec([0, 0, angle]).apply(off[:1]), atol=1e-6)
 
 
@@ -116,7 +116,7 @@ def test_mounting_and_lever_arm_are_found_with_intervals_that_hold_them() -> Non
     assert np.all(np.abs(found.lever_arm_mm - arm) < 3 * found.lever_arm_sd_mm)
     assert np.all(found.mounting_sd_rad < np.radians(0.5))
     assert np.all(found.lever_arm_sd_mm < 10)
-    turned = Rotation.from_matrix(mounted(body.rotation, found.mounting_rad))
+    turned = Rotation.from_matrix(with_mounting(body.rotation, found.mounting_rad))
     assert np.degrees((turned.inv() * own).magnitude()).max() < 0.5
 
 

@@ -194,8 +194,8 @@ def test_weights_of_regular_windows_are_those_of_their_own_times_to_a_millionth(
     fast, slow = auto.replay(samples, times), own.replay(samples, times)
     np.testing.assert_allclose(fast.mean, slow.mean, atol=1e-6)
     np.testing.assert_allclose(fast.sd, slow.sd, atol=1e-6)
-    assert 0 < len(auto._patterns) < 50
-    assert not own._patterns
+    assert 0 < len(auto._known_patterns) < 50
+    assert not own._known_patterns
 
 
 def test_an_irregular_stretch_takes_its_own_times() -> None:

@@ -216,7 +216,7 @@ def test_estimators_from_a_file(study: Path, steadyhand: Steadyhand, tmp_path: P
         (["--set", "fusion.window=3,,5"], "not a list of values"),
         (["--set", "fusion.window=3,~"], "a value is missing"),
         (["--set", "fusion.window=[3"], "not a list of values"),
-        (["--set", "fusion.window=3,5,3"], "a value stands there twice"),
+        (["--set", "fusion.window=3,5,3"], "a value is listed twice"),
         (["--set", "fusion.window=3", "--set", "fusion.window=5"], "fusion.window is set twice"),
     ],
 )

@@ -202,7 +202,7 @@ def test_fit_holds_gravity_against_study_yaml_and_takes_no_bound(
     assert "# P1_a: red, mean acceleration: imu: " in ran.out
     off = Parameter("streams.tracker", "noise_sd_mm", 8.0, Fitted(0.001, 0.0009, 0.0011, True))
     assert off.at_bound
-    assert not off.taken
+    assert not off.usable
 
 
 def test_fit_without_logs_says_so(

@@ -386,7 +386,7 @@ def test_a_bad_study_does_not_stop_the_next(study: Path, folder: Folder, steadyh
     bad = folder("conditions: [a]\n", name="bad")
     ran = steadyhand("compare", bad, str(study))
     assert ran.code == 2
-    assert f"{bad / 'study.yaml'}: names no data" in ran.err
+    assert f"{bad / 'study.yaml'}: has no data" in ran.err
     assert (steadyhand.out / "study" / "results.json").is_file()
 
 

@@ -23,10 +23,12 @@ def read(path: Path, wanted: Iterable[Wanted]) -> Log:
 
     With nothing wanted, every message of every topic is counted, and those that a study could not decode are said.
     """
-    asked = {want.topic: want.content for want in wanted}
-    walked = walk_log(path, asked or None)
-    if asked:
-        topics = {topic: decode(walked, topic, content) for topic, content in asked.items() if topic in walked.topics}
+    content_of = {want.topic: want.content for want in wanted}
+    walked = walk_log(path, content_of or None)
+    if content_of:
+        topics = {
+            topic: decode(walked, topic, content) for topic, content in content_of.items() if topic in walked.topics
+        }
     else:
         topics = {topic: counted(walked, topic) for topic in walked.topics}
     return Log(walked.facts, topics, tuple(walked.faults), _types(walked))

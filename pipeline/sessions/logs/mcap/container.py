@@ -44,7 +44,7 @@ _DEFINITION_LIMIT = 2**20  # bytes of a schema or channel
 
 @dataclass
 class Topic:
-    """What is gathered of one topic while the file is walked."""
+    """What has been collected of one topic while the file is read."""
 
     parts: list[Messages] = field(default_factory=list)
     channels: list[int] = field(default_factory=list)
@@ -53,7 +53,7 @@ class Topic:
 
     @property
     def read(self) -> int:
-        """How many of its messages are there."""
+        """How many of its messages have been found."""
         return sum(map(len, self.parts))
 
 
@@ -83,7 +83,7 @@ class Walk:
     complete: bool = False
 
     def note(self, fault: str) -> None:
-        """Something is wrong with the file. Beyond so many faults they are only counted."""
+        """Note a fault of the file; after the first few, faults are only counted."""
         self.noted += 1
         if self.noted <= _FAULTS_LIMIT:
             self.faults.append(fault)
@@ -259,7 +259,7 @@ def _take_loose(walk: Walk) -> None:
 
 
 def _take_records(walk: Walk, data: bytes) -> bool:
-    """The schemas, channels and messages of a chunk, or outside of any; False where they end in mid-record."""
+    """Read the schemas, channels and messages in a chunk or outside of any; False if they end in mid-record."""
     found, whole = record_starts(data, walk.messages_limit - walk.messages)
     walk.messages += len(found)
     if walk.messages > walk.messages_limit:
@@ -284,7 +284,7 @@ def _take_records(walk: Walk, data: bytes) -> bool:
 
 
 def _share_out(walk: Walk) -> None:
-    """Each message to its topic, in the order of the file; the bytes of the wanted topics only are kept."""
+    """Add each message to its topic, in the order of the file; only the bytes of wanted topics are kept."""
     messages = joined(walk.unshared)
     walk.unshared.clear()
     shares: dict[str | None, list[IntArray]] = {}
@@ -333,7 +333,7 @@ def _contradiction(walk: Walk, what: str, number: int, first: str, second: str) 
     text = f'{what} {number} is defined twice, as "{first}" and as "{second}"'
     if walk.in_summary:
         return ValueError(text)
-    return SessionError(f"{text}: which messages belong to which cannot be told")
+    return SessionError(f"{text}: it is unknown which messages belong to which topic")
 
 
 def _take_chunk(walk: Walk, body: bytes) -> None:
@@ -355,7 +355,7 @@ def _take_chunk(walk: Walk, body: bytes) -> None:
 
 
 def _allow(walk: Walk, stated: int) -> None:
-    """SessionError if so many bytes more would be a bomb."""
+    """Raise SessionError if this many more bytes would make the log a decompression bomb."""
     walk.inflated += stated
     if walk.inflated > walk.inflated_limit:
         raise SessionError(

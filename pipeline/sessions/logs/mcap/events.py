@@ -28,7 +28,7 @@ def event(channel: Channel, payload: bytes, farthest_m: float) -> Mapping[str, o
         raise ValueError(f"it is longer than {_EVENT_LIMIT // 1024} KiB, which no event is")
     said = json.loads(payload)
     if not isinstance(said, dict) or said.get("type") not in EVENT_TYPES:
-        raise ValueError(f"it is no event: `type` must be one of {', '.join(EVENT_TYPES)}")
+        raise ValueError(f"it is not an event: `type` must be one of {', '.join(EVENT_TYPES)}")
     trial = said.get("trial")
     if trial is not None and not (isinstance(trial, int) and abs(trial) < _NUMBER_LIMIT):
         raise ValueError("its trial is not a whole number")
