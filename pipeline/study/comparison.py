@@ -29,7 +29,7 @@ _OPTIONS = {option for test in TESTS.values() for option in test.options}
 
 
 class Comparison(Frozen):
-    """What to test. A key that the test has no use for is an error, for something else was meant."""
+    """What to test. A key that the test does not take is an error, since the user must have meant something else."""
 
     measure: Id | Annotated[tuple[Id, ...], Field(min_length=1)]
     test: TestName
@@ -57,7 +57,7 @@ class Comparison(Frozen):
             raise ValueError(f"bounds need the lower one first, found {list(self.bounds)}")
         for key, names in (("within", self.within), ("fixed", self.terms)):
             if "condition" not in names or len(set(names)) < len(names):
-                raise ValueError(f'{key} of "{self.title}" needs "condition", and no name twice')
+                raise ValueError(f'{key} of "{self.title}" must contain "condition", and no name twice')
         if len(self.within) > 3:
             raise ValueError(f"{self.test} does not take within: {list(self.within)}; three factors are the most")
         for term in self.terms:
@@ -81,7 +81,7 @@ class Comparison(Frozen):
 
     @property
     def options(self) -> tuple[str, ...]:
-        """The keys that mean something to its test alone."""
+        """The keys of the entry that its test takes and some others do not."""
         return TESTS[self.test].options
 
     @property
@@ -91,5 +91,5 @@ class Comparison(Frozen):
 
     @property
     def period_is_slope(self) -> bool:
-        """Is the period a number, each counting as much more as the last one?"""
+        """Whether the period is a number, with the same effect from each period to the next, rather than a factor."""
         return _PERIOD_AS_FACTOR not in self.fixed

@@ -1,4 +1,4 @@
-"""A study's own CSV tables: participants, trials, questionnaires, measures; checked row by row, every fault named."""
+"""Reads a study's own CSV tables (participants, trials, questionnaires, measures) and checks them row by row."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MEASURE_RESERVED = ("trial", "period", "sequence", "unit")
 
 
 def _read(path: Path, required: Sequence[str], optional: Sequence[str] | None) -> pd.DataFrame:
-    """A CSV file as text, ids in NFC; other columns are welcome only where `optional` is None."""
+    """A CSV file as text, ids in NFC; columns that are not listed are allowed only if `optional` is None."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file, strict=True)
@@ -63,7 +63,7 @@ def _header(path: Path, first: Sequence[str], required: Sequence[str], optional:
     header = [str(identifier(name.strip())) for name in first]
     for name in header:
         if header.count(name) > 1:
-            raise PipelineError(f'{path}: the column "{name}" stands there twice')
+            raise PipelineError(f'{path}: the column "{name}" is listed twice')
         if not name:
             raise PipelineError(f"{path}: a column has no name")
     for name in required:
@@ -84,7 +84,7 @@ def _required_text(path: Path, table: pd.DataFrame, columns: Iterable[str]) -> N
 
 
 def _number(text: str) -> float:
-    """A number as people write them: no underscores, nor figures beyond what squares and sums can hold."""
+    """A number as people write it: no underscores, and not so large or small that squares or sums overflow."""
     value = float(text)
     if "_" in text:
         raise ValueError
@@ -94,7 +94,7 @@ def _number(text: str) -> float:
 
 
 def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
-    """A column as numbers, NaN for a missing cell; text is an error that names its rows."""
+    """A column as numbers, NaN for a missing cell. Raises PipelineError, naming the rows, for other text."""
     values, faults = [], []
     for line, text in table[column].items():
         try:
@@ -148,7 +148,10 @@ def _check_unique(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> No
 
 
 def read_participants(path: Path) -> pd.DataFrame:
-    """A row a participant, everything as text; the column participant is unique."""
+    """One row per participant, everything as text; the column participant is unique.
+
+    Raises PipelineError, naming the file and the row, where the table is not as docs/tables.md says; so do the others.
+    """
     table = _read(path, PARTICIPANT_REQUIRED, None)
     _required_text(path, table, ["participant"])
     _check_unique(path, table, ["participant"])
@@ -156,7 +159,7 @@ def read_participants(path: Path) -> pd.DataFrame:
 
 
 def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
-    """A row a trial: ids, trial (whole number), coordinates in mm and times in s (NaN where missing)."""
+    """One row per trial: ids, trial (whole number), coordinates in mm and times in s (NaN where missing)."""
     table = _read(path, TRIAL_REQUIRED, TRIAL_OPTIONAL)
     for column in TRIAL_OPTIONAL:
         if column not in table:
@@ -171,7 +174,7 @@ def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
 
 
 def read_questionnaires(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
-    """A row a rating, NaN where missing."""
+    """One row per rating, NaN where missing."""
     table = _read(path, RATING_REQUIRED, ("session",))
     _required_text(path, table, RATING_REQUIRED[:4])
     _check_conditions(path, table, conditions)
@@ -182,9 +185,9 @@ def read_questionnaires(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
 
 
 def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
-    """A row a value, NaN where missing, and the names of the further within-factors, each a column of text.
+    """One row per value, NaN where missing, and the names of further within-factors, each a column of text.
 
-    The column period, if there, holds whole numbers.
+    The column period, if there is one, holds whole numbers.
     """
     table = _read(path, MEASURE_REQUIRED, None)
     factors = [str(name) for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]

@@ -15,13 +15,16 @@ Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 
 
 class Frozen(BaseModel):
-    """Immutable, and every key is known."""
+    """A model that cannot be changed and refuses unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 def identifier(value: object) -> object:
-    """An id as text in Unicode NFC: 7 and "7" are one, and so are the two ways to write "é"."""
+    """An id as text in Unicode NFC, so that 7 and "7" are the same id, and so are the two ways to encode "é".
+
+    Raises ValueError for true and false, which YAML makes of an unquoted yes or no.
+    """
     if isinstance(value, bool):
         raise ValueError(f'is read as true/false; put it in quotes: "{value}"')
     if isinstance(value, int | float):
@@ -45,13 +48,13 @@ Axes = Annotated[tuple[Axis, ...], Field(min_length=1)]
 
 
 def unique(field: str, values: tuple[str, ...]) -> None:
-    """ValueError where one of the values stands there twice."""
+    """Raise ValueError where a value is listed twice."""
     for value in values:
         if values.count(value) > 1:
-            raise ValueError(f'{field}: "{value}" stands there twice')
+            raise ValueError(f'{field}: "{value}" is listed twice')
 
 
 def known(field: str, value: str, names: Mapping[str, object] | tuple[str, ...]) -> None:
-    """ValueError where a value is none of the names, with the one that was meant."""
+    """Raise ValueError where a value is not one of the names, suggesting the one that was probably meant."""
     if value not in names:
         raise ValueError(f'{field}: "{value}" is not known{did_you_mean(value, names)}')

@@ -1,4 +1,4 @@
-"""A study's folder: its settings read and checked, its sessions found, and no path that leads out of it."""
+"""A study's folder: reads and checks its settings, finds its sessions, and refuses paths outside the folder."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed
 
 
 def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
-    """The settings of a study folder; PipelineError that names the file, the field, the fault and the remedy.
+    """The settings of a study folder. Raises PipelineError, naming the file, the field, the fault and the remedy.
 
-    With `to_be_made` its tables need not be there yet.
+    With `to_be_made` its tables need not exist yet.
     """
     if not folder.is_dir():
         raise PipelineError(f"{folder}: there is no such folder; a study is a folder with a {SETTINGS_FILE} in it")
@@ -45,7 +45,7 @@ def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
 
 
 def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path:
-    """A path of the study, refused if it leads out of its folder by `..`, a root or a link."""
+    """The path of a file of the study. Raises PipelineError if `..`, a root or a link makes it outside the folder."""
     root = folder.resolve()
     path = root / name
     try:
@@ -54,28 +54,32 @@ def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path
     except (OSError, ValueError, RuntimeError) as error:
         raise PipelineError(f"{field}: {name!r} cannot be a path: {error}") from None
     if leads_out:
-        raise PipelineError(f'{field}: "{name}" leads out of the study folder; put the file into it')
+        raise PipelineError(f'{field}: "{name}" is outside the study folder; put the file into it')
     if must_exist and not exists:
         raise PipelineError(f'{field}: there is no file "{name}" in the study folder')
     return path
 
 
 @dataclass(frozen=True)
-class Found:
-    """A study's logs by id; what has a log's name and cannot be read; what lies beside them and has not."""
+class SessionFiles:
+    """The logs of a study, sorted by id.
+
+    `set_aside` are files that have a log's name and cannot be read, `unused` other files beside the logs, each with the
+    reason.
+    """
 
     sessions: list[Session]
     set_aside: list[tuple[Session, str]]
     unused: list[tuple[str, str]]
 
 
-def find_sessions(folder: Path, study: Study) -> Found:
-    """The logs that match the study's pattern, sorted by id, and what is there beside them, with the reason.
+def find_sessions(folder: Path, study: Study) -> SessionFiles:
+    """The logs that match the study's pattern, and the files that are not used.
 
-    Two equal ids, or a link that leads out of the folder, are a PipelineError.
+    Raises PipelineError for two logs with the same id, or a link to a place outside the folder.
     """
     if study.sessions is None:
-        return Found([], [], [])
+        return SessionFiles([], [], [])
     root = folder.resolve()
     pieces = PLACEHOLDER.split(Path(study.sessions).as_posix())
     pattern = "".join(
@@ -98,8 +102,8 @@ def find_sessions(folder: Path, study: Study) -> Found:
         if match is None or reason is not None:
             continue
         inside(folder, path.relative_to(root).as_posix(), f"{folder / SETTINGS_FILE}: sessions")
-        found = match.groupdict()
-        session = Session(Path(relative).stem, found.get("participant"), found.get("condition"), path)
+        named = match.groupdict()
+        session = Session(Path(relative).stem, named.get("participant"), named.get("condition"), path)
         if session.id in sessions:
             other = sessions[session.id].path.relative_to(root)
             raise PipelineError(
@@ -107,11 +111,11 @@ def find_sessions(folder: Path, study: Study) -> Found:
                 f"\"{session.id}\"; a session's id is its file's name, rename one"
             )
         sessions[session.id] = session
-    return Found([sessions[key] for key in sorted(sessions)], set_aside, unused)
+    return SessionFiles([sessions[key] for key in sorted(sessions)], set_aside, unused)
 
 
 def _cannot_be_a_log(path: Path, relative: str, matches: bool, suffix: str) -> str | None:
-    """Why a file among the sessions is not used; None for one that is, or that has nothing to do with them."""
+    """Why a file among the sessions is not used; None for a log, and for files that are not meant as logs."""
     if path.is_symlink() and path.is_dir():
         return "a link to a folder is not followed"
     if path.is_dir() and not matches:

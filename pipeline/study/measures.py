@@ -1,7 +1,7 @@
-"""What is known of each measure and questionnaire: its name for people, unit, scale, direction and source.
+"""The records of measures and questionnaires: label, unit, scale, which direction is better, and source.
 
 One record per measure. Labels, the order of tables, which section of the report shows a measure, whether a percentage
-may be said of it and which direction is better follow from its record, and from nothing else.
+may be stated for it and which direction is better all follow from its record.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _TOTAL = "total"
 class Measure:
     """A dependent variable.
 
-    `unit` is what people read, as in "mm". Only on a ratio scale, whose zero means "none", is a percentage of change
-    meaningful (Stevens 1946). `headline` ranks the measures that the first page looks for, 0 first; None for the
-    others. `cite` are keys of references.bib.
+    `unit` is as shown, such as "mm". A percentage of change is meaningful only on a ratio scale, whose zero means
+    "none" (Stevens 1946). `headline` ranks the measures that the first page may show, 0 first; None for the others.
+    `cite` are keys of references.bib.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class Questionnaire:
-    """A standard instrument: its name for people, its scales or items in their own order, and who made it."""
+    """A standard instrument: its label, its scales or items in their own order, and the publications to cite."""
 
     name: str
     label: str
@@ -145,12 +145,12 @@ _UNITS: Mapping[str, str] = {
     "_s": "s",
     "_percent": "%",
 }
-"""The unit that the end of a measure's name tells. Longer ends first: `_mm_s` is no time."""
+"""The unit by the ending of a measure's name. Longer endings come first: `_mm_s` is not a time in `_s`."""
 
 
 @cache
 def measure(name: str) -> Measure:
-    """The record of a measure; of one that is not ours, what its name tells."""
+    """The record of a measure; for one that Steadyhand does not compute itself, made from its name."""
     if name in MEASURES:
         return MEASURES[name]
     questionnaire, slash, scale = name.partition("/")
@@ -163,7 +163,7 @@ def measure(name: str) -> Measure:
 
 
 def _rating(name: str, questionnaire: str, scale: str) -> Measure:
-    """A scale of a questionnaire. Ratings have an order and, by habit, equal steps, but no zero that means none."""
+    """The record of a questionnaire's scale. Ratings count as interval: equal steps, but no zero that means none."""
     known = QUESTIONNAIRES.get(questionnaire, Questionnaire(questionnaire, _spaced(questionnaire)))
     order = known.scales.index(scale) if scale in known.scales else len(known.scales)
     return Measure(
@@ -180,7 +180,7 @@ def _rating(name: str, questionnaire: str, scale: str) -> Measure:
 
 
 def has_total(questionnaire: str) -> bool:
-    """Do people report the plain sum of its scales?"""
+    """Whether the plain sum of its scales is customarily reported."""
     return questionnaire in QUESTIONNAIRES and QUESTIONNAIRES[questionnaire].has_total
 
 
@@ -190,13 +190,13 @@ def reported_scales(questionnaire: str) -> tuple[str, ...]:
 
 
 def measure_order(name: str) -> tuple[str, int, str]:
-    """What to sort measures by: a questionnaire's scales stand in their own order, its total last."""
+    """A key to sort measures by: a questionnaire's scales come in their own order, its total last."""
     first, _, scale = name.partition("/")
     return first, measure(name).order, scale
 
 
 def headlines(names: Iterable[str]) -> list[str]:
-    """Those of some measures that people look for first, the first of them first."""
+    """Those of the named measures that may be on the first page, in order of their rank."""
     ranked = [(rank, name) for name in names if (rank := measure(name).headline) is not None]
     return [name for _, name in sorted(ranked)]
 

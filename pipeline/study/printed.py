@@ -1,4 +1,4 @@
-"""printed.yaml as frozen models: what a publication prints, digit for digit. docs/audit.md is the reference."""
+"""printed.yaml as frozen models: the figures of a publication, digit for digit. docs/audit.md is the reference."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ BETWEEN = ("t_independent", "welch", "anova", "mann_whitney", "kruskal")
 
 
 def _listed(value: object) -> object:
-    """One thing as a list of it."""
+    """A single text as a list with that text."""
     return (value,) if isinstance(value, str) else value
 
 
 def _read(value: object, info: ValidationInfo) -> Rounded:
-    """A figure; `rounding` of the validation's context says how to take it."""
+    """A printed figure; `rounding` in the validation's context says how it was rounded."""
     if isinstance(value, Rounded):
         return value
     if not isinstance(value, str):
@@ -118,7 +118,7 @@ _OF_ONE_TEST = {"W": "wilcoxon", "U": "mann_whitney", "H": "kruskal", "discordan
 
 
 class PrintedTest(Frozen):
-    """A printed test: its statistic, degrees of freedom, p, and what the text says of it."""
+    """A printed test: its statistic, degrees of freedom, p, and what the text says about it."""
 
     test: (
         Literal[
@@ -189,7 +189,7 @@ class PrintedTest(Frozen):
 
 
 class Measure(Frozen):
-    """What is printed of one dependent variable. `measure` is the study's own name for it, where there is a study."""
+    """The printed figures of one dependent variable. `measure` is the study's own name for it, if there is a study."""
 
     name: Id
     measure: Id | None = None
@@ -211,7 +211,7 @@ class Measure(Frozen):
 
     @property
     def between(self) -> bool:
-        """Are its conditions groups of different participants?"""
+        """Whether its conditions are groups of different participants."""
         return any(test.test in BETWEEN for test in self.tests)
 
 
@@ -235,7 +235,7 @@ class Total(Frozen):
 
     @property
     def printed(self) -> Rounded:
-        """The one of the three that is there."""
+        """The one of the three that is given."""
         (figure,) = (figure for figure in (self.sum, self.mean, self.average) if figure is not None)
         return figure
 
@@ -250,7 +250,7 @@ class Share(Frozen):
 
 
 class Parts(Frozen):
-    """Counts that make a printed total."""
+    """Counts that add up to a printed total."""
 
     label: str
     parts: tuple[Annotated[int, Field(ge=0)], ...]
@@ -315,12 +315,12 @@ class Publication(Frozen):
 
 
 def matches(pattern: str, name: str) -> bool:
-    """Does a name fit a pattern, in which * stands for any text?"""
+    """Whether a name matches a pattern, in which * stands for any text."""
     return re.fullmatch(".*".join(re.escape(piece) for piece in pattern.split("*")), name) is not None
 
 
 def load_publication(path: Path) -> Publication:
-    """A file of printed figures; PipelineError that names the file, the field, the fault and the remedy."""
+    """A file of printed figures. Raises PipelineError, naming the file, the field, the fault and the remedy."""
     content: dict[str, Any] = read_yaml(path, as_text=True)
     publication = parse(Publication, content, path)
     return publication.as_read("cut_off") if publication.rounding == "cut_off" else publication

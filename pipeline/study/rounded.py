@@ -40,27 +40,27 @@ class Interval:
         return Interval(min(ends), max(ends))
 
     def meets(self, other: Interval) -> bool:
-        """Is there a value in both?"""
+        """Whether some value is in both."""
         return self.low <= other.high and other.low <= self.high
 
     def size(self) -> Interval:
-        """Of the values without their sign."""
+        """The interval of the values' absolute sizes."""
         ends = sorted((abs(self.low), abs(self.high)))
         return Interval(Fraction(0) if self.low <= 0 <= self.high else ends[0], ends[1])
 
     def squared(self) -> Interval:
-        """Of the values' squares."""
+        """The interval of the values' squares."""
         size = self.size()
         return Interval(size.low**2, size.high**2)
 
     def at_least(self, low: int) -> Interval:
-        """What of it is not below a bound; the bound where nothing is."""
+        """The part that is not below a bound; the bound itself if there is none."""
         return Interval(max(self.low, Fraction(low)), max(self.high, Fraction(low)))
 
 
 @dataclass(frozen=True)
 class Rounded:
-    """A number as printed. `unit` is one in its last digit, `relation` another than = only for p values."""
+    """A number as printed. `unit` is one in its last digit; `relation` is other than = only for p values."""
 
     text: str
     value: Fraction
@@ -70,7 +70,7 @@ class Rounded:
 
     @classmethod
     def read(cls, text: str, rounding: Rounding = "nearest") -> Rounded:
-        """From its text: 12, 0.050, .050, −1.5, 3.7263e5, 38.3 %, < .001; ValueError for any other."""
+        """From its text: 12, 0.050, .050, −1.5, 3.7263e5, 38.3 %, < .001. Raises ValueError for anything else."""
         spelt = text.strip().translate(_SPELLINGS).replace("<=", "≤").replace(">=", "≥")
         match = _NUMBER.fullmatch(spelt)
         if match is None:
@@ -81,7 +81,7 @@ class Rounded:
         return cls(text.strip(), value, Fraction(10) ** -decimals, relation or "=", rounding)  # type: ignore[arg-type]
 
     def as_read(self, rounding: Rounding) -> Rounded:
-        """The same print, taken to be rounded in another way."""
+        """The same printed figure, assumed to be rounded in another way."""
         return replace(self, rounding=rounding)
 
     @property
@@ -104,7 +104,7 @@ class Rounded:
         return Interval(self.value - inwards, self.value + outwards)
 
     def like(self, value: Fraction | float) -> str:
-        """Another value with as many digits."""
+        """Another value, written with as many decimals."""
         decimals = _decimals(self.unit)
         if decimals > _MOST_DECIMALS:
             return f"{float(value):.3g}"
@@ -114,10 +114,10 @@ class Rounded:
         return re.sub(r"e\+0?", "e", f"{float(value):.{digits}e}")
 
     def span(self, low: Fraction | float, high: Fraction | float) -> str:
-        """Two values with as many digits, or one where they read the same."""
+        """Two values, written with as many decimals; only one if they read the same."""
         return " to ".join(dict.fromkeys((self.like(low), self.like(high))))
 
 
 def _decimals(unit: Fraction) -> int:
-    """How many digits stand behind the point; fewer than none where the last digit counts tens or more."""
+    """The number of decimals; negative where the last printed digit counts tens or more."""
     return len(str(unit.denominator)) - 1 if unit <= 1 else 1 - len(str(unit.numerator))

@@ -20,9 +20,8 @@ Limits = tuple[float, float]
 class ScoringRule:
     """A published way to score an instrument.
 
-    `limits` are the lowest and the highest answer; None where sheets differ, so that study.yaml must say. `bounds` are
-    those of its scores by name. `cite` are keys of references.bib. `assumes` is what the rule takes for granted of the
-    sheet, as a sentence for people.
+    `limits` are the lowest and the highest answer; None where sheets differ, so that study.yaml must state them. `cite`
+    are keys of references.bib. `assumes` says in a sentence what the rule assumes about the sheet.
     """
 
     name: str
@@ -38,7 +37,7 @@ class ScoringRule:
 
     @property
     def weighted(self) -> bool:
-        """Does a score of it need the participants' own weights?"""
+        """Whether one of its scores needs the participants' own weights."""
         return any(scale.weighted for scale in self.scales)
 
     def item(self, given: str) -> str | None:
@@ -65,7 +64,7 @@ def own_rule(
     reversed_items: Iterable[str] = (),
     better: Literal["lower", "higher"] = "higher",
 ) -> ScoringRule:
-    """The rule that study.yaml states itself: the mean or the sum of all items, named `score`."""
+    """A rule that study.yaml states itself: the mean or the sum of all items, as a scale named `score`."""
     named = tuple(items)
     return ScoringRule(
         "own", "", named, (Scale("score", named, reading),), (), better, limits, frozenset(reversed_items)

@@ -16,6 +16,7 @@ PLACEHOLDERS = ("participant", "condition", "session")
 
 
 def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
+    """Raise ValueError where a pattern of sessions has no placeholder, an unknown one, or cannot match a condition."""
     names = PLACEHOLDER.findall(pattern)
     for name in names:
         if name not in PLACEHOLDERS:
@@ -33,7 +34,7 @@ def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
 
 @dataclass(frozen=True)
 class Session:
-    """One participant in one condition, one log. Null where the file's name does not say."""
+    """One participant in one condition, which is one log. `participant` and `condition` are None if not yet known."""
 
     id: str
     participant: str | None

@@ -44,7 +44,7 @@ class Estimators(Frozen):
 
 
 class Exclusion(Frozen):
-    """What is left out by decision: a participant, or one of their conditions, or a session, in one measure or all."""
+    """What the user excludes: a participant, one of their conditions, or a session, in one measure or in all."""
 
     participant: Id | None = None
     condition: Id | None = None
@@ -55,11 +55,11 @@ class Exclusion(Frozen):
     @model_validator(mode="after")
     def _names_someone(self) -> Exclusion:
         if self.participant is None and self.session is None:
-            raise ValueError("names neither a participant nor a session")
+            raise ValueError("needs a participant or a session to exclude")
         return self
 
     def covers(self, **ids: str | None) -> bool:
-        """Does it name nothing that differs from these ids?"""
+        """Whether it excludes what has these ids: everything that it names is the same."""
         return all(getattr(self, key) in (None, value) for key, value in ids.items())
 
 
@@ -70,9 +70,9 @@ Shares = tuple[_Share, _Share]
 
 
 class QualityLimits(Frozen):
-    """From where a figure of a session's quality is amber, and from where red; the report's traffic lights.
+    """The limits (amber, red) of a session's quality figures, for the report's traffic lights.
 
-    Beyond is more, except for `rate_share`, where it is less.
+    A figure above a limit has that colour; for `rate_share`, a figure below it.
     """
 
     rate_share: Shares = (0.8, 0.5)
@@ -146,15 +146,15 @@ class Study(Frozen):
         for kind in ("reference", "display"):
             named = [name for name, stream in self.streams.items() if stream.kind == kind]
             if len(named) > 1:
-                raise ValueError(f"streams: {' and '.join(named)} are both of kind {kind}; there can be one")
+                raise ValueError(f"streams: {' and '.join(named)} are both of kind {kind}; keep one")
         if self.sessions is not None:
             check_pattern(self.sessions, self.conditions)
         if not (self.sessions or self.trials or self.questionnaires or self.measures):
-            raise ValueError("names no data; give sessions, trials, questionnaires or measures")
+            raise ValueError("has no data; add sessions, trials, questionnaires or measures")
         return self
 
     def _families_fit(self) -> None:
-        """A family is adjusted in one way."""
+        """Raise ValueError where the tests of one family are adjusted in different ways."""
         ways: dict[str, str] = {}
         for comparison in self.comparisons:
             if (
@@ -166,7 +166,7 @@ class Study(Frozen):
 
     def exclusion_of(self, session: Session) -> Exclusion | None:
         """The first decision by which a session is left out as a whole."""
-        whole = (one for one in self.exclusions if one.measure is None and one.covers(**session.ids))
+        whole = (each for each in self.exclusions if each.measure is None and each.covers(**session.ids))
         return next(whole, None)
 
     def _sensors_fit(self) -> None:

@@ -1,4 +1,4 @@
-"""What is known of each statistical test: its names for people, its options, what it assumes and whom to cite.
+"""The records of statistical tests: names, options, what each assumes, and which publications to cite.
 
 One record per test. The names that study.yaml takes, labels, the methods text, cautions and references follow from
 it. Which function computes it stands in pipeline/analysis/comparisons.py, so that a change of that arithmetic does not
@@ -19,9 +19,9 @@ Question = Literal["difference", "equivalence", "evidence"]
 class StatisticalTest:
     """A test of study.yaml.
 
-    `label` stands in tables, `long_name` in sentences, `methods_text` in the methods paragraph. `options` are the keys
-    of an entry that only some tests take. `symbol_tells` where the statistic's letter says which test it was. A test
-    of another `question` than "difference" is no evidence for or against a difference by its p.
+    `label` is used in tables, `long_name` in sentences, `methods_text` in the methods paragraph. `options` are the keys
+    of an entry that only some tests take. `symbol_tells` is true if the letter of the statistic says which test it was.
+    The p of a test whose `question` is not "difference" says nothing about a difference.
     """
 
     name: str
@@ -41,7 +41,7 @@ class StatisticalTest:
 
     @property
     def tests_difference(self) -> bool:
-        """Is a small p evidence for a difference?"""
+        """Whether a small p is evidence for a difference."""
         return self.question == "difference"
 
 
@@ -187,7 +187,7 @@ TESTS: Mapping[str, StatisticalTest] = {
 
 @dataclass(frozen=True)
 class Adjustment:
-    """A way of adjusting the p values of a family of tests, as study.yaml names it and as people do."""
+    """A way of adjusting the p values of a family of tests: its name in study.yaml, and its label."""
 
     name: str
     label: str
@@ -206,5 +206,5 @@ ADJUSTMENTS: Mapping[str, Adjustment] = {
 
 
 def tests_that_take(option: str) -> list[str]:
-    """The tests for which a key of an entry means something."""
+    """The tests that take a key of an entry."""
     return [test.name for test in TESTS.values() if option in test.options]

@@ -1,4 +1,4 @@
-"""The kinds of sensor streams in study.yaml, and what each must say of itself."""
+"""The kinds of sensor streams in study.yaml, and the keys that each takes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""YAML text as values and models, with errors that name the file, the field and the remedy."""
+"""Reads YAML into values and models; errors name the file, the field and the remedy."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """A key that stands twice in one mapping is an error, not the last one's victory."""
+    """A loader for which a key that is given twice in one mapping is an error; PyYAML silently takes the last."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """No aliases: a few lines of them can stand for gigabytes."""
+        """Refuse aliases: a few lines of them can expand to gigabytes."""
         if self.check_event(yaml.AliasEvent):
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
             raise yaml.MarkedYAMLError(problem="aliases (*name) are not understood; write it out", problem_mark=mark)
@@ -32,7 +32,7 @@ def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, o
     for key, _ in node.value:
         if isinstance(key, yaml.ScalarNode):
             if key.value in seen:
-                raise yaml.MarkedYAMLError(problem=f'"{key.value}" stands there twice', problem_mark=key.start_mark)
+                raise yaml.MarkedYAMLError(problem=f'"{key.value}" is given twice', problem_mark=key.start_mark)
             seen.add(key.value)
     return dict(loader.construct_mapping(node, deep=True))
 
@@ -41,14 +41,14 @@ _UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG,
 
 
 class _TextLoader(_UniqueKeyLoader):
-    """Numbers stay text: 0.050 keeps its last digit."""
+    """A loader that leaves numbers as text, so that 0.050 keeps its last digit."""
 
 
 _TextLoader.yaml_implicit_resolvers = {}
 
 
 def read_yaml(path: Path, as_text: bool = False) -> dict[str, Any]:
-    """A YAML file that holds a mapping; PipelineError that names the file and line where it does not.
+    """The mapping in a YAML file. Raises PipelineError, naming the file and line, where there is none.
 
     `as_text` leaves every value as it is written, numbers too.
     """
@@ -76,19 +76,19 @@ def read_yaml(path: Path, as_text: bool = False) -> dict[str, Any]:
 
 
 def read_values(text: str) -> list[Any]:
-    """A list in YAML without its brackets, "3, 5"; ValueError where it is none."""
+    """The values of a YAML list without its brackets, such as "3, 5". Raises ValueError where it is not a list."""
     try:
-        found = yaml.load(f"[{text}]", Loader=_UniqueKeyLoader)  # noqa: S506 - safe
+        values = yaml.load(f"[{text}]", Loader=_UniqueKeyLoader)  # noqa: S506 - safe
     except (yaml.YAMLError, RecursionError) as error:
         fault = error.problem if isinstance(error, yaml.MarkedYAMLError) else error
         raise ValueError(f"not a list of values: {fault}") from None
-    if not isinstance(found, list) or any(value is None for value in found):
+    if not isinstance(values, list) or any(value is None for value in values):
         raise ValueError("a value is missing")
-    return found
+    return values
 
 
 def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Model:
-    """Content as a model; every fault in one PipelineError, a line each."""
+    """Content as a model. Raises one PipelineError with a line for every fault."""
     try:
         return model.model_validate(content)
     except ValidationError as error:
@@ -96,7 +96,7 @@ def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Mo
 
 
 def _explained(fault: Any, model: type[BaseModel]) -> str:
-    """One fault of pydantic's in the user's words."""
+    """One of pydantic's faults in the words of study.yaml."""
     words, there = _followed(model, fault["loc"])
     field = ".".join(str(word) for word in words)
     if fault["type"] == "extra_forbidden":
@@ -107,16 +107,16 @@ def _explained(fault: Any, model: type[BaseModel]) -> str:
         return f'"{field}" needs a kind: {", ".join(str(kind) for each in there for kind in _kinds(each))}'
     message = fault["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
-    found = fault.get("input")
-    shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
+    given = fault.get("input")
+    shown = f" (found {given!r})" if isinstance(given, str | int | float | bool) else ""
     return f'"{field}": {message}{shown}' if field else f"{message}{shown}"
 
 
 def _followed(model: type[BaseModel], location: Sequence[object]) -> tuple[list[object], list[Any]]:
-    """The keys of a location that the user wrote, and the types that may stand there.
+    """The keys of a location that the user wrote, and the types that are allowed there.
 
-    Where several models share a place and their `kind` tells them apart, pydantic adds the kind to the location, after
-    the key. Only the model says which is which, for a key may be any word: a stream can be called "display".
+    Where one of several models is chosen by its `kind`, pydantic adds the kind to the location, after the key. Only the
+    model tells a kind from a key, since a key may be any word: a stream can be called "display".
     """
     words: list[object] = []
     there: list[Any] = [model]
@@ -131,14 +131,14 @@ def _followed(model: type[BaseModel], location: Sequence[object]) -> tuple[list[
 
 
 def _keys_at(model: type[BaseModel], location: Sequence[object]) -> list[str]:
-    """The keys that are known where an unknown one stood."""
+    """The known keys at the place of an unknown one."""
     _, there = _followed(model, location)
     models = [each for each in there if _is_model(each)]
     return [field.alias or name for each in models for name, field in each.model_fields.items()]
 
 
 def _inside(annotation: Any, key: object) -> list[Any]:
-    """The types that may stand under a key of a model or a mapping, or in a list."""
+    """The types that are allowed under a key of a model or a mapping, or in a list."""
     if _is_model(annotation):
         fields = annotation.model_fields.items()
         return [each for name, field in fields if key in (name, field.alias) for each in _members(field.annotation)]
@@ -146,7 +146,7 @@ def _inside(annotation: Any, key: object) -> list[Any]:
 
 
 def _members(annotation: Any) -> list[Any]:
-    """A union's types; of any other type that one."""
+    """The types of a union; any other type alone."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _members(parts[0])
@@ -158,6 +158,6 @@ def _is_model(annotation: Any) -> bool:
 
 
 def _kinds(annotation: Any) -> tuple[object, ...]:
-    """The kinds by which a union of models tells this one."""
+    """The values of `kind` that choose this model from a union."""
     field = annotation.model_fields.get("kind") if _is_model(annotation) else None
     return get_args(field.annotation) if field else ()

@@ -27,10 +27,10 @@ MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\nP2,a,m,2\nP
     [
         ("titel: T\nconditions: [a]\nmeasures: measures.csv\n", 'unknown key "titel"; did you mean "title"?'),
         ("measures: measures.csv\n", '"conditions" is missing'),
-        ("conditions: [a, a]\nmeasures: measures.csv\n", 'conditions: "a" stands there twice'),
+        ("conditions: [a, a]\nmeasures: measures.csv\n", 'conditions: "a" is listed twice'),
         ("conditions: [yes, b]\nmeasures: measures.csv\n", "is read as true/false; put it in quotes"),
-        ("conditions: [a]\n", "names no data; give sessions, trials, questionnaires or measures"),
-        ("conditions: [a]\nconditions: [b]\n", 'line 2: not valid YAML: "conditions" stands there twice'),
+        ("conditions: [a]\n", "has no data; add sessions, trials, questionnaires or measures"),
+        ("conditions: [a]\nconditions: [b]\n", 'line 2: not valid YAML: "conditions" is given twice'),
         ("conditions: [a\n", "not valid YAML"),
         ("just a line\n", "holds no settings; it needs lines like"),
         (MINIMAL + "alpha: 5\n", '"alpha": input should be less than 1 (found 5)'),
@@ -40,7 +40,7 @@ MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\nP2,a,m,2\nP
             MINIMAL + "comparisons: [{measure: m, tset: wilcoxon}]\n",
             'unknown key "comparisons.0.tset"; did you mean "test"?',
         ),
-        (MINIMAL + "exclusions: [{reason: gone}]\n", "names neither a participant nor a session"),
+        (MINIMAL + "exclusions: [{reason: gone}]\n", "needs a participant or a session to exclude"),
         (MINIMAL + "exclusions: [{participant: P1}]\n", '"exclusions.0.reason" is missing'),
         (MINIMAL + "shown: {c: x}\n", 'shown: "c" is not known'),
         ("conditions: [a]\nsessions: data/{subject}.mcap\n", 'placeholder "{subject}" is not known'),
@@ -70,14 +70,14 @@ def test_a_path_out_of_the_folder_is_refused(folder: Folder, name: str, steadyha
     root = folder(MINIMAL.replace("measures.csv", name))
     ran = steadyhand("compare", root)
     assert ran.code == 2
-    assert f'measures: "{name}" leads out of the study folder' in ran.err
+    assert f'measures: "{name}" is outside the study folder' in ran.err
 
 
 def test_a_link_out_of_the_folder_is_refused(folder: Folder, tmp_path: Path) -> None:
     (tmp_path / "secret.csv").write_text(MEASURES)
     root = folder(MINIMAL)
     (root / "measures.csv").symlink_to(tmp_path / "secret.csv")
-    with pytest.raises(PipelineError, match="leads out of the study folder"):
+    with pytest.raises(PipelineError, match="is outside the study folder"):
         load_study(root)
 
 
@@ -154,7 +154,7 @@ def test_a_minimal_study_needs_no_title(folder: Folder) -> None:
         ("streams: {t: {topic: /t, kind: position, latency_s: 1e9}}", "streams.t.latency_s"),
         (
             "streams: {r: {topic: /r, kind: reference}, s: {topic: /s, kind: reference}}",
-            "r and s are both of kind reference; there can be one",
+            "r and s are both of kind reference; keep one",
         ),
         ("notes: &a x\ncitation: *a", "aliases (*name) are not understood"),
         ('measures: "a\\0b.csv"', "cannot be a path"),
@@ -177,7 +177,7 @@ def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhan
             "test: friedman, within: [condition, task]",
             "friedman does not take within; it is for rm_anova and art_anova",
         ),
-        ("test: rm_anova, within: [task]", 'within of "m" needs "condition", and no name twice'),
+        ("test: rm_anova, within: [task]", 'within of "m" must contain "condition", and no name twice'),
         (
             "test: mixed_model, fixed: [condition, period, factor(period)]",
             'fixed of "m" needs "condition", and no name',

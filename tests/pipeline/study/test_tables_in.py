@@ -36,7 +36,7 @@ GOOD = HEAD + "P1,a,m,1\nP1,b,m,2\nP2,a,m,4\nP2,b,m,1\nP3,a,m,5\nP3,b,m,2.5\n"
             "participant,condition,measure\nP1,a,m\n",
             'the column "value" is missing; found: participant, condition, measure',
         ),
-        ("participant,condition,measure,value,value\n", 'the column "value" stands there twice'),
+        ("participant,condition,measure,value,value\n", 'the column "value" is listed twice'),
         ("participant;condition;measure;value\n", 'the column "participant" is missing; found: participant;condition'),
         ("", "measures.csv: is empty"),
         ("\ufffe\x00", "measures.csv"),

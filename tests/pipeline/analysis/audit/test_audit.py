@@ -407,7 +407,7 @@ MINIMAL = "source: a paper\nmeasures: [{name: m, cells: {a: {mean: 5}}}]\n"
         ),
         ("source: s\nmeasures: []\n", "measures: needs one or more"),
         ("source: s\nn: twelve\nmeasures: [{name: m}]\n", '"n": input should be a valid integer'),
-        ("source: s\nmeasures: [{name: m}, {name: m}]\n", 'measures: name: "m" stands there twice'),
+        ("source: s\nmeasures: [{name: m}, {name: m}]\n", 'measures: name: "m" is listed twice'),
         (
             "source: s\nmeasures: [{name: m, cells: {kinect: {}}, reductions: [{from: kinct, to: a, percent: 5}]}]\n",
             'from: "kinct" is not known; did you mean "kinect"?',
