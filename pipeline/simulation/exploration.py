@@ -1,4 +1,4 @@
-"""What-if: a study's simulated participants with other trackers and other estimators, whole small studies at a time."""
+"""What-if: small studies of a study's simulated participants with other trackers and other estimators."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.tables.table import Row
 
 @dataclass(frozen=True)
 class Grid:
-    """What is swept: every tracker with every estimator, and how many people try each."""
+    """What is explored: every tracker with every estimator, and how many people try each combination, how often."""
 
     latencies_s: tuple[float, ...]
     noise_sds_mm: tuple[float, ...]
@@ -31,18 +31,18 @@ class Grid:
 
     @property
     def trackers(self) -> list[Tracker]:
-        """Every combination."""
-        return [Tracker(*one) for one in product(self.latencies_s, self.noise_sds_mm, self.rates_hz)]
+        """Every combination of latency, noise and rate."""
+        return [Tracker(*values) for values in product(self.latencies_s, self.noise_sds_mm, self.rates_hz)]
 
     def nearest(self, tracker: Tracker) -> Tracker:
-        """The one of the grid that is most like a tracker, in each respect for itself."""
+        """The tracker of the grid with the nearest latency, noise and rate."""
         swept = (self.latencies_s, self.noise_sds_mm, self.rates_hz)
-        near = [min(values, key=lambda one: abs(one - own)) for values, own in zip(swept, tracker, strict=True)]
+        near = [min(values, key=lambda value: abs(value - own)) for values, own in zip(swept, tracker, strict=True)]
         return Tracker(*near)
 
 
 def stated(setting: Setting) -> Tracker:
-    """The tracker that study.yaml states. PipelineError where it has none."""
+    """The tracker that study.yaml states. Raises PipelineError if it has none."""
     tracker = setting.streams[1]
     return Tracker(
         tracker.latency_s, tracker.noise_sd_mm, tracker.rate_hz or setting.simulation.instruments.tracker_rate_hz
@@ -50,14 +50,14 @@ def stated(setting: Setting) -> Tracker:
 
 
 def shown_estimators(study: Study) -> tuple[str, ...]:
-    """Those that the study's conditions display, in the conditions' order."""
-    return tuple(dict.fromkeys(study.shown[one] for one in study.conditions if one in study.shown))
+    """The estimators that the study's conditions display, in the conditions' order."""
+    return tuple(dict.fromkeys(study.shown[condition] for condition in study.conditions if condition in study.shown))
 
 
 def with_tracker(setting: Setting, tracker: Tracker, estimators: Sequence[str], people: int) -> Setting:
-    """The study with another tracker, stated as such, and a display by the name of each estimator.
+    """The study with another tracker, also stated in its settings, and one condition per estimator, which displays it.
 
-    `rate_hz` is stated where study.yaml states it.
+    `rate_hz` is stated only where study.yaml states it.
     """
     study, settings, (name, stream, _, _) = setting.study, setting.simulation, setting.streams
     other: dict[str, Any] = {"latency_s": tracker.latency_s, "noise_sd_mm": tracker.noise_sd_mm}
@@ -67,7 +67,7 @@ def with_tracker(setting: Setting, tracker: Tracker, estimators: Sequence[str], 
     simulation = settings.model_copy(update={"instruments": instruments, "participants": people})
     changed = {
         "streams": {**study.streams, name: stream.model_copy(update=other)},
-        "shown": {one: one for one in estimators},
+        "shown": {estimator: estimator for estimator in estimators},
         "simulation": simulation,
     }
     return Setting(study.model_copy(update=changed), setting.where)
@@ -76,10 +76,10 @@ def with_tracker(setting: Setting, tracker: Tracker, estimators: Sequence[str], 
 def explore(
     setting: Setting, grid: Grid, executor: Executor, begin: Callable[[int], None], done: Callable[[], None]
 ) -> list[Row]:
-    """Rows of `explore_people`: trackers, then estimators, repeats and participants.
+    """Rows of `explore_people`, in order of trackers, estimators, repeats and participants.
 
-    They do not depend on the executor. PipelineError where study.yaml lacks what a simulation needs, or a setting of
-    the grid does not suit an estimator.
+    They do not depend on the executor. Raises PipelineError where study.yaml lacks what a simulation needs, or where a
+    setting of the grid does not suit an estimator.
     """
     points = [(tracker, estimator) for tracker in grid.trackers for estimator in grid.estimators]
     _check(setting, grid, points)
@@ -94,19 +94,19 @@ def explore(
             future.result()
         except WorkerLostError as lost:
             raise PipelineError(
-                f"explore: a process was lost ({lost}); run it again, perhaps with fewer --jobs"
+                f"explore: a process died ({lost}), possibly out of memory; run it again, perhaps with fewer --jobs"
             ) from None
         done()
-    placed = [(tracker, estimator) for tracker, estimator in points for _ in range(grid.repeats)]
+    repeated = [(tracker, estimator) for tracker, estimator in points for _ in range(grid.repeats)]
     return [
         {**tracker._asdict(), "estimator": estimator, **row}
-        for (tracker, estimator), future in zip(placed, futures, strict=True)
+        for (tracker, estimator), future in zip(repeated, futures, strict=True)
         for row in future.result()
     ]
 
 
 def _check(setting: Setting, grid: Grid, points: Sequence[tuple[Tracker, str]]) -> None:
-    """PipelineError for what would only be found in a worker."""
+    """Raise PipelineError now for what would otherwise only fail in a worker."""
     _ = setting.layout
     for estimator in grid.estimators:
         if estimator not in setting.study.estimators:
@@ -117,11 +117,11 @@ def _check(setting: Setting, grid: Grid, points: Sequence[tuple[Tracker, str]]) 
 
 
 def small_study(setting: Setting, estimator: str, number: int) -> list[Row]:
-    """One repeat with one estimator: a row a participant. Runs in a worker.
+    """One repeat with one estimator, one row per participant. Runs in a worker.
 
-    A repeat's people are the same with every tracker and estimator, and with every tracker have the same luck. With
-    another estimator their luck is another, as that of two sessions of one person is: were it the same, differences
-    would scatter less than a study's, and too few participants would seem enough.
+    A repeat has the same people with every tracker and estimator, and with every tracker the same random draws. With
+    another estimator the draws differ, as they do between two sessions of one person: with the same draws, differences
+    would scatter less than in a study, and too few participants would seem enough.
     """
     again = with_other_people(setting, number)
     rows = []

@@ -1,9 +1,9 @@
-"""A simulated participant, compiled: what is seen, what is wanted, how the hand moves, and when it presses.
+"""A simulated participant, compiled: what they see, where they want to go, how the hand moves, and when they press.
 
-The participant sees the display alone, late, and knows its own hand's plan. Two models of the movement: intermittent
-minimum-jerk plans (Flash and Hogan 1985, replanned after a refractory time) and a second-order lag towards the goal.
-Everything is two-dimensional, in the plane of the canvas, in mm and s. All is inlined: to hand the structures on
-would cost more than the steps.
+The participant sees only the display, with a visual delay, and knows what they planned for their own hand. There are
+two models of movement: intermittent minimum-jerk plans (Flash and Hogan 1985, replanned after a refractory time) and a
+second-order lag towards the goal. Everything is two-dimensional, in the plane of the canvas, in mm and s. All functions
+are inlined, because passing the structures on would cost more than the steps themselves.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from pipeline.statistics.arrays import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 
-STEP_S = 0.0025  # sensors are read in between; a hand hardly bends in it
+STEP_S = 0.0025  # readings in between are interpolated: a hand's motion hardly curves within a step
 _RING = 1024  # steps of memory, a power of two: more than any delay
 _AVERAGED = 20  # steps over which the seen discrepancy is averaged
 _MUSCLE_S = 0.04  # each of the two filters between motor noise and hand
-_LOOKED_FOR = 100  # points of the path to either side, among which it is found again
-_SEEN_S = 0.15  # of the leaky mean of the seen offset, by which a press is judged
+_SEARCHED_POINTS = 100  # how many points of the path to either side are searched for one in view
+_SEEN_MEAN_S = 0.15  # time constant of the leaky mean of the seen offset, which decides about a press
 INTERMITTENT, SECOND_ORDER_LAG = 0, 1
 
 # Where a participant stands in the task.
@@ -94,7 +94,7 @@ class Hand(NamedTuple):
 
 
 # Columns of Hand.clock, in s.
-_PLAN_BEGAN, _PLAN_LASTS, _AIMED_SINCE, _HELD_S, _NEXT_AT = 0, 1, 2, 3, 4
+_PLAN_BEGAN, _PLAN_LASTS, _AIMED_SINCE, _NEAR_FOR_S, _NEXT_AT = 0, 1, 2, 3, 4
 # Columns of Hand.progress.
 STEP, TARGET, PHASE, ALONG, _AIMING, _SEES_FROM, PLANS = 0, 1, 2, 3, 4, 5, 6
 
@@ -145,7 +145,7 @@ def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
 
 @compiled(forceinline=True)
 def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) -> None:
-    """A quintic from the planned motion now to rest at the goal, in T₀ + k·√distance."""
+    """Plans a quintic from the planned motion now to rest at the goal, lasting T₀ + k·√distance."""
     goal = (to_x, to_y)
     distance = np.hypot(to_x - hand.planned[0, 0], to_y - hand.planned[0, 1])
     lasts = person.base_time_s + person.time_per_sqrt_mm_s * np.sqrt(distance)
@@ -165,7 +165,7 @@ def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) ->
 
 @compiled(forceinline=True)
 def _follow_plan(hand: Hand, now: float) -> None:
-    """The planned motion at `now`: along the polynomial, at rest beyond its end."""
+    """Sets the planned motion at `now`: along the polynomial, at rest after its end."""
     lasts = hand.clock[_PLAN_LASTS]
     part = (now - hand.clock[_PLAN_BEGAN]) / lasts if lasts > 0.0 else 1.0
     for axis in range(2):
@@ -198,7 +198,7 @@ def _follow_goal(person: Person, hand: Hand, to_x: float, to_y: float) -> None:
 
 @compiled(forceinline=True)
 def _perceive(person: Person, hand: Hand) -> None:
-    """The correction follows the discrepancy between what was seen and what the hand was to do, with what lag adds."""
+    """Updates the correction, which follows the seen position less the planned one, allowing for the expected lag."""
     step = hand.progress[STEP]
     delay = _steps(person.visual_delay_s)
     earlier = _steps(person.visual_delay_s + person.expected_lag_s)
@@ -220,26 +220,26 @@ def _in_view(person: Person, layout: Layout, x: float, y: float, seen_x: float, 
 
 @compiled(forceinline=True)
 def _farthest_in_view(person: Person, layout: Layout, along: int, last: int, seen_x: float, seen_y: float) -> int:
-    """The farthest point of the path in view, from the nearest such to where it was; where it was if none is."""
-    path, found = layout.path_mm, -1
-    for away in range(_LOOKED_FOR):
+    """The farthest point of the path in view, going on from the nearest one in view; `along` itself if none is."""
+    path, farthest = layout.path_mm, -1
+    for away in range(_SEARCHED_POINTS):
         back, on = max(along - away, 0), min(along + away, last)
         if _in_view(person, layout, path[back, 0], path[back, 1], seen_x, seen_y):
-            found = back
+            farthest = back
         elif _in_view(person, layout, path[on, 0], path[on, 1], seen_x, seen_y):
-            found = on
-        if found >= 0:
+            farthest = on
+        if farthest >= 0:
             break
-    if found < 0:
+    if farthest < 0:
         return along
-    while found < last and _in_view(person, layout, path[found + 1, 0], path[found + 1, 1], seen_x, seen_y):
-        found += 1
-    return found
+    while farthest < last and _in_view(person, layout, path[farthest + 1, 0], path[farthest + 1, 1], seen_x, seen_y):
+        farthest += 1
+    return farthest
 
 
 @compiled(forceinline=True)
 def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
-    """The goal: the target where it is in view, else the farthest point of the path that is."""
+    """Sets the goal: the target if it is in view, otherwise the farthest point of the path in view."""
     step, target = hand.progress[STEP], hand.progress[TARGET]
     delay = _steps(person.visual_delay_s)
     seen_x, seen_y = hand.seen[(step - delay) & (_RING - 1), 0], hand.seen[(step - delay) & (_RING - 1), 1]
@@ -249,35 +249,35 @@ def _aim(person: Person, layout: Layout, hand: Hand, now: float) -> None:
     hand.progress[ALONG] = along
     if hand.progress[_AIMING] == 0 and along >= last and _in_view(person, layout, target_x, target_y, seen_x, seen_y):
         hand.progress[_AIMING] = 1
-        hand.clock[_AIMED_SINCE], hand.clock[_HELD_S] = now, 0.0
+        hand.clock[_AIMED_SINCE], hand.clock[_NEAR_FOR_S] = now, 0.0
         hand.offset[0], hand.offset[1] = target_x - seen_x, target_y - seen_y
     if hand.progress[_AIMING] == 1:
         hand.goal[0], hand.goal[1] = target_x, target_y
         for axis in range(2):
             offset = hand.goal[axis] - hand.seen[(step - delay) & (_RING - 1), axis]
-            hand.offset[axis] += STEP_S / _SEEN_S * (offset - hand.offset[axis])
+            hand.offset[axis] += STEP_S / _SEEN_MEAN_S * (offset - hand.offset[axis])
     elif len(path) > 0:
         hand.goal[0], hand.goal[1] = path[along, 0], path[along, 1]
 
 
 @compiled(forceinline=True)
 def _press(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
-    """Has the participant decided to press? The own hand is slow and the target long enough near the centre."""
+    """Whether the participant decides to press: the hand is slow, and has been near enough to the target for long."""
     if hand.progress[_AIMING] == 0:
         return False
     slow = np.hypot(hand.planned[1, 0], hand.planned[1, 1]) < person.slow_mm_s
     near = min(person.press_radius_mm, layout.radius_mm[hand.progress[TARGET]])
     allowed = near * (1.0 + (now - hand.clock[_AIMED_SINCE]) / person.patience_s)
     if slow and np.hypot(hand.offset[0], hand.offset[1]) < allowed:
-        hand.clock[_HELD_S] += STEP_S
+        hand.clock[_NEAR_FOR_S] += STEP_S
     else:
-        hand.clock[_HELD_S] = 0.0
-    return bool(hand.clock[_HELD_S] >= person.dwell_s)
+        hand.clock[_NEAR_FOR_S] = 0.0
+    return bool(hand.clock[_NEAR_FOR_S] >= person.dwell_s)
 
 
 @compiled(forceinline=True)
 def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
-    """Where the participant stands in the task; True as the tap lands."""
+    """Updates the phase of the task; returns True when the tap lands."""
     phase = hand.progress[PHASE]
     if phase == WAITING and now >= hand.clock[_NEXT_AT]:
         hand.progress[PHASE] = MOVING
@@ -297,7 +297,7 @@ def _decide(person: Person, layout: Layout, hand: Hand, now: float) -> bool:
 
 @compiled(forceinline=True)
 def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, draws: np.random.Generator) -> None:
-    """The hand a step on: its plan, motor noise in proportion to speed, tremor and drift."""
+    """Moves the hand by a step: its plan, motor noise in proportion to speed, tremor and drift."""
     to_x, to_y = hand.goal[0] - hand.correction[0], hand.goal[1] - hand.correction[1]
     wants = hand.progress[PHASE] == MOVING
     if person.model == SECOND_ORDER_LAG:

@@ -1,4 +1,4 @@
-"""A task of study.yaml as the compiled participant walks it."""
+"""A task of study.yaml in the form that the compiled participant takes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _diameters(task: Task) -> FloatArray:
 
 
 def _of_ring(ring: Ring) -> FloatArray:
-    """Each target as far across the circle from the last as can be, every one once, and the first again."""
+    """The targets (k, 2) of a ring in order: each as far across from the last as possible, and the first once more."""
     half = (ring.targets + 1) // 2
     order = [step * half % ring.targets for step in range(ring.targets)] if ring.targets % 2 else []
     if not order:
@@ -54,7 +54,7 @@ def path_points(task: Task) -> FloatArray:
 
 
 def layout(task: Task, where: str) -> Layout:
-    """The task with each target's place on the path; PipelineError, beginning with `where`, if one is off it."""
+    """The task with each target's place on the path. Raises PipelineError, beginning with `where`, if one is off it."""
     path, wanted = path_points(task), targets(task)
     at = np.zeros(len(wanted), np.int64)
     begin = 0
@@ -68,11 +68,11 @@ def layout(task: Task, where: str) -> Layout:
         at[index] = begin = begin + int(np.argmin(apart))
     window = (np.inf, np.inf) if task.window_mm is None else task.window_mm
     if task.window_mm is not None and not len(path):
-        raise PipelineError(f"{where}: task: with a window_mm there must be a path_mm, or nobody finds the targets")
+        raise PipelineError(f"{where}: task: window_mm needs a path_mm, along which participants find the targets")
     return Layout(path, wanted, at, np.array(window, dtype=np.float64) / 2, _diameters(task) / 2)
 
 
-def start(found: Layout) -> FloatArray:
-    """Where the hand is before the first target: at the path's begin, or at the middle of the targets."""
-    begin: FloatArray = found.path_mm[0] if len(found.path_mm) else found.targets_mm.mean(axis=0)
+def start(layout: Layout) -> FloatArray:
+    """Where the hand (2,) is before the first target: at the begin of the path, or in the middle of the targets."""
+    begin: FloatArray = layout.path_mm[0] if len(layout.path_mm) else layout.targets_mm.mean(axis=0)
     return begin

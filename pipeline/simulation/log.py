@@ -15,9 +15,11 @@ from pipeline.simulation.session import Outcome, Setting, reference_ns
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import PositionStream, ReferenceStream
 
-EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
+EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed instant, so that a simulated log is the same on every day
 _MM_PER_M = 1000.0
-_NEXT_S = 1e-6  # after a selection, which else would be of the trial that it starts
+_NEXT_S = (
+    1e-6  # a trial starts this long after the selection before it; at the same time, the selection would belong to it
+)
 
 
 def write_log(path: Path, setting: Setting, participant: str, condition: str, order: int, outcome: Outcome) -> None:
@@ -66,7 +68,7 @@ def _position(stream: PositionStream, measured_ns: int, arrival_ns: int, value: 
 
 
 def _shown(setting: Setting, outcome: Outcome) -> Iterator[Message]:
-    """The display, from its first position on."""
+    """The display's messages, from the first position that it shows."""
     name = setting.study.stream_of_kind("display")
     if name is None:
         return
@@ -79,7 +81,7 @@ def _shown(setting: Setting, outcome: Outcome) -> Iterator[Message]:
 
 
 def _between(outcome: Outcome, time_ns: IntArray, columns: slice) -> FloatArray:
-    """Columns of the trace at some times, (n, 3), as the loop reckons them: the plane's two and a zero."""
+    """Two columns of the trace, interpolated at some times as in the loop, and a column of zeros: (n, 3)."""
     after = np.maximum(-(-time_ns // STEP_NS), 1)
     share = 1.0 - (after * STEP_NS - time_ns) / STEP_NS
     found = np.zeros((len(time_ns), 3))
@@ -89,12 +91,12 @@ def _between(outcome: Outcome, time_ns: IntArray, columns: slice) -> FloatArray:
 
 
 def _plane(outcome: Outcome, time_ns: IntArray) -> FloatArray:
-    """The hand's acceleration."""
+    """The hand's acceleration (n, 3) in mm/s² at some times; zero across the plane."""
     return _between(outcome, time_ns, slice(2, 4))
 
 
 def _events(setting: Setting, outcome: Outcome) -> Iterator[Message]:
-    """Each trial starts as the one before it was selected: from then on its target may be looked for."""
+    """The events' messages. Each trial starts when the previous target was selected."""
     assert setting.study.events is not None  # noqa: S101 - checked before anything is simulated
     topic = setting.study.events.topic
 

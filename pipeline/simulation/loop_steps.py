@@ -29,7 +29,7 @@ TAP_S, TAP_X, TAP_Y, TRUE_X, TRUE_Y = 0, 1, 2, 3, 4
 
 
 class Sensing(NamedTuple):
-    """When sensors measure, in ns since the session's begin, and what turns the hand's motion into their readings."""
+    """When sensors measure, in ns since the session's begin, and how the hand's motion becomes their readings."""
 
     frame_ns: IntArray
     frame_noise_mm: FloatArray  # (n, d)
@@ -40,7 +40,7 @@ class Sensing(NamedTuple):
 
 
 class Session(NamedTuple):
-    """What a session leaves; all arrays are written in place."""
+    """The record of a session; all arrays are written in place."""
 
     trace: FloatArray  # (steps + 1, 4): x, y, ax, ay of the true hand
     shown: FloatArray  # (i, d)
@@ -50,7 +50,7 @@ class Session(NamedTuple):
 
 @compiled(forceinline=True)
 def _sense(sensing: Sensing, readings: Readings, session: Session, step: int) -> None:
-    """The readings that were measured in the step before `step`, from the hand's motion at its ends."""
+    """Writes the readings measured during the step before `step`, interpolating the hand's motion at its ends."""
     now, trace = step * STEP_NS, session.trace
     frame, force = session.next[0], session.next[1]
     while frame < len(sensing.frame_ns) and sensing.frame_ns[frame] <= now:
@@ -85,7 +85,7 @@ def walk(
     session: Session,
     until: int,
 ) -> None:
-    """Steps up to `until` with the display as it stands, or to the end of the task; what is measured is written."""
+    """Runs steps up to `until` or the end of the task, while the display does not change; writes what is measured."""
     newest = session.next[2] - 1
     x = session.shown[newest, 0] if newest >= 0 else np.nan
     y = session.shown[newest, 1] if newest >= 0 else np.nan
@@ -112,7 +112,7 @@ def run(
     live: Live,
     instants: FloatArray,
 ) -> None:
-    """A whole session: to the end of the task, or of the instants at which the display changes."""
+    """Runs a whole session: to the end of the task, or until the last of `instants` at which the display changes."""
     for index in range(len(instants)):
         until = max((sensing.instant_ns[index] + STEP_NS - 1) // STEP_NS, 1)
         walk(person, layout, tremor, drift, hand, draws, sensing, readings, session, until)

@@ -15,9 +15,9 @@ _LONGEST_DELAY_S = 0.9  # less than the memory of the compiled steps
 
 
 def person(settings: SelectionSimulation, participant: str) -> Person:
-    """One participant, the same in every condition and whoever else takes part.
+    """One participant: the same in every condition, and independent of the other participants.
 
-    `expected_lag_s` is their share of a lag of 1 s; `accustomed` makes it that of a display.
+    `expected_lag_s` is what they expect of a lag of 1 s; `used_to_lag` scales it to that of a display.
     """
     drawn = {}
     for name in type(settings.traits).model_fields:
@@ -29,9 +29,9 @@ def person(settings: SelectionSimulation, participant: str) -> Person:
     return Person(model=_MODELS[settings.model], expected_lag_s=share, **drawn)
 
 
-def accustomed(one: Person, lag_s: float) -> Person:
-    """The participant once they know a display that is `lag_s` late: they expect their share of that."""
-    return one._replace(expected_lag_s=one.expected_lag_s * min(max(lag_s, 0.0), _LONGEST_DELAY_S))
+def used_to_lag(person: Person, lag_s: float) -> Person:
+    """The participant once they are used to a display that is `lag_s` late: they expect their share of that lag."""
+    return person._replace(expected_lag_s=person.expected_lag_s * min(max(lag_s, 0.0), _LONGEST_DELAY_S))
 
 
 def _drawn(trait: Trait, random: np.random.Generator) -> float:

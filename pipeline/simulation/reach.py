@@ -1,4 +1,4 @@
-"""Simulated recordings with known truth, written as ordinary logs. Everything after is the ordinary path."""
+"""Simulated reaches with known truth, written as ordinary logs, which the pipeline then reads like any others."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from pipeline.study.settings import Study
 from pipeline.study.simulation import ReachSimulation
 from pipeline.study.streams import AccelerationStream, PositionStream, ReferenceStream
 
-_EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed moment: a simulated log knows no today
+_EPOCH_NS = 1_700_000_000_000_000_000  # an arbitrary fixed instant, so that a simulated log is the same on every day
 _MM_PER_M = 1000.0
 
 
 @dataclass(frozen=True)
 class _Streams:
-    """The streams a simulation writes, by what they are."""
+    """The streams that a simulation writes."""
 
     tracker: PositionStream
     imu: AccelerationStream
@@ -38,10 +38,10 @@ def simulate(
     begin: Callable[[int], None] = lambda total: None,
     done: Callable[[], None] = lambda: None,
 ) -> list[Path]:
-    """Write every recording of the study's `simulation:` block; `begin` and `done` are told of progress.
+    """Write every recording of the study's `simulation:` block; returns their paths.
 
-    Deterministic from the seed; a recording does not depend on how many there are. PipelineError where study.yaml
-    lacks what the simulation needs.
+    `begin` is called with the number of recordings, `done` after each. The seed determines everything; a recording does
+    not depend on how many there are. Raises PipelineError where study.yaml lacks what the simulation needs.
     """
     settings = study.simulation
     assert isinstance(settings, ReachSimulation)  # noqa: S101 - tells the type checker
@@ -69,13 +69,13 @@ def simulate(
 
 
 def _streams(folder: Path, study: Study) -> _Streams:
-    found = {}
+    streams = {}
     for kind in ("position", "acceleration", "reference"):
         name = study.stream_of_kind(kind)
         if name is None:
             raise PipelineError(f"{folder / 'study.yaml'}: simulation: streams lacks one of kind {kind}")
-        found[kind] = study.streams[name]
-    tracker, imu, reference = found["position"], found["acceleration"], found["reference"]
+        streams[kind] = study.streams[name]
+    tracker, imu, reference = streams["position"], streams["acceleration"], streams["reference"]
     assert isinstance(tracker, PositionStream)  # noqa: S101 - tells the type checker
     assert isinstance(imu, AccelerationStream)  # noqa: S101
     assert isinstance(reference, ReferenceStream)  # noqa: S101
@@ -87,7 +87,7 @@ def _reach(settings: ReachSimulation, streams: _Streams, random: np.random.Gener
     length_s = settings.still_before_s + settings.reach_s + settings.still_after_s
 
     def times(rate_hz: float) -> FloatArray:
-        """Regular, from a phase of its own: sensors do not start together."""
+        """Regular times in s from a random phase, since sensors do not start together."""
         first: FloatArray = np.arange(random.uniform(0, 1 / rate_hz), length_s, 1 / rate_hz)
         return first
 

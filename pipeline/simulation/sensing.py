@@ -1,6 +1,7 @@
-"""When the simulated sensors measure, with what noise, and how the phone is held: everything but the hand.
+"""When the simulated sensors measure, with what noise, and how the phone is held: everything except the hand.
 
-Each draw has a generator of its own, and a shorter session has the first part of a longer one's.
+Each kind of draw has a random generator of its own, so that a shorter session gets the same draws as the first part of
+a longer one.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Frames:
 class Phone:
     """The phone's readings: times as above; `force = to_body (a − gravity) + error`, in the body's frame.
 
-    `logged_xyzw` (n, 4) is the orientation the phone believes.
+    `logged_xyzw` (n, 4) is the orientation that the phone logs, which is slightly wrong.
     """
 
     time_ns: IntArray
@@ -76,7 +77,7 @@ def phone(stream: AccelerationStream, instruments: Instruments, length_s: float,
 
 
 def gyroscope(held: Phone) -> FloatArray:
-    """What the gyroscope reads (n, 3), in rad/s of the body's frame: the turn since the reading before."""
+    """What the gyroscope reads (n, 3) in rad/s in the body's frame: the mean turn since the previous reading."""
     from scipy.spatial.transform import Rotation
 
     found = np.zeros((len(held.time_ns), 3))
@@ -88,7 +89,7 @@ def gyroscope(held: Phone) -> FloatArray:
 
 
 def _times(rate_hz: float, instruments: Instruments, length_s: float, draws: Draws, name: str) -> IntArray:
-    """When a sensor measures, in ns: regular from a phase of its own, or with jitter and losses."""
+    """When a sensor measures (n,) in ns: regular from a random phase, with jitter and losses if stated."""
     phase_s = draws(f"{name} phase").uniform(0.0, 1.0 / rate_hz)
     count = int((length_s - phase_s) * rate_hz)
     time = phase_s + np.arange(count) / rate_hz
@@ -101,7 +102,7 @@ def _times(rate_hz: float, instruments: Instruments, length_s: float, draws: Dra
 
 
 def _smooth(random: np.random.Generator, count: int, step_s: float) -> FloatArray:
-    """Noise (count, 3) of SD 1 through two equal low-passes."""
+    """Noise (count, 3) with SD 1, smoothed by two equal first-order low-passes."""
     from scipy.signal import lfilter
 
     keep = np.exp(-step_s / _WOBBLE_S)

@@ -45,7 +45,7 @@ class Setting:
 
     @cached_property
     def layout(self) -> Layout:
-        """The task as the participant walks it."""
+        """The task in the form that the compiled participant takes."""
         if self.study.task is None:
             raise PipelineError(f"{self.where}: simulation: selection needs a task: with targets")
         return layouts.layout(self.study.task, self.where)
@@ -64,9 +64,12 @@ class Setting:
         assert isinstance(tracker, PositionStream)  # noqa: S101
         assert isinstance(imu, AccelerationStream)  # noqa: S101
         if len(study.sensor_streams) > 2:
-            raise PipelineError(f"{self.where}: simulation: takes one tracker and one phone, and streams has more")
+            raise PipelineError(f"{self.where}: simulation: takes one tracker and one phone, but streams has more")
         if imu.calibrate_s or any(imu.lever_arm_mm) or any(imu.mounting_xyzw[:3]):
-            raise PipelineError(f"{self.where}: simulation: the phone is what the tracker sees; take out its mounting")
+            raise PipelineError(
+                f"{self.where}: simulation: the tracker sees the simulated phone's accelerometer itself; remove"
+                " mounting_xyzw, lever_arm_mm and calibrate_s"
+            )
         if study.axes not in (("x", "y"), ("x", "y", "z")):
             raise PipelineError(f"{self.where}: simulation: selection needs axes: [x, y], found {list(study.axes)}")
         return found["position"], tracker, found["acceleration"], imu
@@ -75,12 +78,14 @@ class Setting:
         """The estimator that a condition displays."""
         name = self.study.shown.get(condition)
         if name is None:
-            raise PipelineError(f'{self.where}: simulation: shown says nothing of "{condition}"; name its estimator')
+            raise PipelineError(
+                f'{self.where}: simulation: shown has no estimator for "{condition}"; add the one it displays'
+            )
         return build_estimator(self.study, name)
 
     def lag_s(self, condition: str) -> float:
-        """How late the condition's display is on the participant's own motion."""
-        if self.streams[1].rate_hz is None:  # a filter's lag depends on its readings' rates alone
+        """How late the condition's display is behind the participant's own motion, in s."""
+        if self.streams[1].rate_hz is None:  # a filter's lag depends only on the rates of its readings
             rates = self.simulation.instruments.tracker_rate_hz, self.simulation.instruments.imu_rate_hz
         else:
             rates = self.streams[1].rate_hz, self.streams[3].rate_hz or self.simulation.instruments.imu_rate_hz
@@ -92,9 +97,9 @@ _LAG_DEPENDS_ON = {"title", "conditions", "axes", "streams", "estimators", "sess
 
 @lru_cache(maxsize=256)
 def effective_lag_s(settings: str, name: str, rates_hz: tuple[float, float]) -> float:
-    """By how much an estimator is late on minimum-jerk reaches without noise; 0 where it is ahead.
+    """How late an estimator is, in s, on minimum-jerk reaches without noise; 0 if it is ahead.
 
-    `settings` are those of a study in JSON, as far as its estimators depend on them.
+    `settings` are the study's settings in JSON that its estimators depend on; `rates_hz` are those of tracker and IMU.
     """
     study = Study.model_validate_json(settings)
     estimator, length_s, reach_s = build_estimator(study, name), 12.0, 0.9
@@ -103,9 +108,9 @@ def effective_lag_s(settings: str, name: str, rates_hz: tuple[float, float]) -> 
     def hand(time: FloatArray) -> tuple[FloatArray, FloatArray]:
         share, bend = np.zeros_like(time), np.zeros_like(time)
         for number in range(int(length_s / 2 / reach_s)):
-            one, its = minimum_jerk(time, 1.0 + 2 * reach_s * number, reach_s)
+            reach_share, reach_bend = minimum_jerk(time, 1.0 + 2 * reach_s * number, reach_s)
             sign = 1.0 if number % 2 == 0 else -1.0
-            share, bend = share + sign * one, bend + sign * its
+            share, bend = share + sign * reach_share, bend + sign * reach_bend
         return 150.0 * share, 150.0 * bend
 
     def samples(sensor: Sensor, rate_hz: float) -> Samples:
@@ -124,13 +129,13 @@ def effective_lag_s(settings: str, name: str, rates_hz: tuple[float, float]) -> 
     fine = np.arange(0.0, length_s, 0.002)
     truth = np.zeros((len(fine), track.mean.shape[1]))
     truth[:, 0] = hand(fine)[0]
-    found = accuracy.lag(times, track.mean, Samples(fine, fine, truth), np.random.default_rng(0)).value
-    return float(np.nan_to_num(max(found, 0.0)))
+    lag_s = accuracy.lag(times, track.mean, Samples(fine, fine, truth), np.random.default_rng(0)).value
+    return float(np.nan_to_num(max(lag_s, 0.0)))
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A session as it was. Times are s since its begin; positions in mm, in the tracker's frame.
+    """The record of a simulated session. Times are s since its begin; positions in mm, in the tracker's frame.
 
     `taps` (k, 5) holds per target when it was selected, the displayed and the true position, NaN where it was not;
     `trace` (steps, 4) the true hand `STEP_S` apart; `shown` (i, d) what was displayed at `instant_ns`.
@@ -152,8 +157,8 @@ class Outcome:
     @property
     def errors_mm(self) -> FloatArray:
         """Displayed less target position of each selection (k, 2)."""
-        found: FloatArray = self.taps[:, [TAP_X, TAP_Y]] - self.targets_mm
-        return found
+        errors: FloatArray = self.taps[:, [TAP_X, TAP_Y]] - self.targets_mm
+        return errors
 
     @property
     def completion_time_s(self) -> float:
@@ -177,12 +182,12 @@ class Outcome:
 
 
 def simulate(setting: Setting, participant: str, condition: str, *, compiled: bool = True) -> Outcome:
-    """A session, the same whoever else takes part and in whatever order. `compiled=False`: by the plain loop."""
+    """One session, independent of all other sessions. `compiled=False`: by the plain loop."""
     length_s = min(_USUAL_S, setting.simulation.longest_s)
-    found, done = _attempt(setting, participant, condition, length_s, compiled)
+    outcome, done = _attempt(setting, participant, condition, length_s, compiled)
     if not done and length_s < setting.simulation.longest_s:
-        found, done = _attempt(setting, participant, condition, setting.simulation.longest_s, compiled)
-    return found
+        outcome, done = _attempt(setting, participant, condition, setting.simulation.longest_s, compiled)
+    return outcome
 
 
 def _attempt(
@@ -214,17 +219,17 @@ def _attempt(
     sensed = Sensing(
         frames.time_ns, np.ascontiguousarray(frames.noise_mm[:, :dimension]), phone.time_ns, turn, offset, instant_ns
     )
-    person = people.accustomed(people.person(settings, participant), setting.lag_s(condition))
+    person = people.used_to_lag(people.person(settings, participant), setting.lag_s(condition))
     begin = layouts.start(setting.layout)
     session.trace[0, :2] = begin
     hand = hand_at(begin, settings.still_before_s)
     walking = (person, setting.layout, *_sways(settings), hand, draws("hand"), sensed, readings, session)
     estimator, instants = setting.shown(condition), _since(instant_ns, origin_ns)
-    found = live(estimator, (names, imu_name), readings, rotation, instants) if compiled else None
-    if found is not None:
-        loop_steps.run(*walking, found, instants)
+    ready = live(estimator, (names, imu_name), readings, rotation, instants) if compiled else None
+    if ready is not None:
+        loop_steps.run(*walking, ready, instants)
     else:
-        _plain(estimator, (names, imu_name), rotation, instants, walking)
+        _run_uncompiled(estimator, (names, imu_name), rotation, instants, walking)
     step, shown_until = int(hand.progress[STEP]), int(session.next[2])
     outcome = Outcome(
         settings.still_before_s,
@@ -243,14 +248,14 @@ def _attempt(
     return outcome, bool(hand.progress[PHASE] == DONE)
 
 
-def _plain(
+def _run_uncompiled(
     estimator: Estimator,
     names: tuple[str, str],
     rotation: FloatArray,
     instants: FloatArray,
     walking: tuple[Any, ...],
 ) -> None:
-    """The loop by the estimator's own `update` and `predict`: for any, and what the compiled one is held to."""
+    """The loop by the estimator's own `update` and `predict`, for any estimator; the compiled loop gives the same."""
     from fusion_core import Sample
 
     hand, sensed, readings, session = walking[4], walking[6], walking[7], walking[8]
@@ -277,19 +282,19 @@ def _plain(
         session.next[2] = index + 1
 
 
-def _first(found: Any, count: int) -> Any:
-    """The first readings of a sensor."""
-    return type(found)(*(getattr(found, name)[:count] for name in found.__dataclass_fields__))
+def _first(readings: Any, count: int) -> Any:
+    """The first `count` readings of a sensor."""
+    return type(readings)(*(getattr(readings, name)[:count] for name in readings.__dataclass_fields__))
 
 
 def _since(time_ns: IntArray, origin_ns: int) -> FloatArray:
-    """As the pipeline reckons a log's times, to the last bit."""
-    found: FloatArray = np.asarray((time_ns - origin_ns) * S_PER_NS, dtype=np.float64)
-    return found
+    """Times in s, computed as the pipeline does when it reads a log, so that they are the same to the last bit."""
+    seconds: FloatArray = np.asarray((time_ns - origin_ns) * S_PER_NS, dtype=np.float64)
+    return seconds
 
 
 def reference_ns(setting: Setting, length_s: float) -> IntArray:
-    """When the true position is written down, in ns."""
+    """When the reference records the true position (n,), in ns."""
     rate_hz = setting.simulation.instruments.reference_rate_hz
     return np.rint(np.arange(0.0, length_s, 1.0 / rate_hz) / S_PER_NS).astype(np.int64)
 
@@ -306,10 +311,10 @@ def _sways(settings: SelectionSimulation) -> tuple[Sway, Sway]:
 def _in_tracker_frame(
     phone: sensing.Phone, gravity_mm_s2: FloatArray, dimension: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What makes an acceleration of the hand the one that the pipeline finds in the log: its turn and its offset.
+    """The rotation (n, d, 2) and offset (n, d) that turn the hand's acceleration into the one read from the log.
 
-    The phone feels `to_body (a − gravity) + error`; the pipeline turns that by the logged orientation and adds
-    gravity. Third, that orientation's rotation (n, d, 3).
+    The phone measures `to_body (a − gravity) + error`; the pipeline rotates that by the logged orientation and adds
+    gravity. The third result is the logged orientation as a rotation (n, d, 3).
     """
     believed = rotations(phone.logged_xyzw)
     turn = believed @ phone.to_body

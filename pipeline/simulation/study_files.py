@@ -1,4 +1,4 @@
-"""A simulated study's files: logs, participants, questionnaires and repeated studies; all of a run or none."""
+"""Writes a simulated study's files: logs, participants, questionnaires and repeated studies; all of a run or none."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class Session:
 
 
 def simulate_study(folder: Path, study: Study, executor: Executor, begin: Begin, done: Done) -> list[str]:
-    """Write the study's files; the names of the logs.
+    """Write the study's files; returns the names of the logs.
 
-    They appear together once all are done: a run that is stopped leaves those of the run before. PipelineError where
-    study.yaml lacks what a simulation needs.
+    The files appear together once all are done: if a run is stopped, those of the previous run remain. Raises
+    PipelineError where study.yaml lacks what a simulation needs.
     """
     where = str(folder / "study.yaml")
     setting = Setting(study, where)
@@ -72,7 +72,7 @@ def simulate_study(folder: Path, study: Study, executor: Executor, begin: Begin,
 
 
 def participants(settings: SelectionSimulation) -> list[str]:
-    """Their ids."""
+    """The participants' ids."""
     return [f"P{number:02d}" for number in range(1, settings.participants + 1)]
 
 
@@ -93,7 +93,7 @@ def _sessions(setting: Setting, folder: Path) -> list[Session]:
 
 
 def _check(setting: Setting) -> None:
-    """PipelineError for what would only be found in a worker."""
+    """Raise PipelineError now for what would otherwise only fail in a worker."""
     study = setting.study
     _ = setting.layout, setting.streams
     for condition in study.conditions:
@@ -105,9 +105,9 @@ def _check(setting: Setting) -> None:
         ("repeats", study.repeats is not None or setting.simulation.repeats == 0),
     ):
         if not wanted:
-            raise PipelineError(f"{setting.where}: {field}: is missing; the simulation writes to what it names")
+            raise PipelineError(f"{setting.where}: {field}: is missing; name the file that the simulation is to write")
     if study.repeats is not None and setting.simulation.repeats == 0:
-        raise PipelineError(f"{setting.where}: repeats: names a file, but simulation: repeats is 0; take it out")
+        raise PipelineError(f"{setting.where}: repeats: names a file, but simulation: repeats is 0; remove it")
     for published in setting.simulation.published:
         for condition in published.conditions:
             if condition not in study.conditions:
@@ -115,7 +115,7 @@ def _check(setting: Setting) -> None:
 
 
 def make(setting: Setting, session: Session, folder: Path) -> dict[str, float]:
-    """Simulate one session, write its log, and say what a rating depends on. Runs in a worker."""
+    """Simulate one session and write its log; returns the figures that ratings depend on. Runs in a worker."""
     outcome = simulate(setting, session.participant, session.condition)
     path = folder / session.file
     write_log(path, setting, session.participant, session.condition, session.order, outcome)
@@ -123,7 +123,7 @@ def make(setting: Setting, session: Session, folder: Path) -> dict[str, float]:
 
 
 def drivers(outcome: Outcome) -> dict[str, float]:
-    """What was measured in a session."""
+    """The figures of a session that ratings may depend on."""
     return {
         "completion_time_s": outcome.completion_time_s,
         "selection_rmse_mm": float(np.sqrt(outcome.selection_mse_mm2)),
@@ -132,15 +132,15 @@ def drivers(outcome: Outcome) -> dict[str, float]:
 
 
 def repeat(setting: Setting, number: int) -> dict[str, dict[str, float]]:
-    """One more study with other people: each condition's mean over participants of each measure. Runs in a worker."""
-    other, found = with_other_people(setting, number), {}
+    """One more study with other people: each measure's mean over participants, by condition. Runs in a worker."""
+    other, means = with_other_people(setting, number), {}
     for condition in setting.study.conditions:
         outcomes = [simulate(other, participant, condition) for participant in participants(other.simulation)]
-        found[condition] = {
+        means[condition] = {
             "selection_mse_mm2": float(np.nanmean([outcome.selection_mse_mm2 for outcome in outcomes])),
             "completion_time_s": float(np.nanmean([outcome.completion_time_s for outcome in outcomes])),
         }
-    return found
+    return means
 
 
 def with_other_people(setting: Setting, number: int) -> Setting:
@@ -154,7 +154,7 @@ def with_other_people(setting: Setting, number: int) -> Setting:
 def _tables(
     setting: Setting, folder: Path, measured: dict[Session, dict[str, float]], repeats: dict[int, Any]
 ) -> list[str]:
-    """The study's tables; their names."""
+    """Write the study's tables; returns their names."""
     study, settings, files = setting.study, setting.simulation, []
     names = participants(settings)
     order = {(one.participant, one.order): one.condition for one in measured}
@@ -193,7 +193,7 @@ def _write(folder: Path, name: str, header: Sequence[str], rows: Iterable[Sequen
 
 
 def _publish(folder: Path, beside: Path, files: Sequence[str], origin: str) -> None:
-    """Bring the finished files to their places; what an earlier run left and this one has not goes."""
+    """Move the finished files to their places, and remove files of an earlier run that this one did not write."""
     earlier = files_made(folder)
     (folder / MADE).unlink(missing_ok=True)
     for name in files:

@@ -1,4 +1,4 @@
-"""Whether a simulated study's files are there and up to date: asked at every run, so nothing heavy is imported."""
+"""Whether a simulated study's files exist and are up to date. Every run checks this, so nothing heavy is imported."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pipeline.engine.code_digest import code_digest
 from pipeline.study.settings import Study
 
 MADE = "simulated.json"
-"""What the last run made, and from what: beside study.yaml."""
+"""The file beside study.yaml that lists what the last simulation wrote, and a digest of what it depended on."""
 
 
 def files_made(folder: Path) -> list[str]:
-    """The files of the last simulation that was finished."""
+    """The files of the last simulation that finished; none if there was none."""
     try:
         return [str(name) for name in json.loads((folder / MADE).read_text(encoding="utf-8"))["files"]]
     except (OSError, ValueError, KeyError, TypeError):
@@ -22,7 +22,7 @@ def files_made(folder: Path) -> list[str]:
 
 
 def is_made(folder: Path, study: Study) -> bool:
-    """Are the files there, and were they made from these settings by this code?"""
+    """Whether the files exist and were made from these settings by this code."""
     try:
         made = json.loads((folder / MADE).read_text(encoding="utf-8"))
         there = all((folder / name).is_file() for name in made["files"])
@@ -32,7 +32,7 @@ def is_made(folder: Path, study: Study) -> bool:
 
 
 def made_from(study: Study) -> str:
-    """A digest of all that the files depend on: settings and code."""
+    """A digest of everything that the files depend on: settings and code."""
     settings = {"conditions", "sessions", "axes", "streams", "events", "estimators", "shown", "task", "simulation"}
     tables = {"participants", "questionnaires", "repeats"}
     return digest_of(

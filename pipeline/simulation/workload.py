@@ -1,4 +1,4 @@
-"""Ratings of a simulated session, by the response model that study.yaml states: judgement, and said to be so."""
+"""Ratings of a simulated session, by the response model that study.yaml states. It is an assumption, not a finding."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pipeline.study.simulation import Workload
 def ratings(
     model: Workload, seed: int, participant: str, condition: str, measured: Mapping[str, float]
 ) -> dict[str, float]:
-    """A rating a scale: its base, what each doubling of a driver adds, the person's own level, and chance.
+    """One rating per scale: its base, plus a rise per doubling of each driver, the person's own level, and noise.
 
-    `measured` holds the drivers of the session; one that is not finite adds nothing.
+    `measured` holds the session's drivers; one that is not finite or not above 0 adds nothing.
     """
-    found = {}
+    rated = {}
     for name, scale in model.scales.items():
         level = model.person_sd * seeded(str(seed), participant, "rating", name).standard_normal()
         chance = model.noise_sd * seeded(str(seed), participant, condition, "rating", name).standard_normal()
@@ -26,5 +26,5 @@ def ratings(
             if np.isfinite(measured[driver]) and measured[driver] > 0:
                 rating += rise * np.log2(measured[driver] / model.usual[driver])
         stepped = model.lowest + model.step * round((rating - model.lowest) / model.step)
-        found[name] = float(np.clip(stepped, model.lowest, model.highest))
-    return found
+        rated[name] = float(np.clip(stepped, model.lowest, model.highest))
+    return rated

@@ -279,7 +279,7 @@ def test_a_lost_process_is_said(study: Path, command: Command, monkeypatch: pyte
     monkeypatch.setattr("pipeline.simulation.exploration.small_study", lost)
     ran = command(study, *SMALL)
     assert ran.code == 2
-    assert "a process was lost (signal 9)" in ran.err
+    assert "a process died (signal 9), possibly out of memory" in ran.err
 
 
 def test_ctrl_c_writes_nothing(study: Path, command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

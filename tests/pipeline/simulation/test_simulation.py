@@ -308,10 +308,10 @@ def test_a_run_that_is_stopped_leaves_the_files_of_the_run_before(
             {"task": {"path_mm": [[0, 500], [100, 500]], "targets_mm": [[50, 560]]}},
             "[50.0, 560.0] is 60 mm off what is left of the path",
         ),
-        ({"shown": {"kinect": "kinect"}}, 'shown says nothing of "fusion"'),
+        ({"shown": {"kinect": "kinect"}}, 'shown has no estimator for "fusion"'),
         ({"axes": ["x"]}, "selection needs axes: [x, y], found ['x']"),
         ({"simulation": settings(repeats=0)["simulation"]}, "repeats: names a file, but simulation: repeats is 0"),
-        ({"participants": None}, "participants: is missing; the simulation writes to what it names"),
+        ({"participants": None}, "participants: is missing; name the file that the simulation is to write"),
         ({"sessions": "data/{session}.mcap"}, "needs {participant} and {condition} for the logs' names"),
     ],
 )
