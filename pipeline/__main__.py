@@ -334,7 +334,7 @@ def cache_verify(cache: CacheFolder = None) -> None:
 
 def main() -> None:
     """Run the command; an error that the user can correct is a message, not a traceback."""
-    threads.one_a_process()
+    threads.limit_to_one_thread()
     from pipeline.commands.console import warn
     from pipeline.errors import RUN_AGAIN, PipelineError
 

@@ -104,7 +104,7 @@ def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str =
         raise PipelineError(
             "a script that loads with several jobs is run by each; put it under: if __name__ == '__main__'"
         )
-    threads.one_a_process()
+    threads.limit_to_one_thread()
     with executor_of(jobs, executor) as opened, show_progress() as progress:
         result = bring_up_to_date(folder, COMPARE, Resources(cache_in(cache), opened, progress))
     for line in (*damage_messages(result), *session_messages(result)):

@@ -11,7 +11,7 @@ overwritten, nothing ever expires, and any number of studies, versions and runs 
     .steadyhand-cache/
     ├── lock                    held while an entry is put in place or removed
     ├── inputs/
-    │   └── 51d0….json          what is known of the files of one study (pipeline.engine.input_digests)
+    │   └── 51d0….json          digests of the files of one study (pipeline.engine.input_digests)
     ├── new/
     │   ├── fuse-k2x9a7/        a run is writing this, or was killed while it did
     │   └── gone-7dz1p0/        an entry being removed
@@ -21,27 +21,28 @@ overwritten, nothing ever expires, and any number of studies, versions and runs 
                 ├── entry.json      size and SHA-256 of each file, the stage's outcome, the digest of both
                 └── tracks.parquet
 
-Keys and digests. Entries of earlier stages stand in a key by their `digest`, which is of their content, not by their
-key. Where an edit changes the key of an early stage and its tables come out the same, everything after it is found in
-the cache as before.
+Keys and digests. A key contains the `digest` of each earlier entry, which depends on its content alone, and not its
+key. So where an edit changes the key of an early stage but its tables come out the same, all later stages are still
+found in the cache.
 
-Whole or not at all. A stage writes into a folder of its own below `new`, and `keep` renames that to its place. A rename
-within one file system happens at once: no reader ever sees half an entry, whenever a run is killed. Removal goes the
-same way, out of sight first. What a killed run leaves below `new` is in nobody's way; `prune` removes it after a day.
+Whole or not at all. A stage writes into a folder of its own below `new`, and `keep` renames that folder to its place. A
+rename within one file system is atomic: no reader ever sees half an entry, even if a run is killed. An entry is removed
+in the same way: it is renamed to a place below `new` first. What a killed run leaves below `new` does no harm; `prune`
+removes it after a day.
 
-The lock. Two runs may compute the same entry. Each writes its own folder, and the second finds the place taken and
-drops its own; the contents are the same. The lock only keeps one run from removing a damaged entry at the moment at
-which another has just replaced it. Readers take no lock.
+The lock. Two runs may compute the same entry. Each writes its own folder; the second finds that the entry exists and
+removes its own folder, since the contents are the same. The lock only keeps one run from removing a damaged entry when
+another has just replaced it. Readers take no lock.
 
 What `get` trusts. Reading every table to compare digests would take longer than many runs. So `keep` sets the time of
-each file to an even second in the past (`_seal`), and `get` takes a file as unchanged while it has that time and its
-size. Whatever writes to the file sets another time, even within one tick of the coarsest clock. A file with another
+each file to an even second in the past (`_seal`), and `get` considers a file unchanged as long as it has that time and
+its size. Whatever writes to the file sets another time, even within one tick of the coarsest clock. A file with another
 time (after a copy of the cache, say) is read and compared. entry.json is always read, and checked against its own
-digest. `damage` and `verify` read everything: that also finds a disk that decays and a write that was lost with the
-power. A damaged entry counts as none: it is computed again, and the user is told.
+digest. `damage` and `verify` read everything, which also finds bad sectors of a disk and writes that were lost in a
+power cut. A damaged entry is treated as missing: it is computed again, and the user is told.
 
-What must stay true. (1) A key names all that may change the entry, else stale results are taken for current ones; that
-is the one mistake the cache cannot notice. (2) A function that fills a folder writes there only. (3) Files below an
+What must stay true. (1) A key covers everything that may change the entry. Otherwise stale results are taken for
+current ones, and the cache cannot notice it. (2) A function that fills a folder writes there only. (3) Files below an
 entry are never written to. (4) `new` is on the same file system as the entries.
 
 What may change. Anything about `new`, the lock and `inputs`. A change to what entry.json holds needs another LAYOUT,
@@ -93,7 +94,7 @@ class Entry:
 
 
 class Cache:
-    """Entries below one folder, by stage and key. `read_digest` is how a file is read; a test counts with it."""
+    """Entries below one folder, by stage and key. `read_digest` computes a file's digest; tests count its calls."""
 
     def __init__(self, root: Path, read_digest: Callable[[Path], str] = file_digest) -> None:
         self.root = root
@@ -108,7 +109,7 @@ class Cache:
         return self.root / stage / key[:2] / key
 
     def get(self, stage: str, key: str) -> Entry | None:
-        """The entry; None where there is none, or a file of it is missing or not what was written.
+        """The entry; None where there is none, or where a file of it is missing or has changed.
 
         A file that still has the time and size it was kept with is not read.
         """
@@ -122,7 +123,7 @@ class Cache:
         return entry
 
     def damage(self, stage: str, key: str) -> str | None:
-        """What is wrong with an entry that is there, reading all of it; None where nothing is, or there is no entry."""
+        """What is wrong with an existing entry, by reading all of it; None if it is whole or does not exist."""
         return damage_in(self._folder(stage, key))
 
     def entries(self) -> Iterator[Path]:
@@ -137,7 +138,7 @@ class Cache:
             yield from sorted((self.root / _NEW).iterdir())
 
     def remove(self, folder: Path) -> None:
-        """Remove an entry or a remnant. An entry goes at once, not file by file."""
+        """Remove an entry or a remnant. An entry disappears at once, not file by file."""
         with self._locked():
             _discard(folder, self.root / _NEW)
 
@@ -146,13 +147,13 @@ class Cache:
         """Keep other runs from putting entries in place or removing them."""
         self.root.mkdir(parents=True, exist_ok=True)
         with (self.root / "lock").open("a") as file:
-            with suppress(OSError):  # some network file systems have no locks; renames are whole even so
+            with suppress(OSError):  # some network file systems have no locks; renames are still atomic
                 fcntl.flock(file, fcntl.LOCK_EX)
             yield
 
     @contextmanager
     def new(self, stage: str) -> Iterator[Path]:
-        """A folder to fill; it is removed unless `keep` takes it over."""
+        """An empty folder for a stage to fill; it is removed afterwards unless `keep` has taken it into the cache."""
         (self.root / _NEW).mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f"{stage}-", dir=self.root / _NEW))
         try:
@@ -182,18 +183,18 @@ class Cache:
         final = self._folder(stage, key)
         final.parent.mkdir(parents=True, exist_ok=True)
         with self._locked():
-            there = self.get(stage, key)
-            if there is not None:
-                return there  # another run was first
+            existing = self.get(stage, key)
+            if existing is not None:
+                return existing  # another run was first
             _discard(final, self.root / _NEW)
             folder.rename(final)
         return Entry(final, dict(outcome), digest)
 
 
 def _seal(folder: Path, files: Iterable[str]) -> int:
-    """Set the files' times of modification (ns since 1970) to one at least two seconds ago; any later write changes it.
+    """Set the files' modification times to at least two seconds ago, in ns since 1970; any later write changes them.
 
-    It is an even number of seconds, which every file system keeps as it is: FAT counts in steps of two.
+    The time is an even number of seconds, because FAT stores times in steps of two seconds.
     """
     sealed_ns = (int(time.time()) // _CLOCK_S - 1) * _CLOCK_S * 1_000_000_000
     for name in files:
@@ -202,17 +203,17 @@ def _seal(folder: Path, files: Iterable[str]) -> int:
 
 
 class _DamagedError(Exception):
-    """Why a folder is not a whole entry."""
+    """Raised with the reason why a folder is not a whole entry."""
 
 
 def last_used_s(folder: Path) -> float:
-    """When an entry was last used, in seconds since 1970; of a folder that is no entry, when it was last changed."""
+    """When an entry was last used, in seconds since 1970; for a remnant, when it was last changed."""
     manifest = folder / _MANIFEST
     return (manifest if manifest.is_file() else folder).stat().st_mtime
 
 
 def damage_in(folder: Path) -> str | None:
-    """What is wrong with the entry in a folder, reading all of it; None where nothing is, or there is no folder."""
+    """What is wrong with the entry in a folder, by reading all of it; None if it is whole or does not exist."""
     if not folder.is_dir():
         return None
     try:
@@ -223,9 +224,9 @@ def damage_in(folder: Path) -> str | None:
 
 
 def _read(folder: Path, read_digest: Callable[[Path], str], trust_times: bool) -> Entry:
-    """The entry in a folder, each file of it compared with what was written. Raises _DamagedError.
+    """The entry in a folder; raises _DamagedError where a file is not what was written.
 
-    With `trust_times` a file that still has the time it was sealed with counts as what was written.
+    With `trust_times`, a file that still has the time it was sealed with counts as unchanged and is not read.
     """
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
@@ -250,7 +251,7 @@ def _read(folder: Path, read_digest: Callable[[Path], str], trust_times: bool) -
 
 
 def _discard(folder: Path, trash: Path) -> None:
-    """Take a folder out of its place in one step, then remove it."""
+    """Remove a folder: rename it away in one step first, so that nobody sees it half removed."""
     if not folder.exists():
         return
     trash.mkdir(parents=True, exist_ok=True)

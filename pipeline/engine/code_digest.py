@@ -1,10 +1,10 @@
-"""The digest of a stage's code: of its module, of all it reaches, of the files beside them, and of libraries' versions.
+"""The digest of a stage's code: its module, all modules it imports, data files beside them, and libraries' versions.
 
 It is part of every key of the cache (pipeline.engine.cache), so an edit makes exactly those stages compute again whose
-code can reach it. Imports are found in the text of a module, wherever they stand in it, without running it; so are
-modules named in a string, such as a stage's function. What files a module opens cannot be found that way. So every file
-counts that is no Python and stands beside a module that is reached, or in folders below that hold no modules:
-templates, scripts, styles, whatever comes. Nobody has to list them, so nobody can forget to.
+code can reach it. Imports are found by parsing a module, wherever they are in it, without running it; so are modules
+named in a string, such as a stage's function. Which files a module opens cannot be found that way. So every file counts
+that is not Python and is beside a module that is reached, or in a folder below that has no modules: templates, scripts,
+styles. They are found rather than listed, so that none can be forgotten.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _DISTRIBUTIONS = {
 
 @cache
 def code_digest(module: str) -> str:
-    """The digest of a module of the Steadyhand that runs."""
+    """The digest of a module of the running Steadyhand."""
     return code_digest_in(_ROOT, module)
 
 
@@ -48,7 +48,7 @@ def code_digest_in(root: Path, module: str) -> str:
     pending = [module]
     while pending:
         reached_module = pending.pop()
-        # A package is run on the way to its modules, but what else it imports for its users is not used here.
+        # Importing a module runs the __init__ of its packages; what else these import is not used by the module.
         for package in _parents(reached_module):
             path = _source(root, package)
             if path is not None:
@@ -103,7 +103,7 @@ def _parents(module: str) -> list[str]:
 
 @cache
 def _imports(root: Path, source: bytes) -> tuple[str, ...]:
-    """The modules a source imports, wherever it does, and those it names as text to import when needed."""
+    """The modules that a source imports anywhere, and those that it names in strings, to be imported when needed."""
     reached: list[str] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -120,7 +120,7 @@ def _imports(root: Path, source: bytes) -> tuple[str, ...]:
 
 
 def versions(libraries: Iterable[str]) -> dict[str, str]:
-    """The installed version of each library that has one (those of Python itself have none)."""
+    """The installed version of each library; the standard library's modules have none and are left out."""
     installed = {}
     for library in sorted(set(libraries) - sys.stdlib_module_names):
         try:

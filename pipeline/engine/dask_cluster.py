@@ -1,4 +1,4 @@
-"""Sessions computed by the workers of a Dask cluster. Imports Dask, so it is imported only where Dask is asked for."""
+"""Computing on the workers of a Dask cluster. This imports Dask, so it is imported only for `--executor dask`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.engine.stage import Work
 from pipeline.errors import RUN_AGAIN, PipelineError, WorkerLostError
 
 _STAGES = "pipeline.stages"  # the digest of this module's code follows the code of every stage
-_IGNORE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # it is for the command alone
+_IGNORE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # only the command handles it
 
 
 class OneThread(WorkerPlugin):
@@ -29,19 +29,19 @@ class OneThread(WorkerPlugin):
     name = "steadyhand-one-thread"
 
     def setup(self, worker: Any) -> None:
-        """Also where a worker is started anew."""
-        threads.one_a_process()
+        """Called when a worker starts, also when Dask restarts it."""
+        threads.limit_to_one_thread()
 
 
 class OnDask(Executor):
-    """The workers of a cluster. Dask itself hands the work of one that died to another."""
+    """An executor over the workers of a cluster. If a worker dies, Dask itself gives its work to another."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
         self._code = code_digest(_STAGES)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Compute on some worker, if its code is the same as here and it sees the folders."""
+        """Compute on some worker, provided that its code is the same as here and that it can see the folders."""
         folders = sorted(set(_folders(args)))
         on_dask = self._client.submit(checked_call, self._code, folders, fn, args, kwargs, pure=False)
         future = _DaskFuture(on_dask)
@@ -50,7 +50,7 @@ class OnDask(Executor):
 
 
 def _folders(args: Iterable[Any]) -> Iterator[Path]:
-    """The folders that a call names, at any depth: a worker must see them."""
+    """The folders among a call's arguments, at any depth of nesting: a worker must be able to see them."""
     for arg in args:
         if isinstance(arg, list | tuple):
             yield from _folders(arg)
@@ -59,7 +59,7 @@ def _folders(args: Iterable[Any]) -> Iterator[Path]:
 
 
 class _DaskFuture(Future[Any]):
-    """A future of Python's for one of Dask's."""
+    """A future of the standard library that stands for one of Dask's."""
 
     def __init__(self, on_dask: Any) -> None:
         super().__init__()
@@ -83,7 +83,7 @@ class _DaskFuture(Future[Any]):
         except (CancelledError, ConnectionError, TimeoutError):
             self.set_exception(PipelineError(f"--executor dask: lost the Dask scheduler. {RUN_AGAIN}"))
         except ImportError as error:
-            self.set_exception(_other_code(f"one cannot import {error.name}"))
+            self.set_exception(_different_code(f"one cannot import {error.name}"))
         except Exception as error:  # noqa: BLE001 - handed on by the future
             self.set_exception(error)
 
@@ -91,12 +91,12 @@ class _DaskFuture(Future[Any]):
 def checked_call(
     code: str, folders: list[Path], fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> Any:
-    """Call the function on a worker, which must give the same result as the process of the command would.
+    """Call the function on a worker, after checking that it would give the same result here.
 
-    Raises PipelineError where the worker's code has another digest than `code`, or a folder is not to be seen there.
+    Raises PipelineError where the worker's code has another digest than `code`, or where it cannot see a folder.
     """
     if code_digest(_STAGES) != code:
-        raise _other_code("their code, Python or libraries differ")
+        raise _different_code("their code, Python or libraries differ")
     for folder in folders:
         if not folder.is_dir():
             raise PipelineError(
@@ -106,7 +106,7 @@ def checked_call(
     return fn(*args, **kwargs)
 
 
-def _other_code(difference: str) -> PipelineError:
+def _different_code(difference: str) -> PipelineError:
     return PipelineError(
         f"--executor dask: the workers do not run the same Steadyhand as this command: {difference}; install the same"
         " version with the same libraries on them, and restart them"
@@ -115,15 +115,17 @@ def _other_code(difference: str) -> PipelineError:
 
 @contextmanager
 def on_dask(address: str | None, count: int, say: Callable[[str], None], connect_s: float = 10.0) -> Iterator[Executor]:
-    """The executor of the scheduler at an address, or of a cluster of `count` processes of this machine.
+    """The executor for the scheduler at an address; without one, for a cluster of `count` processes of this machine.
 
     Raises PipelineError where no scheduler answers within `connect_s` seconds.
     """
     for name in filter(re.compile(r"distributed\b").match, [*logging.root.manager.loggerDict]):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is raised as well
+        logging.getLogger(name).setLevel(
+            logging.CRITICAL
+        )  # errors are raised as well, so logging them would say them twice
     with ExitStack() as open_until_done:
         if address is None:
-            # A session that kills its worker is tried again by itself; the others need not wait for it long.
+            # A session that kills its worker is tried again by itself later; the others must not wait for retries.
             open_until_done.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 1}))
             cluster = LocalCluster(
                 n_workers=count,

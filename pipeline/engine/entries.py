@@ -1,4 +1,4 @@
-"""The entries of pieces of work: from the cache, or computed over an executor where it has none."""
+"""The entries of pieces of work: from the cache, or computed by an executor where the cache has none."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from pipeline.engine.compute import (
     compute_with_own_helpers,
     keep_unusable,
 )
-from pipeline.engine.processes import InThisProcess, Processes, in_a_process_of_its_own
+from pipeline.engine.processes import InThisProcess, Processes, call_in_own_process
 from pipeline.engine.resources import Resources
 from pipeline.engine.result import Damaged, Result
 from pipeline.engine.stage import Stage, Work
 from pipeline.errors import RUN_AGAIN, PipelineError, WorkerLostError
 
-_AHEAD = 256  # groups of pieces handed to the executor before they are needed: more than a cluster has processes
-_LARGEST_GROUP = 8  # pieces of one session, whose recording is then loaded once
+_AHEAD = 256  # groups handed to the executor ahead of time: more than a cluster has processes, so that none waits
+_LARGEST_GROUP = 8  # pieces of one session computed together, so that its recording is loaded once
 
 
 def entries_of(stage: Stage, result: Result, pieces: Iterable[Piece], resources: Resources) -> list[Entry]:
-    """The entry of each piece of work with its key; each key the cache has no entry for is computed once.
+    """The entry of each piece of work, in their order; each key that the cache has no entry for is computed once.
 
-    Of the pieces only those that are to be computed are kept meanwhile.
+    `pieces` is consumed one by one, and only pieces that must be computed are kept in memory.
     """
     entries: dict[str, Entry] = {}
     missing: dict[str, Piece] = {}
@@ -44,7 +44,7 @@ def entries_of(stage: Stage, result: Result, pieces: Iterable[Piece], resources:
             entries[key] = entry
     result.computed[stage.name] = len(missing)
     if missing:
-        resources.cache.root.mkdir(parents=True, exist_ok=True)  # a worker elsewhere looks whether it is there
+        resources.cache.root.mkdir(parents=True, exist_ok=True)  # a worker on another machine checks that it exists
         resources.progress.begin(stage.label or stage.name, len(missing), stage.unit)
         for key, entry in _computed(stage, list(missing.values()), resources):
             entries[key] = entry
@@ -66,27 +66,32 @@ def entry_of_study(stage: Stage, result: Result, work: Work, key: str, resources
 
 
 def _compute_study(stage: Stage, work: Work, key: str, resources: Resources) -> Entry:
-    """In this process, which hands the stage's small jobs to the run's executor; or, of an archive, in another.
+    """Compute in this process, with the run's executor for the stage's small jobs; an archive in a separate process.
 
-    Joining the tables of an archive takes memory that Python hardly gives back; a process that ends does.
+    Joining the tables of an archive takes memory that Python hardly returns to the system; when a process ends, it
+    returns all of it.
     """
     cache_root, executor = resources.cache.root, resources.executor
     apart = len(work.sessions) >= resources.archive_sessions and not isinstance(executor, InThisProcess)
     if not isinstance(executor, Processes):
         # Also with Dask a stage does its jobs itself. They write files into a folder of the cache; what a worker on
         # another machine writes there may be seen here late, and sending it tables costs more than drawing them.
-        return _compute_apart(compute, stage, work, key, cache_root) if apart else compute(stage, work, key, cache_root)
+        return (
+            _compute_in_own_process(compute, stage, work, key, cache_root)
+            if apart
+            else compute(stage, work, key, cache_root)
+        )
     if not apart:
         return compute_with_helpers(stage, work, key, cache_root, executor)
-    # Its jobs cannot come back through the pipe to the processes of this run, so that process has some of its own.
-    # Those of the run end before, with all they hold: no more are at work at once than the user allowed.
+    # The separate process cannot use the processes of this run, so it starts its own. Those of the run end before that,
+    # so that no more processes run at once than the user allowed.
     executor.end_idle()
-    return _compute_apart(compute_with_own_helpers, stage, work, key, cache_root, executor.count)
+    return _compute_in_own_process(compute_with_own_helpers, stage, work, key, cache_root, executor.count)
 
 
-def _compute_apart(function: Callable[..., Entry], stage: Stage, *arguments: Any) -> Entry:
+def _compute_in_own_process(function: Callable[..., Entry], stage: Stage, *arguments: Any) -> Entry:
     try:
-        entry: Entry = in_a_process_of_its_own(function, stage, *arguments)
+        entry: Entry = call_in_own_process(function, stage, *arguments)
     except WorkerLostError as error:
         raise PipelineError(
             f'the process computing stage "{stage.name}" died ({error}), possibly out of memory. {RUN_AGAIN}'
@@ -95,7 +100,7 @@ def _compute_apart(function: Callable[..., Entry], stage: Stage, *arguments: Any
 
 
 def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache) -> Entry | None:
-    """The cache's entry. If it is damaged, that is noted, and there is none: it will be computed again."""
+    """The cache's entry; None if there is none. A damaged one is noted in `result` and treated as missing."""
     entry = cache.get(stage.name, key)
     if entry is None:
         damage = cache.damage(stage.name, key)
@@ -105,11 +110,11 @@ def _look_up(stage: Stage, key: str, session: str, result: Result, cache: Cache)
 
 
 def _computed(stage: Stage, missing: Sequence[Piece], resources: Resources) -> Iterator[tuple[str, Entry]]:
-    """Entries by their keys, as they are done.
+    """Keys and entries, in the order in which they are finished.
 
     A piece whose process died is tried once more after the others, by itself: another piece of its group may have
-    killed the process, or the machine was short of memory just then. If the process dies again, the session is set
-    aside, and tried again in the next run.
+    killed the process, or the machine may have been short of memory at that moment. If the process dies again, the
+    session is set aside, and tried again in the next run.
     """
     lost: list[Piece] = []
     waiting: dict[Future[list[Entry]], list[Piece]] = {}
@@ -117,18 +122,18 @@ def _computed(stage: Stage, missing: Sequence[Piece], resources: Resources) -> I
         for done in _as_completed(stage, _groups(missing, resources.fewest_groups), resources, waiting):
             try:
                 for (_, key), entry in zip(waiting[done], done.result(), strict=True):
-                    yield key, _visible(entry)
+                    yield key, _require_visible(entry)
             except WorkerLostError:
                 lost += waiting[done]
     finally:
         for future in waiting:
             future.cancel()
     for work, key in lost:
-        yield key, _visible(_second_try(stage, work, key, resources))
+        yield key, _require_visible(_retry(stage, work, key, resources))
 
 
-def _second_try(stage: Stage, work: Work, key: str, resources: Resources) -> Entry:
-    kept = resources.cache.get(stage.name, key)  # perhaps its process died after this one was done
+def _retry(stage: Stage, work: Work, key: str, resources: Resources) -> Entry:
+    kept = resources.cache.get(stage.name, key)  # its process may have died after this piece was finished
     if kept is not None:
         return kept
     try:
@@ -140,7 +145,7 @@ def _second_try(stage: Stage, work: Work, key: str, resources: Resources) -> Ent
 
 
 def _groups(missing: Sequence[Piece], fewest: int) -> Iterator[list[Piece]]:
-    """What is computed in one go: a few pieces of one session, where that leaves enough groups to share."""
+    """Pieces to be computed together: a few of one session, as far as that leaves `fewest` groups to share out."""
     size = min(max(len(missing) // fewest, 1), _LARGEST_GROUP)
     group: list[Piece] = []
     for piece in missing:
@@ -154,9 +159,9 @@ def _groups(missing: Sequence[Piece], fewest: int) -> Iterator[list[Piece]]:
 def _as_completed(
     stage: Stage, groups: Iterable[list[Piece]], resources: Resources, waiting: dict[Future[list[Entry]], list[Piece]]
 ) -> Iterator[Future[list[Entry]]]:
-    """Submit all, some at a time, each in `waiting` until it is taken; futures as they are done.
+    """Submit all groups, some at a time; yield futures as they finish. A future is in `waiting` until it was taken.
 
-    Of a future that is done nothing is kept: of ten thousand sessions they would be most of what this process holds.
+    Nothing is kept of a finished future: with ten thousand sessions, they would use most of this process's memory.
     """
     for group in groups:
         future = resources.executor.submit(compute_all, stage, group, resources.cache.root)
@@ -168,14 +173,14 @@ def _as_completed(
 
 
 def _done(waiting: dict[Future[list[Entry]], list[Piece]]) -> Iterator[Future[list[Entry]]]:
-    """Those that are done, at least one; each leaves `waiting` once it has been taken."""
+    """Wait for at least one future to finish; yield those that have, and remove each from `waiting` afterwards."""
     for future in wait(waiting, return_when=FIRST_COMPLETED).done:
         yield future
         waiting.pop(future)
 
 
-def _visible(entry: Entry) -> Entry:
-    """The entry, if it is to be seen here: another machine may have computed it."""
+def _require_visible(entry: Entry) -> Entry:
+    """The entry; PipelineError if its folder cannot be seen here, because another machine has computed it."""
     if not entry.folder.is_dir():
         raise PipelineError(
             f"{entry.folder}: a worker computed this, but it cannot be seen here; put --cache on a file system that all"

@@ -22,9 +22,9 @@ def _print(text: str) -> None:
 def executor_of(jobs: int | None, name: str = PROCESS, say: Callable[[str], None] = _print) -> Iterator[Executor]:
     """The executor of that name, with `jobs` processes (None: as many as there are processors).
 
-    No process of this machine starts before there is work for it; one job is done in this process. `say` is told
-    where to watch a Dask cluster. Raises PipelineError where no executor has that name, or Dask is not installed or
-    does not answer.
+    No process starts before there is work for it; with one job, everything is computed in this process. `say` is called
+    with the address of a Dask cluster's dashboard. Raises PipelineError where no executor has that name, or where Dask
+    is not installed or does not answer.
     """
     count = jobs or os.cpu_count() or 1
     if name == INLINE or (name == PROCESS and count == 1):

@@ -13,7 +13,7 @@ _REMNANT_S = 24 * 3600.0  # a folder that a run is still writing is younger than
 
 @dataclass(frozen=True)
 class Item:
-    """A folder of the cache: an entry with its stage, or what a killed run left ("").
+    """A folder of the cache: an entry, with the name of its stage, or a remnant of a killed run, with stage "".
 
     `size_bytes` is that of its files, `used_s` when it was last used, in seconds since 1970.
     """
@@ -26,14 +26,14 @@ class Item:
 
 @dataclass(frozen=True)
 class Cleanup:
-    """What was removed and what is left."""
+    """Which folders were removed and which are left."""
 
     removed: tuple[Item, ...]
     left: tuple[Item, ...]
 
 
 def items_in(cache: Cache) -> Iterator[Item]:
-    """Every entry, then every remnant. What another run removes meanwhile is left out."""
+    """Every entry, then every remnant. A folder that another run removes at the same time is skipped."""
     for stage_of, folders in ((lambda f: f.parents[1].name, cache.entries()), (lambda _: "", cache.remnants())):
         for folder in folders:
             try:
@@ -44,9 +44,9 @@ def items_in(cache: Cache) -> Iterator[Item]:
 
 
 def prune(cache: Cache, now_s: float, unused_s: float | None, keep: Collection[Path] | None) -> Cleanup:
-    """Remove entries that were not used for `unused_s`, and those not in `keep`; both must hold where both are given.
+    """Remove entries that were not used for `unused_s` and are not in `keep`; None sets no such condition.
 
-    What killed runs left goes after a day.
+    Remnants of killed runs are removed after a day.
     """
 
     def may_go(item: Item) -> bool:
@@ -59,7 +59,7 @@ def prune(cache: Cache, now_s: float, unused_s: float | None, keep: Collection[P
 
 
 def verify(cache: Cache, say: Callable[[Item, str], None]) -> Cleanup:
-    """Compare every file of every entry with the digest of what was written; say and remove what is damaged."""
+    """Compare every file of every entry with the digest of what was written; report damaged entries and remove them."""
 
     def damaged(item: Item) -> bool:
         damage = damage_in(item.folder) if item.stage else None

@@ -1,4 +1,4 @@
-"""Digests of the files a study is made of, remembered as long as the file system says that a file is the same."""
+"""Digests of a study's own files, remembered as long as the file system says that a file has not changed."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def file_digests(
     read_digest: Callable[[Path], str] = file_digest,
     now_ns: Callable[[], int] = time.time_ns,
 ) -> dict[str, str]:
-    """SHA-256 of each file, under its name. Only what changed since the last time is read, by `read_digest`.
+    """SHA-256 of each file, by its name in `files`. Only files that changed since the last call are read.
 
-    A file is the same if its size, its times of modification and of change, and its inode are. One that changed
-    within the last two seconds is read again the next time, for it might change once more at what is the same time to
-    the file system (as git does with its index). What is known of a study's files is kept in the folder `memory`.
+    A file counts as unchanged if its size, modification time, change time and inode are the same. One that changed
+    within the last two seconds is read again the next time, because another change might get the same time (git treats
+    its index in the same way). The digests of a study's files are remembered in the folder `memory`.
     """
     kept = memory / f"{digest_of(str(study))}.json"
     before = _read(kept)
@@ -50,7 +50,7 @@ def _stamp(path: Path) -> _Stamp:
 
 
 def _read(kept: Path) -> _Known:
-    """What was kept; nothing where it is missing or damaged."""
+    """The remembered digests; none where the file is missing or damaged."""
     try:
         content = json.loads(kept.read_text(encoding="utf-8"))
         if digest_of(content["files"]) != content["sha256"]:
@@ -61,7 +61,7 @@ def _read(kept: Path) -> _Known:
 
 
 def _write(known: _Known, kept: Path) -> None:
-    """Whole or not at all. What cannot be kept is read again the next time."""
+    """Write the whole file or none of it. If it cannot be written, the study's files are read again the next time."""
     partial = kept.with_name(f"{kept.name}.{os.getpid()}")
     with suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)

@@ -12,12 +12,12 @@ from pipeline.errors import WorkerLostError
 
 
 class Jobs:
-    """Jobs that an executor does meanwhile; at the end of the `with` block all of them are done.
+    """Jobs that an executor does in the background; at the end of the `with` block all of them are done.
 
-    A job is a function of a module, with arguments that can be pickled, that writes a file of its own. So it does not
-    matter which process does it or when. The executor begins with the first; at the end of the block this process
-    helps, beginning with the last, and does once more what a process was at that died. Without an executor each job
-    is done here, when it is added.
+    A job is a module's function with arguments that can be pickled, and writes a file of its own. So it does not matter
+    which process does it or when. The executor begins with the first job. At the end of the block this process helps,
+    beginning with the last, and repeats jobs whose process died. Without an executor, each job is done in this process
+    when it is added.
     """
 
     def __init__(self, executor: Executor | None = None) -> None:
@@ -37,14 +37,14 @@ class Jobs:
             if kind is None:
                 self._finish()
         finally:
-            # Whoever failed, the folder that the jobs write into is about to go: none must still be writing then.
+            # After an error the folder that the jobs write into is about to be removed: none must still be writing.
             for future, _ in self._added:
                 future.cancel()
             wait([future for future, _ in self._added])
 
     def _finish(self) -> None:
         for future, do_here in reversed(self._added):
-            if future.cancel():  # nobody has begun it
+            if future.cancel():  # no process has begun it
                 do_here()
         for future, do_here in self._added:
             if future.cancelled():

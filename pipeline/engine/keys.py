@@ -1,4 +1,4 @@
-"""A piece of work, and the key of its result: everything that may change it, and nothing else."""
+"""A piece of work, and the key of its result, which covers everything that may change the result and nothing else."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from pipeline.study.settings import Study
 
 @dataclass(frozen=True)
 class Declared:
-    """A stage, the settings of a study that it declared, and a digest of both and of its code.
+    """A stage, the settings of a study that it declared, and a digest of these settings and of its code.
 
-    It is the same for every session, so it is made once.
+    It is the same for every session, so it is computed once.
     """
 
     stage: Stage
@@ -58,7 +58,7 @@ def work_and_key(declared: Declared, result: Result, sessions: Sequence[Session]
             result.name,
             [[session.id, session.participant, session.condition] for session in sessions],
             work.inputs,
-            # By what is in them, not by their keys: what comes out the same after a change ends what follows from it.
+            # By content, not by key: if an earlier stage gives the same tables after a change, later ones need not run.
             {name: [entry.digest for entry in entries] for name, entries in read.items()},
             [[session.id, reason] for session, reason in (*work.set_aside, *work.in_part)],
             work.unused,

@@ -1,4 +1,4 @@
-"""What is said of a run: what happened to sessions and to the cache, and what was computed."""
+"""Messages about a run: what happened to sessions and to the cache, and what was computed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pipeline.engine.result import Result
 
 
 def session_messages(result: Result) -> Iterator[str]:
-    """A line for each session that is not wholly in the results, and for each file that is not used."""
+    """A line for each session that is set aside or read in part, and for each file that is not used."""
     for session, reason in result.set_aside:
         yield f"{result.name}: session {session.id} set aside: {reason}"
     for session, reason in result.in_part:
@@ -25,7 +25,7 @@ def damage_messages(result: Result) -> Iterator[str]:
 
 
 def computed_message(result: Result) -> str:
-    """How much of each stage was computed, and in how long."""
+    """How many pieces of each stage were computed, and how long the run took."""
     counts = [f"{stage} {count}" for stage, count in result.computed.items() if count]
     if not counts:
         return f"Nothing had changed, so nothing was computed again ({result.seconds:.1f} s)."

@@ -1,4 +1,4 @@
-"""Where work is done: in this process, or in processes that may die without taking the others with them."""
+"""Executors: this process, or several processes, one of which may die without affecting the others."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pipeline.errors import WorkerLostError
 
 
 class InThisProcess(Executor):
-    """An executor that computes when it is asked to."""
+    """An executor that computes in this process, at once."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Compute now."""
@@ -28,11 +28,11 @@ class InThisProcess(Executor):
 
 
 class Processes(Executor):
-    """Up to `count` processes of this machine. Each computes one call at a time, for which a thread waits here.
+    """Up to `count` processes of this machine. Each computes one call at a time, while a thread waits for it here.
 
     Python's own ProcessPoolExecutor is not used because it breaks as a whole when one of its processes dies, and
-    does not say which call killed it. Here a process that dies takes one call with it, whose future raises
-    WorkerLostError, and another takes its place. A process ends when this one does, however that ends.
+    does not say which call killed it. Here only the future of the call that was running raises WorkerLostError, and
+    another process replaces the dead one. All processes end when this process ends, for whatever reason.
     """
 
     def __init__(self, count: int) -> None:
@@ -47,9 +47,9 @@ class Processes(Executor):
         return self._threads.submit(self.call, fn, args, kwargs)
 
     def call(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        """Compute in some process, and wait for it."""
+        """Compute in an idle process or a new one, and wait for the result."""
         try:
-            process = self._idle.pop()  # the last one used, so that few calls at once need few processes
+            process = self._idle.pop()  # the one used last, so that no more processes start than are needed at once
         except IndexError:
             process = _Process()
             self._started.append(process)
@@ -63,22 +63,22 @@ class Processes(Executor):
 
     @contextmanager
     def all_but_one(self) -> Iterator[Executor | None]:
-        """An executor over these processes that leaves one out, for a caller that is at work itself; None of one."""
+        """An executor over these processes except one, for a caller that works itself; None if there is only one."""
         if self.count == 1:
             yield None
             return
-        with _Fewer(self, self.count - 1) as fewer:
+        with _SomeProcesses(self, self.count - 1) as fewer:
             yield fewer
 
     def end_idle(self) -> None:
-        """End the processes, which gives their memory back; later calls start others. Only between calls."""
+        """End the processes, which frees their memory; later calls start new ones. Must not be called during a call."""
         for process in self._started:
             process.stop()
         self._started.clear()
         self._idle.clear()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Stop the processes, also those at work; a call they were at raises WorkerLostError."""
+        """Stop the processes, also busy ones; the calls that they were computing raise WorkerLostError."""
         self._stopping = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for process in self._started:
@@ -86,8 +86,8 @@ class Processes(Executor):
         self._threads.shutdown(wait=wait, cancel_futures=True)
 
 
-class _Fewer(Executor):
-    """Some of the processes of an executor."""
+class _SomeProcesses(Executor):
+    """An executor over some of the processes of another."""
 
     def __init__(self, processes: Processes, count: int) -> None:
         self._processes = processes
@@ -98,14 +98,14 @@ class _Fewer(Executor):
         return self._threads.submit(self._processes.call, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Wait for calls; the processes go on."""
+        """Wait for the calls; the processes themselves are not stopped."""
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
 
 
-def in_a_process_of_its_own(fn: Callable[..., Any], *args: Any) -> Any:
-    """What the call gives; the process, which may start others, ends with it, and gives all its memory back.
+def call_in_own_process(fn: Callable[..., Any], *args: Any) -> Any:
+    """The call's result, computed in a new process, which may start others and ends afterwards, freeing its memory.
 
-    Raises WorkerLostError where it dies.
+    Raises WorkerLostError where the process dies.
     """
     process = _Process(may_start_others=True)
     try:
@@ -115,7 +115,7 @@ def in_a_process_of_its_own(fn: Callable[..., Any], *args: Any) -> Any:
 
 
 class _Process:
-    """A process that computes what comes through a pipe. Where the other end closes, it ends."""
+    """A process that computes the calls it receives through a pipe, and ends when the other end of the pipe closes."""
 
     def __init__(self, may_start_others: bool = False) -> None:
         # Spawned, not forked: a fork would copy the locks of this process's threads in whatever state they are.
@@ -123,7 +123,7 @@ class _Process:
         self._here, there = context.Pipe()
         self._process = context.Process(target=_serve, args=(there,), daemon=not may_start_others)
         self._process.start()
-        there.close()  # the process alone holds that end now, so that its death shows here as an end of file
+        there.close()  # only the process has that end open now, so if it dies, this end reads an end of file
         self.alive = True
 
     def call(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
@@ -147,7 +147,7 @@ class _Process:
 
 
 def _serve(pipe: Connection) -> None:
-    """Compute until the pipe closes. Ctrl-C is for the process that asked; SIGTERM lets what is open be put away."""
+    """Compute until the pipe closes. The parent process handles Ctrl-C; SIGTERM exits with clean-up."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     with suppress(EOFError, OSError):
@@ -156,6 +156,6 @@ def _serve(pipe: Connection) -> None:
             answer: tuple[Exception | None, Any]
             try:
                 answer = (None, fn(*args, **kwargs))
-            except Exception as error:  # noqa: BLE001 - handed to the process that asked
+            except Exception as error:  # noqa: BLE001 - handed to the parent process
                 answer = (error, None)
             pipe.send(answer)

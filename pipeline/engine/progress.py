@@ -1,4 +1,4 @@
-"""How far a run is: bars in a terminal, plain lines in a log file."""
+"""The progress of a run: bars in a terminal, plain lines in a log file."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _BETWEEN_LINES_S = 10.0
 
 
 class Progress(Protocol):
-    """Is told how far things are."""
+    """Shows how far a run is."""
 
     def begin(self, label: str, total: int, unit: str = "sessions") -> None:
-        """Something that takes `total` steps begins; `label` says what, `unit` what the steps are."""
+        """A task of `total` steps begins; `label` names the task, `unit` what its steps are."""
 
     def advance(self) -> None:
         """One step is done."""
@@ -25,25 +25,25 @@ class Progress(Protocol):
 
 
 class PlainLines:
-    """A line when something begins, and one every ten seconds while it lasts."""
+    """A line when a task begins, and one about every ten seconds while it lasts."""
 
     def __init__(self) -> None:
         self._label, self._total, self._done, self._last_line_s = "", 0, 0, 0.0
 
     def begin(self, label: str, total: int, unit: str = "sessions") -> None:
-        """A line that says what is coming."""
+        """Print the task and how many steps it has."""
         self._label, self._total, self._done, self._last_line_s = label, total, 0, time.monotonic()
         _print(f"{label} …" if total == 1 else f"{label}: {total} {unit} …")
 
     def advance(self) -> None:
-        """Now and then a line."""
+        """Count a step; print a line if the last one was over ten seconds ago."""
         self._done += 1
         if time.monotonic() - self._last_line_s > _BETWEEN_LINES_S and self._done < self._total:
             self._last_line_s = time.monotonic()
             _print(f"{self._label}: {self._done} of {self._total}")
 
     def end(self) -> None:
-        """Nothing: the next line says that this is done."""
+        """Print nothing: the line of the next task shows that this one is done."""
 
 
 def _print(text: str) -> None:
@@ -51,7 +51,7 @@ def _print(text: str) -> None:
 
 
 class Bars:
-    """A bar in a terminal for what is going on; it vanishes when that is done."""
+    """A bar in a terminal for the task that is running; it disappears when the task is done."""
 
     def __init__(self) -> None:
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -61,7 +61,7 @@ class Bars:
         self._task = self.live.add_task("", total=None, visible=False)
 
     def begin(self, label: str, total: int, unit: str = "sessions") -> None:
-        """Show a bar; what its steps are has no room on it."""
+        """Show a bar; there is no room on it for the unit of its steps."""
         del unit
         self.live.update(self._task, visible=False)
         self._task = self.live.add_task(label, total=total)
@@ -77,7 +77,7 @@ class Bars:
 
 @contextmanager
 def show_progress() -> Iterator[Progress]:
-    """Bars where someone looks on, lines elsewhere."""
+    """Bars if stderr is a terminal, otherwise lines."""
     if not sys.stderr.isatty():
         yield PlainLines()
         return

@@ -1,4 +1,4 @@
-"""What a report says of its own making."""
+"""What a report says about how it was made."""
 
 PROVENANCE = "provenance.json"
 """The file beside results.json that says how they were made."""

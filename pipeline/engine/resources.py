@@ -1,4 +1,4 @@
-"""What a run needs beside the study: a cache, an executor, and someone who is told how far it is."""
+"""What a run needs besides the study: a cache, an executor, and where to show progress."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pipeline.engine.progress import Progress
 
 @dataclass(frozen=True)
 class Resources:
-    """Where results are kept, where they are computed, and who is told.
+    """Where results are kept, where they are computed, and where progress is shown.
 
-    From `archive_sessions` sessions on, a stage of the whole study is computed in a process of its own. Pieces of one
-    session are computed in groups, as far as that leaves `fewest_groups` groups for the processes to share. Neither
-    changes a result; tests set them low.
+    With `archive_sessions` sessions or more, a stage of the whole study is computed in a process of its own, which
+    frees its memory. Pieces of one session are computed in groups, as long as there are at least `fewest_groups` groups
+    for the processes to share. Neither changes a result; tests set them low.
     """
 
     cache: Cache

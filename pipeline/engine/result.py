@@ -1,4 +1,4 @@
-"""What a run gives: the entries of each stage, and what happened to the sessions."""
+"""The result of a run: the entries of each stage, and what happened to the sessions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.study.settings import Study
 
 
 class Damaged(NamedTuple):
-    """An entry that was cached and could not be used any more; `session` is empty for one of the whole study."""
+    """A cached entry that was found damaged; `session` is empty for one of the whole study."""
 
     stage: str
     session: str
@@ -21,10 +21,11 @@ class Damaged(NamedTuple):
 
 @dataclass
 class Result:
-    """A study brought up to date: what each stage gave, by session, and what happened to the sessions.
+    """A study brought up to date: the entries of each stage by session id, and what happened to the sessions.
 
-    `sessions` are those that went through every stage. The entry of a stage of scope "study" stands under an empty
-    name. `computed` counts what the cache did not have, by stage.
+    `sessions` are those that went through every stage. The entry of a stage of scope "study" has the session id "".
+    `computed` counts, by stage, the pieces that the cache did not have. `set_aside`, `in_part` and `unused` (files)
+    give the reason for each; `inputs` holds the SHA-256 of each of the study's files.
     """
 
     folder: Path
@@ -41,7 +42,7 @@ class Result:
 
     @property
     def name(self) -> str:
-        """The study's name: its folder's."""
+        """The study's name, which is its folder's."""
         return self.folder.name
 
     @property
@@ -50,5 +51,5 @@ class Result:
         return 1 if self.set_aside or self.in_part else 0
 
     def entry(self, stage: str) -> Path:
-        """The folder of a stage of scope "study"."""
+        """The folder of the entry of a stage of scope "study"."""
         return self.entries[stage][""].folder

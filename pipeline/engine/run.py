@@ -1,4 +1,4 @@
-"""The stages one after the other over a study: brought up to date, or only looked up."""
+"""Runs the stages one after the other over a study, or only looks up what the cache has."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.study.settings import Study
 def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
     """Run the stages over a study; what the cache holds is not computed again.
 
-    Raises PipelineError where nothing can be done: a bad study, or no usable session and no tables.
+    Raises PipelineError for a study that cannot be read, or one without tables and without a usable session.
     """
     began = time.monotonic()
     result, sessions = open_study(folder, resources.cache)
@@ -55,9 +55,9 @@ def run_variants(
 ) -> list[list[Entry]]:
     """A stage's entries with several settings of one study: a list for each session, in the order of the variants."""
     began = time.monotonic()
-    each = [(declared_by(stage, study), replace(result, study=study)) for study in variants]
+    declared = [(declared_by(stage, study), replace(result, study=study)) for study in variants]
     # Session by session, so that the variants of one session may share a process that has loaded its recording.
-    pieces = (work_and_key(declared, variant, [session]) for session in sessions for declared, variant in each)
+    pieces = (work_and_key(of_stage, variant, [session]) for session in sessions for of_stage, variant in declared)
     entries = entries_of(stage, result, pieces, resources)
     result.seconds += time.monotonic() - began
     return [entries[at : at + len(variants)] for at in range(0, len(entries), len(variants))]
@@ -66,8 +66,8 @@ def run_variants(
 def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[Path]:
     """The folders of the entries that a run over the study would take from the cache; nothing is computed.
 
-    What follows from something that would have to be computed first cannot be known, and is not among them.
-    Raises PipelineError where the study is bad.
+    An entry that depends on something still to be computed has no known key and is not included. Raises PipelineError
+    where the study cannot be read.
     """
     result, sessions = open_study(folder, cache)
     used: set[Path] = set()
@@ -80,12 +80,12 @@ def current_entries(folder: Path, stages: Sequence[Stage], cache: Cache) -> set[
         complete = complete and len(entries) == (len(sessions) if stage.scope == "session" else 1)
         result.entries[stage.name] = entries
         if stage.scope == "session":
-            sessions = usable_after(result, [one for one in sessions if one.id in entries], entries)
+            sessions = usable_after(result, [session for session in sessions if session.id in entries], entries)
     return used
 
 
 def _cached(stage: Stage, result: Result, sessions: Sequence[Session], cache: Cache) -> dict[str, Entry]:
-    """The stage's entries that the cache has, by session; that of the whole study under an empty name."""
+    """The stage's entries that the cache has, by session id; "" for an entry of the whole study."""
     declared = declared_by(stage, result.study)
     parts = {session.id: [session] for session in sessions} if stage.scope == "session" else {"": sessions}
     looked_up = {name: cache.get(stage.name, work_and_key(declared, result, part)[1]) for name, part in parts.items()}

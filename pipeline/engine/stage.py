@@ -14,12 +14,12 @@ from pipeline.study.settings import Study
 
 @dataclass(frozen=True)
 class Stage:
-    """What a stage reads and which settings may change its output; nothing else can reach it.
+    """A stage: what it reads and which settings may change its output; it is given nothing else.
 
-    `function` is "module:function", imported only when there is something to compute. A stage of scope "session"
-    runs once a session, one of scope "study" once. `reads` names earlier stages, `settings` keys of study.yaml,
-    `files` keys of study.yaml that name a file. `label` and `unit` are for people who wait: what is being done, and
-    what a piece of its work is.
+    `function` is "module:function", imported only when there is something to compute. A stage of scope "session" runs
+    once per session, one of scope "study" once. `reads` names earlier stages, `settings` keys of study.yaml, `files`
+    keys of study.yaml that name a file. `label` and `unit` are shown as progress: what is being done, and what its
+    steps are.
     """
 
     name: str
@@ -41,7 +41,11 @@ class Stage:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a stage reports beside its tables. Not None: why the session cannot be used, or was read only in part."""
+    """What a stage reports besides its tables.
+
+    `set_aside` is the reason why the session cannot be used, `in_part` why it was read only in part; None otherwise.
+    `participant` and `condition` are what the log says, where the file's name does not.
+    """
 
     set_aside: str | None = None
     in_part: str | None = None
@@ -53,11 +57,12 @@ class Outcome:
 class Work:
     """One piece of work. `study` holds the declared settings only, `entries` the folders of the stages read.
 
-    For a stage of scope "study" each stage read has a folder a session, in the order of `sessions`; a stage of
-    scope "study" has one. `unused` are files among the sessions that are none, with the reason.
+    For a stage of scope "study", `entries` holds one folder per session, in the order of `sessions`, for each session
+    stage read, and one folder for each study stage read. `unused` are files among the sessions that are not logs, with
+    the reason. The result is written into the folder `out`.
 
-    `executor` may take small jobs of a stage of scope "study" (pipeline.engine.jobs); None where all of it is to be
-    done in the process that computes the stage. No result may depend on it, so it is in no key.
+    `executor` may take small jobs of a stage of scope "study" (pipeline.engine.jobs); None if they are to be done in
+    this process. No result may depend on it, so it is in no key.
     """
 
     study_name: str

@@ -1,4 +1,4 @@
-"""Which sessions a study has, and which of them go on after a stage."""
+"""Which sessions a study has, and which of them can still be used after a stage."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ from pipeline.study.settings import Study
 
 
 def open_study(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
-    """A study before its first stage, and its sessions as their names say. Raises PipelineError for a bad study."""
+    """A study before its first stage, and its sessions with participant and condition as their file names say.
+
+    Raises PipelineError where the study cannot be read.
+    """
     study = load_study(folder)
     listed = find_sessions(folder, study)
     result = Result(folder.resolve(), study, set_aside=listed.set_aside, unused=listed.unused)
@@ -37,9 +40,9 @@ def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache:
 
 
 def usable_after(result: Result, sessions: Sequence[Session], entries: dict[str, Entry]) -> list[Session]:
-    """The sessions that go on after a stage, with participant and condition as the log says; `result` takes the rest.
+    """The sessions that can be used after a stage, with participant and condition as the log says.
 
-    `entries` are the stage's, by session.
+    Sessions that are set aside or read in part are noted in `result`. `entries` are the stage's, by session id.
     """
     usable = []
     for session in sessions:

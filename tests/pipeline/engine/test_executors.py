@@ -282,7 +282,7 @@ def test_numeric_libraries_start_no_threads_where_a_process_computes(monkeypatch
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
     for name in ("MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)
-    threads.one_a_process()
+    threads.limit_to_one_thread()
     with Processes(1) as executor:
         assert executor.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "1"
         assert executor.submit(os.getenv, "OMP_NUM_THREADS").result() == "4"  # the user's own is kept
