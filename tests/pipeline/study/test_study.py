@@ -180,7 +180,7 @@ def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhan
         ("test: rm_anova, within: [task]", 'within of "m" must contain "condition", and no name twice'),
         (
             "test: mixed_model, fixed: [condition, period, factor(period)]",
-            'fixed of "m" needs "condition", and no name',
+            'fixed of "m" must contain "condition", and no name',
         ),
         (
             "test: mixed_model, fixed: [condition, 'condition:task']",
