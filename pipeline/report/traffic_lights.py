@@ -18,7 +18,7 @@ LIGHTS: tuple[Light, ...] = ("not judged", "green", "amber", "red")
 """From the least to the worst."""
 SYMBOLS: Mapping[Light, str] = {"not judged": "–", "green": "✓", "amber": "▲", "red": "✗"}
 FACTS = ("Rate", "Longest gap", "Delay", "Clock", "Lost", "Replay", "Checks")
-"""What is judged of a session, in the order of the report."""
+"""The figures of a session that are judged, in the order of the report."""
 _TO_COMPARE = 3  # sessions: with fewer the usual rate cannot be told from an unusual one
 
 
@@ -99,7 +99,7 @@ def _usual_rates(study: Study, quality: Sequence[Row]) -> dict[str, float]:
 
 
 def _stream(study: Study, row: Row, usual_hz: float | None) -> Iterator[Judged]:
-    """What is judged of a stream. Events come when they come: of them only what was lost."""
+    """What is judged of a stream. Events have no rate, so only their losses are judged."""
     limits, stream = study.quality_limits, study.streams.get(row["stream"])
 
     def one(fact: str, shown: str, light: Light) -> Judged:
@@ -120,7 +120,7 @@ def _stream(study: Study, row: Row, usual_hz: float | None) -> Iterator[Judged]:
             share = row["out_of_order"] / row["messages_read"]
             yield one("Clock", f"{percent(share)} out of order", _above(share, limits.out_of_order_share))
     if row["messages_lost"] is None:
-        yield one("Lost", "not known how many", "amber")
+        yield one("Lost", "number not known", "amber")
     elif row["messages_read"] + row["messages_lost"]:
         share = row["messages_lost"] / (row["messages_read"] + row["messages_lost"])
         yield one("Lost", f"{row['messages_lost']}, {percent(share)}", _above(share, limits.lost_share))

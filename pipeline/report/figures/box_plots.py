@@ -30,8 +30,8 @@ def _workload_words(wide: Mapping[str, pd.DataFrame]) -> Words:
     conditions = list(next(iter(wide.values())).columns)
     names = listing([short_label(name) for name in wide])
     head = (
-        f"Ratings by scale and condition ({complete_counts(wide)}): boxes hold the middle half of the participants, the"
-        " thick line is the median, marks are participants."
+        f"Ratings by scale and condition ({complete_counts(wide)}): boxes show the middle half of the participants, the"
+        " thick line is the median, marks are single participants."
     )
     alt = f"Box plots of {names} for {listing(conditions)}."
     if len(conditions) > 1:

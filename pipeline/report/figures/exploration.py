@@ -78,7 +78,7 @@ def participants(differences: pd.DataFrame, own: Tracker) -> Figure:
 
 
 def _alt(surface: Surface) -> str:
-    return f"Heat maps of {surface.label} over latency and noise; the values stand in the table that follows."
+    return f"Heat maps of {surface.label} over latency and noise; the values are in the table that follows."
 
 
 def _surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) -> Figure:
@@ -133,8 +133,8 @@ def _panel(
         values[cell] = np.nan if pd.isna(value) else value
         bracketed[cell] = row.get("bracketed", False)
     _cells(axes, values, bracketed, surface, scale)
-    axes.set_xticks(np.arange(len(latencies)) + 0.5, [f"{1000 * one:g}" for one in latencies])
-    axes.set_yticks(np.arange(len(noises)) + 0.5, [f"{one:g}" for one in noises])
+    axes.set_xticks(np.arange(len(latencies)) + 0.5, [f"{1000 * latency:g}" for latency in latencies])
+    axes.set_yticks(np.arange(len(noises)) + 0.5, [f"{noise:g}" for noise in noises])
     axes.tick_params(length=0)
     for side in axes.spines.values():
         side.set_visible(False)

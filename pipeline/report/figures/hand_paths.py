@@ -42,7 +42,7 @@ def _path_words(
     summary = f"Extent of each line: {spans}; {counted(int((events['type'] == 'selection').sum()), 'selection')}."
     return Words(
         f"The hand's path{where} in {plane[0]} and {plane[1]}; it starts at the arrow. {summary} Look where the lines"
-        " part, and how much each trembles.",
+        " separate, and how much each trembles.",
         f"Lines of the hand's path in the plane{where}. {summary}",
     )
 

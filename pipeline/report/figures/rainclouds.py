@@ -1,4 +1,4 @@
-"""Every participant in every condition, and the differences: of one measure, or of each scale of a questionnaire."""
+"""Rainclouds: every participant in every condition, and their differences, for a measure or a questionnaire."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
     legend_text = (
         " Small marks are participants"
         + (", joined by lines" if len(wide.columns) > 1 and not between else "")
-        + "; shapes show their density, thick bars the middle half, large marks the means with 95 % intervals."
+        + "; shapes show their density, thick bars the middle half of them, large marks the means with 95 % intervals."
     )
     return Words(head + legend_text, alt)
 
@@ -62,7 +62,7 @@ def met_one_each(wide: pd.DataFrame) -> bool:
 
 
 def _complete_of(complete: pd.DataFrame) -> str:
-    return f"{counted(len(complete), 'participant')} complete"
+    return f"{counted(len(complete), 'complete participant')}"
 
 
 def _differences_words(complete: pd.DataFrame, unit: str) -> str:
@@ -125,7 +125,7 @@ def _furthest(wide: Mapping[str, pd.DataFrame]) -> str:
     if apart == 0:
         return "The means are the same in every scale."
     return (
-        f"The means lie furthest apart in {short_label(measure).lower()}: {number(means.max())} under {means.idxmax()},"
+        f"The means differ most in {short_label(measure).lower()}: {number(means.max())} under {means.idxmax()},"
         f" {number(means.min())} under {means.idxmin()}."
     )
 

@@ -1,4 +1,4 @@
-"""What the statistical words of a report mean, a sentence each."""
+"""What the statistical words of a report mean, in one sentence each."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import re
 from collections.abc import Sequence
 
 _WORDS: Sequence[tuple[str, str, str]] = (
-    ("n", r"\bn = \d|^n$", "How many participants count."),
+    ("n", r"\bn = \d|^n$", "The number of participants that a figure rests on."),
     ("M", r"\bM = ", "Mean: the sum of the values over their number."),
     ("SD", r"\bSDs?\b", "Standard deviation: how far values typically lie from their mean."),
     ("Median", r"\b[Mm]edian\b", "The value that half of the values lie below."),
     (
         "95 % interval, CI",
         r"95 % (CI|interval)|\[95 %",
-        "Confidence interval: made so that in 95 of 100 such studies it holds the true value.",
+        "Confidence interval: computed so that in 95 of 100 such studies it contains the true value.",
     ),
     ("MSE", r"\bMSE\b", "Mean squared error: the mean of the squared distances from the target."),
     ("RMSE", r"\bRMSE\b", "Root mean square error: the root of the mean squared error, in the unit of the distances."),
-    ("Baseline", r"\bbaseline\b", "The condition that the others are held against: the first in study.yaml."),
+    ("Baseline", r"\bbaseline\b", "The condition that the others are compared with: the first in study.yaml."),
     (
         "p",
         r"\bp [=<>] |^p$",
@@ -31,12 +31,12 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     (
         "p adjusted",
         r"-adjusted|^p adjusted$",
-        "p made larger for the number of tests in a family, since of many tests some fall below any level by chance.",
+        "p made larger for the number of tests in a family: among many tests, some are significant by chance.",
     ),
     (
         "Holm",
         r"\bHolm\b",
-        "A way of adjusting p: the smallest is multiplied by the number of tests, the next by one less.",
+        "A way of adjusting p: the smallest is multiplied by the number of tests, the next by one less, and so on.",
     ),
     ("Bonferroni", r"\bBonferroni\b", "A way of adjusting p: each is multiplied by the number of tests."),
     (
@@ -47,7 +47,7 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     (
         "Sphericity",
         r"[Ss]phericity|^p corrected$|Greenhouse",
-        "That the differences between any two conditions vary equally, which the ANOVA of more than two supposes.",
+        "The assumption of an ANOVA of three or more conditions that the differences between any two vary equally.",
     ),
     (
         "Greenhouse-Geisser ε, p corrected",
@@ -57,67 +57,71 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     (
         "Repeated-measures ANOVA (rm ANOVA)",
         r"\brm ANOVA|[Rr]epeated-measures ANOVA",
-        "Analysis of variance: asks whether the means of the conditions differ more than chance would have it.",
+        "Analysis of variance: asks whether the means of the conditions differ more than is to be expected by chance.",
     ),
-    ("F", r"\bF\(|\bF = ", "What an ANOVA is judged by: variation between conditions over variation by chance."),
-    ("Follow-up", r"[Ff]ollow-up", "A test of two conditions after one of all of them."),
+    (
+        "F",
+        r"\bF\(|\bF = ",
+        "The statistic of an ANOVA: the variation between conditions divided by the variation by chance.",
+    ),
+    ("Follow-up", r"[Ff]ollow-up", "A test of two conditions after a test of all of them."),
     (
         "Paired t test",
         r"[Pp]aired t\b",
         "Asks whether the mean of the participants' differences between two conditions differs from zero.",
     ),
-    ("t", r"\bt\(|\bt = ", "A difference or an estimate over its standard error."),
+    ("t", r"\bt\(|\bt = ", "A difference or an estimate divided by its standard error."),
     ("df", r"^df$", "Degrees of freedom: how many independent pieces of data a statistic rests on."),
     (
         "Wilcoxon signed-rank test",
         r"\bWilcoxon\b",
-        "Compares two conditions by the ranks of the participants' differences, ties at their mean rank.",
+        "Compares two conditions by the ranks of the participants' differences, where ties share their mean rank.",
     ),
     ("W₊", r"W₊", "The sum of the ranks of the differences in which the first condition's value is larger."),
     ("Friedman test", r"\bFriedman\b", "Compares conditions by how each participant's values rank them."),
-    ("χ²", r"χ²", "What Friedman's test is judged by: how far the conditions' mean ranks lie apart."),
+    ("χ²", r"χ²", "The statistic of Friedman's test: how far apart the conditions' mean ranks lie."),
     (
         "Aligned rank transform (ART)",
         r"\bART\b|[Aa]ligned rank",
-        "Does what ANOVA does on ranks, effect by effect, each after the others are taken out.",
+        "An ANOVA of ranks: for each effect the values are ranked after the other effects are taken out.",
     ),
     (
         "Mixed model",
         r"[Mm]ixed model",
-        "Takes every value there is, also of people who lack others, with a constant for each participant.",
+        "Uses every value, also those of people who lack others, with a constant for each participant.",
     ),
     (
         "Singular fit",
         r"[Ss]ingular fit",
-        "A mixed model that finds no variance between participants, so that it says no more than one without them.",
+        "A mixed model that finds no variance between participants, as if each row came from a different person.",
     ),
     (
         "Crossover analysis",
         r"[Cc]rossover",
-        "Takes the period's effect out of the difference of two conditions, and asks whether what came first matters.",
+        "Takes the effect of the period out of the difference between two conditions, and tests for carry-over.",
     ),
-    ("Carry-over", r"[Cc]arry-over", "What an earlier condition still does in a later one."),
+    ("Carry-over", r"[Cc]arry-over", "The effect that an earlier condition still has in a later one."),
     (
         "Test of equivalence (TOST)",
         r"\bTOST\b",
-        "Asks the reverse: whether the mean difference lies within stated bounds; p is the larger of two.",
+        "Asks whether the mean difference lies within stated bounds; p is the larger of two one-sided ones.",
     ),
     (
         "Bayes factor, BF₁₀",
         r"BF₁₀|Bayes factor",
-        "How many times as likely the data are under a difference (of the stated prior) as under none.",
+        "How many times as likely the data are if there is a difference (with the stated prior) as if there is none.",
     ),
     ("Effect size", r"[Ee]ffect size", "How large a difference is, whatever the number of participants."),
-    ("η²G", r"η²G", "Generalized eta squared: the share of all variance that goes with the condition, from 0 to 1."),
+    ("η²G", r"η²G", "Generalized eta squared: the share of all variance that the condition explains, from 0 to 1."),
     (
         "η²p",
         r"η²p",
-        "Partial eta squared: the share of the variance of the effect and its error together, from 0 to 1.",
+        "Partial eta squared: the effect's share of the variance of effect and error together, from 0 to 1.",
     ),
     ("d_z", r"\bd_z\b", "The mean difference in units of the differences' standard deviation."),
     ("r_rb", r"\br_rb\b", "Rank-biserial correlation: from −1 (second always larger) to 1 (first always larger)."),
     ("W", r"\bW = [.\d]", "Kendall's W: from 0 (participants rank the conditions differently) to 1 (all alike)."),
-    ("Estimate", r"\bestimate = ", "A difference or slope as the model has it, in the unit of the measure."),
+    ("Estimate", r"\bestimate = ", "A difference or slope estimated by the model, in the unit of the measure."),
     ("Mean difference", r"^Mean difference$", "The mean under the first condition minus that under the second."),
     ("Reduction", r"^Reduction$", "By how much the mean is lower under the second condition, as a share of the first."),
     (

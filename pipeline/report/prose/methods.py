@@ -67,7 +67,7 @@ def _who(facts: Mapping[str, Any]) -> str:
 
 
 def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
-    """What was measured; of a questionnaire its scales together."""
+    """The measures, with the scales of a questionnaire together."""
     scales: dict[str, list[str]] = {}
     others: list[str] = []
     for measure in dict.fromkeys(row["measure"] for row in results["descriptives"]):
@@ -79,7 +79,7 @@ def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
             others.append(f"{subject(measure)}{f' in {unit}' if unit else ''}")
     named = [f"{subject(f'{name}/ratings')} ({', '.join(parts)})" for name, parts in scales.items()]
     if others or named:
-        yield f"Measures: {'; '.join([*others, *named])}. Each participant's mean in each condition was one value."
+        yield f"Measures: {'; '.join([*others, *named])}. Each participant's mean in a condition counted as one value."
 
 
 def _estimators(study: Study) -> Iterator[str]:
@@ -117,19 +117,19 @@ def _value(value: object) -> str:
 
 
 def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
-    """Each entry's test, of which measures, and how families of p values were adjusted."""
+    """Each entry's test and its measures, and how families of p values were adjusted."""
     if not rows:
         return
     said: dict[str, list[str]] = {}
     for entry in study.comparisons:
         of = listing([_named(pattern) for pattern in entry.measures])
         mine = [row for row in rows if row["test"] == entry.test]
-        said.setdefault(_asked(entry, mine) + _followed_up(entry, mine), []).append(of)
+        said.setdefault(_test_text(entry, mine) + _followed_up(entry, mine), []).append(of)
     for test, measures in said.items():
         yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
-        yield "Of more than two conditions p was corrected for sphericity after Greenhouse and Geisser."
-    yield f"The level of significance was {_level(study.alpha)}; intervals are of 95 %."
+        yield "With more than two conditions, p was corrected for sphericity (Greenhouse-Geisser)."
+    yield f"The level of significance was {_level(study.alpha)}; intervals are 95 % intervals."
 
 
 def _named(pattern: str) -> str:
@@ -141,7 +141,7 @@ def _level(alpha: float) -> str:
     return f"{alpha:g}".removeprefix("0")
 
 
-def _asked(entry: Comparison, rows: Sequence[Row]) -> str:
+def _test_text(entry: Comparison, rows: Sequence[Row]) -> str:
     """`Wilcoxon signed-rank tests (…), exact, midranks, zeros dropped, p Holm-adjusted`; rows are of its test."""
     options = TESTS[entry.test].options
     parts = [TESTS[entry.test].methods_text]
@@ -172,18 +172,19 @@ def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
 
 def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     """Who was left out by decision and why, and how much else is missing."""
-    for one in study.exclusions:
-        named = [f"{key} {value}" for key, value in one.model_dump().items() if value and key != "reason"]
-        yield f"Excluded: {', '.join(named)} ({one.reason.strip().rstrip('.')})."
+    for exclusion in study.exclusions:
+        named = [f"{key} {value}" for key, value in exclusion.model_dump().items() if value and key != "reason"]
+        yield f"Excluded: {', '.join(named)} ({exclusion.reason.strip().rstrip('.')})."
     aside = sum(row["what"] == "session set aside" for row in rows)
     if aside:
-        yield f"Of the sessions {aside} could not be used and {'was' if aside == 1 else 'were'} set aside."
+        yield f"{counted(aside, 'session')} could not be used and {'was' if aside == 1 else 'were'} set aside."
     incomplete = {row["participant"] for row in rows if row["what"] == "left out of comparisons"}
     if incomplete:
-        yield f"Of the participants {len(incomplete)} lacked a value and did not count in the comparisons concerned."
+        were = "was" if len(incomplete) == 1 else "were"
+        yield f"{counted(len(incomplete), 'participant')} lacked a value and {were} left out of those comparisons."
 
 
 def _software(versions: Mapping[str, str]) -> Iterator[str]:
     listed = [f"{name} {version}" for name, version in versions.items() if name not in ("steadyhand", "Python")]
     ours = f"Steadyhand {versions['steadyhand']}" if "steadyhand" in versions else "Steadyhand"
-    yield f"All was computed with {ours} on Python {versions['Python']} ({', '.join(listed)})."
+    yield f"Everything was computed with {ours} on Python {versions['Python']} ({', '.join(listed)})."

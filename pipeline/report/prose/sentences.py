@@ -31,8 +31,8 @@ _DIGITS = 3  # of p, as APA prints it
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a sentence may say beside its row: conditions in order, level, descriptives by measure and condition."""
+class StudyFacts:
+    """What sentences need beside their row: conditions in order, level, descriptives by measure and condition."""
 
     conditions: tuple[str, ...]
     alpha: float
@@ -49,25 +49,25 @@ class _Pair:
     where: str = ""
 
 
-def told_of(conditions: Sequence[str], alpha: float, descriptives: Sequence[Row]) -> Told:
-    """What sentences may say of a study."""
-    return Told(tuple(conditions), alpha, {(row["measure"], row["condition"]): row for row in descriptives})
+def study_facts(conditions: Sequence[str], alpha: float, descriptives: Sequence[Row]) -> StudyFacts:
+    """The facts of a study that sentences need."""
+    return StudyFacts(tuple(conditions), alpha, {(row["measure"], row["condition"]): row for row in descriptives})
 
 
-def sentence(row: Row, told: Told) -> str:
-    """A row of `comparisons` in APA's manner, with its direction in words; why not, where it is not defined."""
+def sentence(row: Row, facts: StudyFacts) -> str:
+    """A row of `comparisons` in APA style, with its direction in words; where it is undefined, the reason."""
     what = subject(row["measure"])
     if row["status"] != "ok":
         of = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f" of {contrast(row)}"
         return f"{what}: the {_test(row)}{of} is {row['status']} (n = {row['n']})."
     if TESTS[row["test"]].question == "evidence":
-        return _bayes(row, told, what)
+        return _bayes(row, facts, what)
     if TESTS[row["test"]].question == "equivalence":
-        return _equivalence(row, told, what)
-    pair, difference = _pair(row, told.conditions), _difference(row)
+        return _equivalence(row, facts, what)
+    pair, difference = _pair(row, facts.conditions), _difference(row)
     if pair is not None and difference is not None:
-        return _directed(row, told, what, pair, difference)
-    return _effect(row, told, what)
+        return _directed(row, facts, what, pair, difference)
+    return _effect(row, facts, what)
 
 
 def _test(row: Row) -> str:
@@ -75,18 +75,18 @@ def _test(row: Row) -> str:
     return "follow-up t test" if follows_up else TESTS[row["test"]].long_name
 
 
-def _directed(row: Row, told: Told, what: str, pair: _Pair, difference: float) -> str:
+def _directed(row: Row, facts: StudyFacts, what: str, pair: _Pair, difference: float) -> str:
     """Which of two is lower, by how much, and whether that is significant."""
     amount = _amount(row, difference)
     side = f"{'lower' if difference > 0 else 'higher'} {pair.among} {pair.second}" if difference else "the same in both"
-    if _significant(row, told.alpha) and difference:
+    if _significant(row, facts.alpha) and difference:
         head = f"{what} was significantly {side} than {pair.among} {pair.first}{pair.where}"
-        inside = [amount, *_means(row, told)]
+        inside = [amount, *_means(row, facts)]
     else:
         head = f"{what} did not differ significantly between {pair.first} and {pair.second}{pair.where}"
-        inside = [f"{side} {amount}".strip(), *_means(row, told)]
+        inside = [f"{side} {amount}".strip(), *_means(row, facts)]
     said = "; ".join(part for part in inside if part)
-    return f"{head}{f' ({said})' if said else ''}, {_evidence(row, told)}."
+    return f"{head}{f' ({said})' if said else ''}, {_evidence(row, facts)}."
 
 
 def _amount(row: Row, difference: float) -> str:
@@ -101,51 +101,51 @@ def _amount(row: Row, difference: float) -> str:
     return f"by {size}" + ("" if reduction is None else f", {percent(abs(reduction))}")
 
 
-def _effect(row: Row, told: Told, what: str) -> str:
+def _effect(row: Row, facts: StudyFacts, what: str) -> str:
     """An effect without a direction: of several conditions, of another factor, of an interaction."""
-    found = _significant(row, told.alpha)
+    found = _significant(row, facts.alpha)
     if row["effect"] in EFFECTS_OF_CONDITION and row["contrast"] is None:
         verb = "differed significantly" if found else "did not differ significantly"
-        means = "; ".join(_means(row, told))
-        among = f"between {listing(list(told.conditions))}{f' ({means})' if means else ''}"
-        return f"{what} {verb} {among}, {_evidence(row, told)}."
+        means = "; ".join(_means(row, facts))
+        among = f"between {listing(list(facts.conditions))}{f' ({means})' if means else ''}"
+        return f"{what} {verb} {among}, {_evidence(row, facts)}."
     kind = "interaction" if ":" in row["effect"] and row["contrast"] is None else "effect"
     verb = "was" if found else "was not"
-    return f"{what}: the {kind} of {contrast(row)} {verb} statistically significant, {_evidence(row, told)}."
+    return f"{what}: the {kind} of {contrast(row)} {verb} statistically significant, {_evidence(row, facts)}."
 
 
-def _equivalence(row: Row, told: Told, what: str) -> str:
+def _equivalence(row: Row, facts: StudyFacts, what: str) -> str:
     """Whether the mean difference lies within the bounds."""
-    details, pair = row["details"], _pair(row, told.conditions)
+    details, pair = row["details"], _pair(row, facts.conditions)
     unit = unit_of(row["measure"])
     between = f"between {pair.first} and {pair.second}" if pair else f"of {contrast({**row, 'details': None})}"
     bounds = f"{interval(*details['bounds'])} {unit}".strip()
-    shown = "lies" if _significant(row, told.alpha) else "was not shown to lie"
+    shown = "lies" if _significant(row, facts.alpha) else "was not shown to lie"
     inside = f"90 % CI {interval(*details['ci90_difference'])}" if details.get("ci90_difference") else ""
     mean = f"{number(row['mean_difference'])} {unit}".strip()
     parts = [mean, inside] if inside else [mean]
-    evident = f"two one-sided t tests, {evidence(row, _digits(row, told.alpha), _BEFORE_INTERVAL)}, n = {row['n']}"
+    evident = f"two one-sided t tests, {evidence(row, _digits(row, facts.alpha), _BEFORE_INTERVAL)}, n = {row['n']}"
     return f"{what}: the mean difference {between} ({', '.join(parts)}) {shown} within {bounds}, {evident}."
 
 
-def _bayes(row: Row, told: Told, what: str) -> str:
+def _bayes(row: Row, facts: StudyFacts, what: str) -> str:
     """How many times as likely the data are under a difference as under none, or the reverse."""
-    pair, factor = _pair(row, told.conditions), row["statistic"]
+    pair, factor = _pair(row, facts.conditions), row["statistic"]
     between = f"between {pair.first} and {pair.second}" if pair else f"of {contrast(row)}"
-    likelier, other = ("no difference", "one") if factor is not None and factor < 1 else ("a difference", "none")
+    likelier, alternative = ("no difference", "one") if factor is not None and factor < 1 else ("a difference", "none")
     if factor is None:  # larger than any number a computer holds
         times, bayes = "more than 10³⁰⁸", f"ln BF₁₀ = {number(row['details']['log_bf10'])}"
     else:
         times, bayes = number(factor if factor >= 1 else 1 / factor), f"BF₁₀ = {statistic_value(row)}"
     prior = f"Cauchy prior of scale {row['details']['prior_scale']:g}"
     return (
-        f"{what}: the data are {times} times as likely under {likelier} {between} as under {other}, {bayes}"
+        f"{what}: the data are {times} times as likely under {likelier} {between} as under {alternative}, {bayes}"
         f" ({prior}), {effect_size(row, _BEFORE_INTERVAL)}, n = {row['n']}."
     )
 
 
-def _evidence(row: Row, told: Told) -> str:
-    """What the test is called where its letter does not say it, its figures, and how many took part."""
+def _evidence(row: Row, facts: StudyFacts) -> str:
+    """The test's name where its statistic does not tell it, its figures, and n."""
     named = ""
     if row["test"] == "wilcoxon":
         named = f"{row['method'].split(', ')[0].split(' ')[0]} Wilcoxon signed-rank test, "
@@ -153,7 +153,7 @@ def _evidence(row: Row, told: Told) -> str:
         named = "follow-up, "
     elif not TESTS[row["test"]].symbol_tells:
         named = f"{_test(row)}, "
-    figures = evidence(row, _digits(row, told.alpha), _BEFORE_INTERVAL)
+    figures = evidence(row, _digits(row, facts.alpha), _BEFORE_INTERVAL)
     singular = ", singular fit" if finds_no_variance_between_people(row) else ""
     return f"{named}{figures}, n = {row['n']}{singular}"
 
@@ -200,11 +200,11 @@ def _pair(row: Row, conditions: Sequence[str]) -> _Pair | None:
     return _Pair(first, second, "in period" if row["effect"] == "period" else "at", where)
 
 
-def _means(row: Row, told: Told) -> Iterator[str]:
+def _means(row: Row, facts: StudyFacts) -> Iterator[str]:
     """M and SD of each condition, where all of them are compared and they are of the same people as the test."""
-    if row["effect"] not in EFFECTS_OF_CONDITION or (row["contrast"] is not None and len(told.conditions) > 2):
+    if row["effect"] not in EFFECTS_OF_CONDITION or (row["contrast"] is not None and len(facts.conditions) > 2):
         return
-    found = [told.descriptives.get((row["measure"], condition)) for condition in told.conditions]
+    found = [facts.descriptives.get((row["measure"], condition)) for condition in facts.conditions]
     if all(one is not None and one["n"] == row["n"] for one in found):
         yield from (_mean(one) for one in found if one is not None)
 
@@ -214,13 +214,13 @@ def _mean(described: Row) -> str:
     return f"{described['condition']}: M = {number(described['mean'])}{spread}"
 
 
-def means_sentence(measure: str, told: Told) -> str:
-    """M, SD and n of every condition, for a measure whose tests do not tell them."""
-    found = [one for condition in told.conditions if (one := told.descriptives.get((measure, condition)))]
+def means_sentence(measure: str, facts: StudyFacts) -> str:
+    """M, SD and n of every condition, for a measure whose sentences do not state them."""
+    found = [one for condition in facts.conditions if (one := facts.descriptives.get((measure, condition)))]
     parts = [f"{_mean(one)}, n = {one['n']}" for one in found]
     return f"{subject(measure)}: {'; '.join(parts)}." if parts else ""
 
 
-def tells_means(row: Row, told: Told) -> bool:
-    """Does the row's sentence say the means of all conditions?"""
-    return row["status"] == "ok" and TESTS[row["test"]].tests_difference and any(_means(row, told))
+def states_means(row: Row, facts: StudyFacts) -> bool:
+    """Does the row's sentence state the means of all conditions?"""
+    return row["status"] == "ok" and TESTS[row["test"]].tests_difference and any(_means(row, facts))

@@ -1,4 +1,4 @@
-"""What a reader of the results has to be careful about, in a line each."""
+"""What a reader of the results has to be careful about, one line each."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def cautions(material: Material) -> list[Text]:
 def _of_data(material: Material) -> Iterator[Text]:
     origin, n = material.study.data_origin, material.results["study"]["participants"]["n"]
     if origin == "reconstructed":
-        yield (Strong("The data are reconstructed: "), "they fit printed figures and are nobody's measurements.")
+        yield (Strong("The data are reconstructed: "), "they fit printed figures and were not measured with anybody.")
     if origin == "simulated":
         yield (Strong("The data are simulated: "), "they show what a model does, not what people do.")
     if material.rows("comparisons") and n < _FEW:
-        text = f"with n = {n} intervals are wide and a normal distribution cannot be checked."
+        text = f"with n = {n}, intervals are wide and it cannot be checked whether data are normally distributed."
         yield (Strong("Few participants: "), text)
 
 
@@ -58,19 +58,19 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
 
     violated = [row for row in rows if TESTS[row["test"]].assumes_sphericity and below(row, "mauchly_p")]
     if violated:
-        text = f"(the differences between conditions vary unequally) for {_named(violated)}: judge by the"
+        text = f"(the differences between conditions vary unequally) for {_named(violated)}: use the"
         yield (Strong("Sphericity is violated "), f"{text} Greenhouse-Geisser p.")
     resting = [row for row in rows if TESTS[row["test"]].assumes_normality]
     skewed = [row for row in resting if below(row, "shapiro_p", "residual_shapiro_p")]
     if skewed:
-        text = f"by Shapiro and Wilk's test, for {_named(skewed)}: see whether a rank test says the same."
+        text = f"(Shapiro-Wilk test) for {_named(skewed)}: check whether a rank test gives the same result."
         yield (Strong("Differences are not normally distributed "), text)
     yield from _far_out(resting)
     yield from _aligned_ranks(rows)
     singular = [row for row in rows if finds_no_variance_between_people(row)]
     if singular:
-        text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so that it"
-        yield (Strong("Singular fit "), f"{text} treats their rows as if of different people.")
+        text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so it"
+        yield (Strong("Singular fit "), f"{text} treats all rows as if they came from different people.")
     undefined = sum(row["status"] != "ok" for row in rows)
     if undefined:
         yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
@@ -78,50 +78,53 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
     ]
     if narrow:
-        text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals hold the"
+        text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain the"
         yield (Strong("Stated uncertainty too small "), f"{text} reference in less than 90 % of instants.")
 
 
 def _misshapen(row: Row) -> bool:
-    """Are its values skewed, or do its cells spread unlike?"""
+    """Are its values skewed, or do its cells spread unequally?"""
     details = row["details"] or {}
     return bool(details.get("skewed") or details.get("spreads_differ"))
 
 
 def _aligned_ranks(rows: list[Row]) -> Iterator[Text]:
     """Aligned ranks of skewed data: an effect leaks into the others, and there are far too many false alarms."""
-    found = [row for row in rows if TESTS[row["test"]].ranks_aligned and _misshapen(row)]
-    if found:
-        named = _named(found)
-        text = f"of data that are skewed or spread unlike ({named}) can find effects that are not there, where another"
-        yield (Strong("Aligned ranks "), f"{text} factor has a strong one; an ANOVA of the logarithms holds its level.")
+    concerned = [row for row in rows if TESTS[row["test"]].ranks_aligned and _misshapen(row)]
+    if concerned:
+        named = _named(concerned)
+        text = f"of data that are skewed or spread unequally ({named}) can find effects that do not exist where another"
+        yield (
+            Strong("Aligned ranks "),
+            f"{text} factor has a strong one; an ANOVA of the logarithms does not have this problem.",
+        )
 
 
 def _far_out(rows: list[Row]) -> Iterator[Text]:
     """Participants whose difference lies far from the others'."""
-    found = [row for row in rows if (row["details"] or {}).get("outliers")]
-    people = list(dict.fromkeys(person for row in found for person in row["details"]["outliers"]))
+    concerned = [row for row in rows if (row["details"] or {}).get("outliers")]
+    people = list(dict.fromkeys(person for row in concerned for person in row["details"]["outliers"]))
     if people:
         who = listing(people) if len(people) <= _REMARKS_MAX else counted(len(people), "participant")
-        text = f"in {_named(found)}: {who}. Nobody is left out for that; look at the figures."
-        yield (Strong("Far from the other participants "), text)
+        text = f"in {_named(concerned)}: {who} (kept in all tests). Look at the figures."
+        yield (Strong("Outliers "), text)
 
 
 def _of_design(material: Material) -> Iterator[Text]:
-    """What in the check of the design is not as it should be: order of the conditions, period, carry-over, cells."""
+    """The remarks of the design check: order of the conditions, period, carry-over, cells."""
     remarked = [row for row in material.rows("design_check") if row["remark"]]
     told = [f"{row['what']}: {row['remark']}" for row in remarked]
     if told:
         more = f"; and {len(told) - _REMARKS_MAX} more" if len(told) > _REMARKS_MAX else ""
-        yield (Strong("Design: "), f"{'; '.join(told[:_REMARKS_MAX])}{more}. See design and participants.")
+        yield (Strong("Design: "), f"{'; '.join(told[:_REMARKS_MAX])}{more}. See “Design and participants”.")
 
 
 def _of_gaps(material: Material) -> Iterator[Text]:
     contradictions = sum(row["verdict"] == "contradiction" for row in material.rows("printed"))
     if contradictions:
         verb = "contradicts" if contradictions == 1 else "contradict"
-        yield (f"{counted(contradictions, 'printed figure')} {verb} others in the same publication; see there.",)
+        yield (f"{counted(contradictions, 'printed figure')} {verb} others in it; see “Printed and computed”.",)
     kinds = Counter(row["what"] for row in material.rows("exclusions"))
     if kinds:
         told = listing([f"{what} ({count})" for what, count in kinds.items()])
-        yield (Strong("Not everything is in: "), f"{told}; data quality says which and why.")
+        yield (Strong("Missing or excluded: "), f"{told}; see “Data quality and exclusions”.")

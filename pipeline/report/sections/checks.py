@@ -22,7 +22,7 @@ def blocks(material: Material) -> Iterator[Block]:
         return
     contradicted = sorted(_contradicted(rows), key=lambda row: -LIGHTS.index(row["status"]))
     found = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
-    text = f"{found} of what the logs and study.yaml claim; each is described in docs/checks.md." + _lags(rows)
+    text = f"{found} of the logs against each other and study.yaml; docs/checks.md describes each." + _lags(rows)
     yield Paragraph((Strong("Checks: "), text))
     if contradicted:
         yield _table(contradicted)
@@ -39,7 +39,7 @@ def _lags(rows: Sequence[Row]) -> str:
         return ""
     more = f"; and {len(lags) - _ROWS_MAX} more in tables/checks.csv" if len(lags) > _ROWS_MAX else ""
     return (
-        " How much later the tracker's stamps are than the phone's, by their movement, with the 95 % interval: "
+        " Lag of the tracker's time stamps behind the phone's, measured from their movement, with 95 % interval: "
         f"{'; '.join(lags[:_ROWS_MAX])}{more}."
     )
 
@@ -78,7 +78,7 @@ def caution(material: Material) -> Iterator[Text]:
     text = (
         f"in {counted(len(sessions), 'session')} ({listing(sessions[:_NAMED_MAX])}"
         f"{', …' if len(sessions) > _NAMED_MAX else ''}), by {listing(kinds[:_NAMED_MAX])}{more}. "
-        f"{first['session']}: {first['message']}. Figures that rest on these sessions are not to be believed before "
-        "that is put right; data quality has the table of checks."
+        f"{first['session']}: {first['message']}. Do not rely on figures from these sessions before "
+        "this is resolved; the table of checks is under “Data quality and exclusions”."
     )
     yield (Strong("The data contradict themselves or study.yaml "), text)

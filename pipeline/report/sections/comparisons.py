@@ -47,14 +47,14 @@ def section(material: Material) -> Section | None:
     table = Table(
         "table-comparisons",
         f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
-        f" if there were none; the study's level is {100 * material.study.alpha:g} %.",
+        f" if there were none; the study's level of significance is {100 * material.study.alpha:g} %.",
         columns([title for title, _ in filled], 3),
         tuple(tuple(cell(row) for _, cell in filled) for row in rows),
-        f"{_who_counts(tests)} Mean difference: first minus second condition. Reduction: relative to the first, of"
+        f"{_who_counts(tests)} Mean difference: first minus second condition. Reduction: relative to the first, for"
         " measures whose zero means none.",
         tuple(anchor(at) for at in range(len(rows))),
     )
-    where = "Every test of the study, a row each. What the words and letters mean stands in the "
+    where = "Every test of the study, one row each. The words and symbols are explained in the "
     explained = Paragraph((where, CrossReference("glossary", "glossary"), "."))
     blocks: list[Block] = [explained, table, Paragraph((Strong("Methods: "), _methods(rows)))]
     return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
@@ -62,10 +62,10 @@ def section(material: Material) -> Section | None:
 
 def _who_counts(tests: Sequence[str]) -> str:
     if {TESTS[name].design for name in tests} == {"between"}:
-        return "Every participant with a value counts (n)."
-    every = "Only participants with a value in every condition count (n)"
+        return "n: every participant with a value."
+    every = "n: participants with a value in every condition"
     of_all = [TESTS[name].label for name in tests if not TESTS[name].complete_cases]
-    return f"{every}, but in the {listing(of_all)} all." if of_all else f"{every}."
+    return f"{every}; in the {listing(of_all)}, all participants." if of_all else f"{every}."
 
 
 def _methods(rows: Sequence[Row]) -> str:
@@ -78,7 +78,7 @@ def _methods(rows: Sequence[Row]) -> str:
 
 
 def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:
-    """Are the differences that tests of pairs rest on normal, and does any lie far out? Once for each pair."""
+    """Normality and outliers of the differences that tests of pairs rest on, once for each pair."""
     found: dict[tuple[str, str], Row] = {}
     for row in rows:
         details = row["details"] or {}
@@ -92,18 +92,18 @@ def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:
     )
     table = Table(
         "table-diagnostics",
-        "The differences looked at: a small p of Shapiro and Wilk's test (W) speaks against a normal distribution, "
-        "which t tests and ANOVA suppose and rank tests do not.",
-        columns(("Measure", "Differences", "n", "W", "p", "Far out"), 2),
+        "Are the differences normally distributed? A small p of the Shapiro-Wilk test (W) speaks against it. t tests "
+        "and ANOVA assume a normal distribution; rank tests do not.",
+        columns(("Measure", "Differences", "n", "W", "p", "Outliers"), 2),
         cells,
-        f"Far out: participants whose difference has a {OUTLIER_RULE}; nobody is left out for that. No spread: more "
-        "than half of the differences are equal, so that the rule does not apply.",
+        f"Outliers: participants whose difference has a {OUTLIER_RULE}; they are kept in all tests. No spread: "
+        "more than half of the differences are equal, so the rule does not apply.",
     )
     return [table]
 
 
 def _differences(row: Row, conditions: Sequence[str]) -> str:
-    """Between what: the pair, or all conditions, whose residuals are looked at."""
+    """The pair compared, or all conditions, whose residuals are checked."""
     if row["contrast"] is None and "shapiro_w" not in row["details"]:
         return "residuals of all conditions"
     pair = " - ".join(conditions) if row["contrast"] is None else row["contrast"]
@@ -150,4 +150,4 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Mean difference", lambda row: number(row["mean_difference"])),
     ("Reduction", lambda row: percent(reduction_of(row))),
 )
-"""The table's columns; one that no row fills is left out."""
+"""The table's columns; a column that no row fills is left out."""

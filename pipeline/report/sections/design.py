@@ -48,7 +48,7 @@ def _participants(material: Material) -> Text:
 
 
 def _checked(material: Material) -> list[Block]:
-    """What the check of the design found, and in a sentence what of it calls for attention."""
+    """The table of the design check, and a sentence on what needs attention."""
     rows = material.rows("design_check")
     if not rows:
         return []
@@ -63,17 +63,17 @@ def _checked(material: Material) -> list[Block]:
         for row in rows
     )
     remarked = [row["what"] for row in rows if row["remark"]]
-    text = "everything that could be checked is as it should be."
+    text = "nothing to remark on in what could be checked."
     if remarked:
-        text = f"{counted(len(remarked), 'remark')}, on {listing(list(dict.fromkeys(remarked)))}; see the table."
+        text = f"{counted(len(remarked), 'remark')}, about {listing(list(dict.fromkeys(remarked)))}; see the table."
     note = (
-        f"Effects of the period and carry-over are tested singly at the {100 * material.study.alpha:g} % level; that "
-        "none is found does not mean that there is none, least of all for carry-over between few people."
+        f"Effects of the period and carry-over are each tested at the {100 * material.study.alpha:g} % level; not "
+        "finding one does not mean that there is none, least of all for carry-over with few people."
     )
     table = Table(
         "table-design",
-        "The design checked: who met which condition when, and whether it mattered. A comparison within people is fair "
-        "if each condition comes equally often early and late, and equally often after each other one.",
+        "Design check: who met which condition when, and whether it mattered. A comparison within people is fair "
+        "if each condition comes equally often early and late, and equally often after every other condition.",
         columns(("What", "Of", "Found", "Expected", "Remark"), 5),
         cells,
         note if any(row["expected"] == "none" for row in rows) else "",

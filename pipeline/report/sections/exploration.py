@@ -61,7 +61,7 @@ def pays_sentence(pays: Pays, estimator: str) -> Sequence[str]:
         "tracker": f"For {name} a better tracker pays more",
         "equal": f"For {name} a better filter and a better tracker cannot be told apart",
         "neither": f"For {name} neither a better filter nor a better tracker clearly pays",
-        None: f"For {name} there is nothing to weigh",
+        None: f"For {name} there is nothing to compare",
     }[pays.verdict]
     parts = []
     if by_filter is not None:
@@ -107,13 +107,13 @@ def _pays(explored: Explored) -> Iterator[Block]:
         "Simulated participants",
         (
             (
-                "People were simulated who see the display alone. Take from this which way an effect goes and its rough"
-                " size, and which study to run next; not seconds, millimetres or participants to promise.",
+                "People were simulated who see the display alone. Use this for the direction and rough size of"
+                " effects and to choose the next study, not as a forecast of seconds, millimetres or participants.",
             ),
             (
-                "The best of several trackers or filters is partly the best by chance. Two ways, or a way and"
-                " what is, count as told apart where the 95 % interval of their difference, person by person, leaves"
-                " out zero.",
+                "The best of several trackers or filters is partly the best by chance. Two of them, or one and the"
+                " present state, count as different where the 95 % interval of their difference, person by person,"
+                " excludes zero.",
             ),
         ),
     )
@@ -144,7 +144,7 @@ def _steps(explored: Explored) -> Table:
 _COLUMNS = ("selection_rmse_mm", "completion_time_s")
 _INTERVALS = (
     "In brackets 95 % t intervals over people; of the error, the root of the interval of the mean square. They say how"
-    " well the simulation knows its own mean, not how true it is."
+    " precisely the simulation estimates its own mean, not how realistic it is."
 )
 
 
@@ -254,10 +254,10 @@ def _how(explored: Explored) -> Paragraph:
         (
             f"{counted(len(explored.found['explore']), 'point')}, a tracker and an estimator each; {people} in each of"
             f" {studies}, drawn from seed {settings.seed} and the traits of study.yaml. They are the same people at"
-            " every point. With one estimator their luck is the same with every tracker, so that trackers are compared"
-            " with little noise; with another estimator it is another, as in two sessions of one person, or too few"
-            " participants would seem enough. Each tracker's latency, noise and rate are stated to the estimators as"
-            " well, as a lab would. Every number of this report stands in results.json; the tables are beside it as CSV"
-            " and Parquet, explore_people with a row a session.",
+            " every point. With one estimator the same random numbers are used for every tracker, so that trackers are"
+            " compared with little noise; each estimator has its own, as in two sessions of one person: otherwise too"
+            " few participants would seem enough. Each tracker's latency, noise and rate are stated to the estimators,"
+            " as a lab would do. Every number of this report is in results.json; the tables are beside it as CSV"
+            " and Parquet, explore_people with one row per session.",
         )
     )

@@ -25,7 +25,7 @@ def of(sections: Sequence[Section]) -> tuple[Section, ...]:
     found = explained([text for section in sections for block in section.blocks for text in _texts(block)])
     if not found:
         return ()
-    caption = "The statistical words of this report, a sentence each."
+    caption = "The statistical words of this report."
     table = Table("table-glossary", caption, columns(("Word", "Meaning"), 2), tuple(found))
     return (Section(ANCHOR, "Glossary", (table,)),)
 

@@ -1,4 +1,4 @@
-"""What sections are made from, and helpers that they share."""
+"""The material of sections: a study's settings, results and tables; and helpers that they share."""
 
 from __future__ import annotations
 
@@ -115,9 +115,9 @@ def safe_name(text: str) -> str:
     return f"{plain[:_NAME_LENGTH]}-{hashlib.sha256(text.encode()).hexdigest()[:6]}".lstrip("-")
 
 
-def first_of(shown: int, there: int, what: str) -> str:
+def first_of(shown: int, total: int, what: str) -> str:
     """A sentence that a figure shows only the first of many; nothing if it shows all."""
-    return f" The first {shown} of {there} {what}." if there > shown else ""
+    return f" The first {shown} of {total} {what}." if total > shown else ""
 
 
 def conditions_text(conditions: Sequence[str]) -> str:

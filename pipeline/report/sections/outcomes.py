@@ -1,4 +1,4 @@
-"""What people did and felt: selection, time, workload and whatever else was measured."""
+"""Outcomes: selection, time, workload and further measures."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def time(material: Material) -> Section | None:
     if not names:
         return None
     text = (
-        "Completion time runs from the start of a session to its last selection, time per trial from a target's "
-        "appearance to its selection."
+        "Completion time runs from the start of a session to its last selection; time per trial from the appearance of "
+        "a target to its selection."
     )
     blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-time", names)]
     for name in names:
@@ -109,7 +109,7 @@ def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Ta
         )
         for row in rows
     )
-    caption = "Means over participants, each participant one value in each condition."
+    caption = "Means over participants; each participant has one value in each condition."
     return Table(table_id, caption, columns(titles, 2), cells)
 
 
@@ -151,7 +151,7 @@ def _selected(material: Material) -> list[Block]:
 
 
 def _sentences(rows: Sequence[Row]) -> Iterator[str]:
-    """A sentence a comparison; the pairs that follow one up share one."""
+    """One sentence per comparison; its follow-up pairs share one."""
     whole = {(row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] == "F"}
 
     def follows_up(row: Row) -> bool:
@@ -214,9 +214,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     )
     methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
     note = f"Methods: {methods}. {capitalized(families(rows))}."
-    caption = (
-        f"Tests of the {title} scales. Judge by the adjusted p: with many tests some fall below any level by chance."
-    )
+    caption = f"Tests of the {title} scales. Use the adjusted p: with many tests, some are significant by chance."
     return Table(
         f"table-{safe_name(questionnaire)}-tests",
         caption,
@@ -236,7 +234,7 @@ def _shown(material: Material) -> Table:
     return Table(
         "table-shown",
         "What each estimator would have shown at the moments of selection: its distance from the targets. People "
-        "steered by what was displayed, so the displayed estimator has the advantage.",
+        "aimed with what was displayed, so the displayed estimator has an advantage.",
         columns(titles, 2),
         cells,
         '"recorded" is where the participants selected.',

@@ -66,7 +66,7 @@ def section(material: Material) -> Section:
         blocks.append(Notice("To be careful about", tuple(found)))
     blocks += [Paragraph(text) for text in _evidence(material)]
     if material.sessions:
-        told = "Every session can be looked at closely, as the tracker gave it and as each estimator made of it: "
+        told = "Look at every session closely, as the tracker recorded it and as each estimator reconstructed it: "
         blocks.append(Paragraph((told, Link(traces.PAGE, traces.PAGE), ".")))
     return Section("summary", "Summary", tuple(blocks))
 
@@ -84,7 +84,7 @@ def _answer(material: Material) -> Text:
 
 
 def _sentence(material: Material, row: Row) -> str:
-    """What a comparison of the conditions came to, with the means and their intervals."""
+    """The result of a comparison of the conditions, with the means and their intervals."""
     label = short_label(row["measure"])
     if row["status"] != "ok":
         return f"{label}: {comparison_sentence(row)}."
@@ -120,7 +120,11 @@ def _closest(material: Material) -> Text:
     }
     told = [
         f"{number(mean, 1)} mm on average over {counted(n, 'session')}"
-        + (f" ({number(min(errors[name]), 1)} to {number(max(errors[name]), 1)} mm in single ones)" if n > 1 else "")
+        + (
+            f" ({number(min(errors[name]), 1)} to {number(max(errors[name]), 1)} mm in single sessions)"
+            if n > 1
+            else ""
+        )
         for name, (mean, n) in means
     ]
     if not told:
@@ -144,8 +148,8 @@ def _figure(material: Material) -> list[Figure]:
         material.figure(
             "answer",
             figures.errors,
-            f"Error (left) and lag (right) of each estimator, a small mark a session (n = {n}), the large one their"
-            " mean. An estimator that helps sits to the left in both.",
+            f"Error (left) and lag (right) of each estimator, small marks are sessions (n = {n}), large marks their"
+            " means. An estimator that helps sits to the left in both.",
             f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
             rows,
         )
@@ -154,8 +158,10 @@ def _figure(material: Material) -> list[Figure]:
 
 def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
     label, compared = measure_label(measure), len(material.study.conditions) == 2 and len(wide.dropna()) > 1
-    differences = " Right: each participant's difference and their mean with its interval; zero is no difference."
-    mark = "a mark is a participant" if met_one_each(wide) else "a line is a participant"
+    differences = (
+        " Right: each participant's difference, and the mean difference with its interval; zero is no difference."
+    )
+    mark = "each small mark is a participant" if met_one_each(wide) else "each line is a participant"
     told = [
         f"{row['condition']} {_mean(row)}"
         for row in material.rows("descriptives")
@@ -187,7 +193,7 @@ def _question(material: Material) -> Text:
     people = counted(material.results["study"]["participants"]["n"], "participant")
     if material.rows("comparisons"):
         return (
-            Strong("Does it make a difference to people which system they use? "),
+            Strong("Do the conditions differ for the people who use them? "),
             f"{people}{compared}.",
         )
     return (Strong("How accurately does each estimator follow the hand? "), f"{people}{compared}.")
@@ -289,11 +295,11 @@ def _ratings(material: Material) -> list[Text]:
     for (questionnaire, _), rows in families.items():
         label = measure_label(f"{questionnaire}/x").partition(":")[0]
         below = [row for row in rows if row["p"] is not None and row["p"] < alpha]
-        text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level taken singly"
+        text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level before adjustment"
         if any(row["p_adjusted"] is not None for row in rows):
             kept = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
             text += (
-                f", and {len(kept)} after adjusting for {counted(len(rows), 'test')} ({adjustment(rows[0]['adjust'])})"
+                f", and {len(kept)} after adjustment for {counted(len(rows), 'test')} ({adjustment(rows[0]['adjust'])})"
             )
         answers.append((Strong(f"{label}: "), f"{text}."))
     return answers

@@ -1,4 +1,4 @@
-"""Of a study with many sessions or participants, a page for each participant."""
+"""A page for each participant of a study with many sessions or participants."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def section(material: Material) -> Section | None:
 
 
 def write(material: Material, folder: Path) -> None:
-    """A page a participant, where there are many."""
+    """Write one page per participant, where there are many."""
     people = _people(material)
     if not people:
         return
@@ -124,7 +124,7 @@ def _document(material: Material, person: str, sections: tuple[Section, ...]) ->
 
 
 def _measures(conditions: Sequence[str], values: Mapping[str, pd.DataFrame], person: str) -> Table:
-    """Every measure of a participant's, a column a condition."""
+    """Every measure of a participant, one column per condition."""
     cells = [
         (measure_label(measure), *map(number, of_all.loc[[person]].to_numpy(np.float64)[0].tolist()))
         for measure, of_all in values.items()
@@ -132,7 +132,7 @@ def _measures(conditions: Sequence[str], values: Mapping[str, pd.DataFrame], per
     ]
     return Table(
         "table-measures",
-        "The participant's own values, means over everything but the condition.",
+        "The participant's own values, averaged over everything but the condition.",
         columns(("Measure", *conditions), 1),
         tuple(cells),
     )

@@ -8,7 +8,7 @@ from itertools import groupby
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
-from pipeline.report.prose.sentences import Told, means_sentence, sentence, tells_means, told_of
+from pipeline.report.prose.sentences import StudyFacts, means_sentence, sentence, states_means, study_facts
 from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import used_versions
@@ -20,10 +20,12 @@ BIBLIOGRAPHY = "references.bib"
 
 def section(material: Material) -> Section:
     """To paste."""
-    said = methods(material.study, material.results, used_versions())
+    methods_text = methods(material.study, material.results, used_versions())
     blocks: list[Block] = [
-        Paragraph(("Written from the rows of this report's tables, to be shortened and put into your own words.",)),
-        Paragraph((Strong("Methods. "), said)),
+        Paragraph(
+            ("These texts are written from the tables of this report. Shorten them and put them into your own words.",)
+        ),
+        Paragraph((Strong("Methods. "), methods_text)),
     ]
     results = list(_results(material))
     if results:
@@ -42,28 +44,28 @@ def bibtex(material: Material) -> str:
 
 
 def _results(material: Material) -> Iterator[Text]:
-    """A paragraph a measure and test: a sentence a row, each with the way to its row."""
+    """One paragraph per measure and test: one sentence per row, with a link to the row."""
     study = material.study
-    told = told_of(study.conditions, study.alpha, material.rows("descriptives"))
+    facts = study_facts(study.conditions, study.alpha, material.rows("descriptives"))
     rows = list(enumerate(material.rows("comparisons")))
-    lacking = {row["measure"] for _, row in rows} - {row["measure"] for _, row in rows if tells_means(row, told)}
+    lacking = {row["measure"] for _, row in rows} - {row["measure"] for _, row in rows if states_means(row, facts)}
     for (measure, _), group in groupby(rows, key=lambda item: (item[1]["measure"], item[1]["test"])):
-        means = means_sentence(measure, told) if measure in lacking else ""
+        means = means_sentence(measure, facts) if measure in lacking else ""
         lacking.discard(measure)
         text: list[str | Strong | CrossReference] = [f"{means} "] if means else []
-        text += [part for at, row in group for part in _linked(at, row, told)]
+        text += [part for at, row in group for part in _linked(at, row, facts)]
         yield tuple(text)
 
 
-def _linked(at: int, row: Row, told: Told) -> tuple[str | Strong | CrossReference, ...]:
-    return f"{sentence(row, told)} ", CrossReference("[row]", anchor(at)), " "
+def _linked(at: int, row: Row, facts: StudyFacts) -> tuple[str | Strong | CrossReference, ...]:
+    return f"{sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "
 
 
 def _references(material: Material) -> Table:
     listed = references(material)
     return Table(
         "table-references",
-        f"What was used and should be cited; {BIBLIOGRAPHY} beside this report has it for BibTeX.",
+        f"What was used and should be cited; {BIBLIOGRAPHY} beside this report holds the same entries for BibTeX.",
         columns(("Key", "Reference", "Used for"), 3),
-        tuple((one.key, one.text, one.used_for) for one in listed),
+        tuple((reference.key, reference.text, reference.used_for) for reference in listed),
     )

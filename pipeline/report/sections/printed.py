@@ -1,4 +1,4 @@
-"""A publication's figures beside the computed ones, and what of them cannot be true together."""
+"""A publication's figures beside the computed ones, and which of them contradict each other."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def _beside_computed(figures: Sequence[Row]) -> list[Block]:
     agreeing = sum(row["verdict"] == "agrees" for row in figures)
     text: Text = (
         f"{figures[0]['source']} prints {counted(len(figures), 'figure')} of this study. ",
-        Strong(f"{agreeing} of them come out to the last printed digit"),
-        f", {len(figures) - agreeing} not.",
+        Strong(f"{agreeing} of them are reproduced to the last printed digit"),
+        f", {len(figures) - agreeing} {'is' if len(figures) - agreeing == 1 else 'are'} not.",
     )
     table = Table(
         "table-printed",
-        "Each printed figure with the computed one at as many digits. “Differs” names what no data can give together"
-        " with the rest, or what these data do not give.",
+        "Each printed figure beside the computed one with as many digits. A figure “differs” if these data do not give"
+        " it, or if no data can give it together with the others.",
         (Column("Figure", False), Column("Printed"), Column("Computed"), Column("Verdict", False)),
         tuple((row["what"], row["printed"], row["computed"], row["verdict"]) for row in figures),
     )
@@ -50,14 +50,14 @@ def _against_each_other(source: str, held: Sequence[Row]) -> list[Block]:
     blocks: list[Block] = [
         Paragraph(
             (
-                f"The printed figures of {source} were held against each other in {counted(len(held), 'check')}, each"
-                " in the room that rounding leaves.",
+                f"The printed figures of {source} were compared with each other in {counted(len(held), 'check')},"
+                " allowing for rounding.",
             )
         )
     ]
     for verdict, title in (
         (CONTRADICTION, "Contradictions within the publication"),
-        (REMARK, "What a reader of it should know"),
+        (REMARK, "What a reader of the publication should know"),
     ):
         texts = tuple(_sentence(row) for row in held if row["verdict"] == verdict)
         if texts:
@@ -73,8 +73,8 @@ def _against_each_other(source: str, held: Sequence[Row]) -> list[Block]:
     blocks.append(
         Table(
             "table-held",
-            "Printed figures held against each other: how many statements agree with the rest. Each of them stands in"
-            " results.json.",
+            "Printed figures compared with each other: how many statements agree with the others. results.json lists"
+            " each of them.",
             columns(("Check", *_VERDICTS.values()), 1),
             counts,
         )

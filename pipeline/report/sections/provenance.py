@@ -28,7 +28,7 @@ def section(material: Material) -> Section:
     """Provenance."""
     text = (
         f"Made by Steadyhand from the study folder “{material.name}”, {counted(len(material.inputs), 'file')}. Every"
-        " number in this report stands in results.json and in the tables folder beside it; provenance.json holds the"
+        " number in this report is in results.json and in the tables folder beside it; provenance.json holds the"
         " settings and the command."
     )
     listed = sorted(material.inputs.items())[:_FILES_MAX]
@@ -41,7 +41,7 @@ def section(material: Material) -> Section:
             libraries(),
             Table(
                 "table-inputs",
-                f"Files that were read, with the beginning of their SHA-256: equal digests are equal files.{more}",
+                f"Files that were read, with the first digits of their SHA-256 (equal files, equal digests).{more}",
                 (Column("File", False), Column("SHA-256", False)),
                 tuple((name, digest[:16]) for name, digest in listed),
             ),

@@ -1,4 +1,4 @@
-"""The report of a replay: variants ranked, what each costs in lag and jitter, and what is not in it."""
+"""The report of a replay: variants ranked, the lag and jitter of each, and what is missing."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _NOTE = (
 )
 _NOTE_SELECTION = (
     " At the selections: root of the mean over sessions of the mean squared distance to the target that the estimator"
-    " would have shown when people selected; they aimed with what they saw then, so this favours what was shown."
+    " would have shown when people selected; they aimed with what they saw then, so this favours the displayed one."
 )
 
 
@@ -55,7 +55,7 @@ def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: P
     sections = [Section("variants", "Variants side by side", tuple(_variants(studies, found, drawn)))]
     left_out = _left_out(found["replay_exclusions"])
     if left_out is not None:
-        sections.append(Section("exclusions", "What is not in it, or only in part", (left_out,)))
+        sections.append(Section("exclusions", "Missing or excluded", (left_out,)))
     sections.append(Section("provenance", "Provenance", (_studies(studies), libraries())))
     subtitle = f"Replay of {counted(len(studies), 'study', 'studies')}"
     return Document("Variants of estimators", subtitle, " ".join(origins), tuple(sections))
@@ -80,8 +80,8 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
         "The best of many",
         (
             (
-                "Of several variants the first is partly first by chance: its figures here flatter it. Settings chosen"
-                " so should be tried on sessions that had no say in the choice.",
+                "The best of several variants is partly best by chance, so its figures here are too good. Try settings"
+                " chosen this way on sessions that were not used for the choice.",
             ),
         ),
     )
@@ -105,7 +105,7 @@ def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[B
     )
     ranked = [row for row in rows if row["rank"] is not None and (row["lag_s"], row["jitter_mm"]) != (None, None)]
     if not ranked:
-        yield Paragraph(("Neither lag nor jitter could be measured, so what less error costs cannot be drawn.",))
+        yield Paragraph(("Neither lag nor jitter could be measured, so there is no figure of them against the error.",))
     else:
         yield draw_now(drawn / f"trade-off-{index}.svg", figures.trade_off, tables.frame("replay_means", ranked))
 
@@ -146,12 +146,12 @@ def _left_out(excluded: pd.DataFrame) -> Table | None:
         for row in rows[:_ROWS_MAX]
     )
     titles = columns(("Study", "Session", "Variant", "What", "Why"), 5)
-    return Table("table-exclusions", f"Sessions and files that are not wholly in this report.{more}", titles, cells)
+    return Table(
+        "table-exclusions", f"Sessions and files that are not in this report, or only in part.{more}", titles, cells
+    )
 
 
 def _studies(studies: Sequence[Row]) -> Table:
     cells = tuple((study["name"], study["title"], study["data_origin"], str(study["sessions"])) for study in studies)
     titles = columns(("Study", "Title", "Data", "Sessions"), 3)
-    return Table(
-        "table-studies", "What was replayed; every number of this report stands in results.json.", titles, cells
-    )
+    return Table("table-studies", "What was replayed; every number of this report is in results.json.", titles, cells)

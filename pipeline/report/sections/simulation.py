@@ -1,4 +1,4 @@
-"""How simulated people were made, what they gain over repeated studies, and what of that may be said of real ones."""
+"""How people were simulated, the reductions over repeated studies, and what holds for real people."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _OF_PLANS_ALONE = ("refractory_s", "base_time_s", "time_per_sqrt_mm_s", "dead_zo
 
 
 def section(material: Material) -> Section | None:
-    """None for a study whose people are real, or whose hand is scripted."""
+    """The section; None for a study with real people or a scripted hand."""
     settings = material.study.simulation
     if not isinstance(settings, SelectionSimulation):
         return None
@@ -50,7 +50,7 @@ def section(material: Material) -> Section | None:
 def _made(settings: SelectionSimulation) -> tuple[str | Strong, ...]:
     return (
         f"{counted(settings.participants, 'person', 'people')} were simulated (seed {settings.seed}). ",
-        "Each sees the display alone, late, knows what the own hand was to do, and moves by "
+        "Each sees only the display, with a delay, knows what their own hand was meant to do, and moves by "
         f"{_MODELS[settings.model]}; motor noise grows with speed. The estimator of each condition ran inside the loop,"
         " at the sensors' own times: what it shows changes how the hand moves.",
     )
@@ -107,19 +107,19 @@ def _beside(row: Row) -> str:
 def _care(settings: SelectionSimulation) -> Notice:
     texts: list[tuple[str, ...]] = [
         (
-            "Direction and rough size of what lag and jitter do may be read off. Seconds, millimetres, ratings, and how"
-            " many real people a study needs may not: they hang on a model of people.",
+            "The direction and rough size of the effects of lag and jitter can be taken from this. Seconds,"
+            " millimetres, ratings and the number of people a study needs cannot: they depend on a model of people.",
         ),
         (
             "An error is displayed less target position. A constant offset of the estimate cancels, since people steer"
-            " what they see; so errors here are smaller than a study's in which the display's place is not the truth.",
+            " what they see; so errors here are smaller than in a study where the display itself is offset.",
         ),
     ]
     if settings.workload is not None:
         texts.append(
             (
                 "Ratings come from a stated response model: each scale rises by so much for each doubling of time,"
-                " error or corrections, with a person's own level and chance added. They say what was put in.",
+                " error or corrections, with a person's own level and chance added. They show only what was assumed.",
             )
         )
     return Notice("What may be said of real people", tuple(texts))
@@ -135,8 +135,8 @@ def _traits(settings: SelectionSimulation) -> Table:
             rows.append((label, number(trait.mean, 4).rstrip("0").rstrip("."), percent(trait.cv, 0), trait.source))
     return Table(
         "table-traits",
-        "Traits: mean, how far people differ (coefficient of variation), and the source. None was set on the published"
-        " results beside which the study stands.",
+        "Traits: mean, how far people differ (coefficient of variation), and the source. None was fitted to the"
+        " published results that the study is compared with.",
         (Column("Trait", False), Column("Mean"), Column("CV"), Column("Source", False)),
         tuple(rows),
     )

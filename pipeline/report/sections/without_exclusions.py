@@ -1,4 +1,4 @@
-"""What the comparisons would be had study.yaml left nobody out."""
+"""The comparisons as they would be without the exclusions of study.yaml."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _Key = tuple[str, str, str, str | None, int]
 
 
 def without_exclusions(material: Material) -> list[Block]:
-    """The comparisons that come out otherwise without the exclusions, beside those with them; nothing if none were."""
+    """The comparisons that change without the exclusions, beside those with them; empty without exclusions."""
     everything = material.rows("comparisons_all_data")
     if not everything:
         return []
@@ -37,12 +37,12 @@ def without_exclusions(material: Material) -> list[Block]:
     ]
     head = f"Without the {counted(len(material.study.exclusions), 'exclusion')} of study.yaml"
     if not changed:
-        return [Paragraph((Strong(f"{head}: "), "every comparison comes out the same."))]
+        return [Paragraph((Strong(f"{head}: "), "every comparison has the same result."))]
     over = sum(
         _significant(old, material.study.alpha) != _significant(new, material.study.alpha) for old, new in changed
     )
-    said = f"{over or 'none'} of them on the other side of the {100 * material.study.alpha:g} % level"
-    text = f"{len(changed)} of {counted(len({**before, **after}), 'comparison')} come out otherwise, {said}."
+    said = f"{over or 'none'} of them to the other side of the {100 * material.study.alpha:g} % level"
+    text = f"{len(changed)} of {counted(len({**before, **after}), 'comparison')} change, {said}."
     titles = ("Measure", "Test", "Compared", "Data", "n", "Statistic", "p", "Effect size [95 %]")
     cells = [cell for old, new in changed for cell in (_cells(old, new, "with"), _cells(new, old, "without"))]
     table = Table(
@@ -50,7 +50,7 @@ def without_exclusions(material: Material) -> list[Block]:
         f"{head}, on all data: the comparisons that change, with the exclusions and without them.",
         columns(titles, 4),
         tuple(cells),
-        "p: adjusted over its family where the study adjusts, else corrected for sphericity where it can be.",
+        "p: adjusted over its family where the study adjusts, else corrected for sphericity where that applies.",
     )
     return [Paragraph((Strong(f"{head}: "), text)), table]
 

@@ -17,7 +17,7 @@ from pipeline.analysis.compare import descriptives
 from pipeline.analysis.comparisons import compared as rows_of
 from pipeline.report.prose.glossary import explained
 from pipeline.report.prose.references import bibliography, escaped, used
-from pipeline.report.prose.sentences import Told, sentence, told_of
+from pipeline.report.prose.sentences import StudyFacts, sentence, study_facts
 from pipeline.report.sections.comparisons import anchor
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -54,7 +54,7 @@ def p_of(p: float) -> str:
 
 def sentences(steadyhand: Steadyhand, rows: Sequence[Row]) -> list[str]:
     results = steadyhand.results()
-    told = told_of(results["study"]["conditions"], results["study"]["alpha"], results["descriptives"])
+    told = study_facts(results["study"]["conditions"], results["study"]["alpha"], results["descriptives"])
     return [sentence(row, told) for row in rows]
 
 
@@ -130,7 +130,7 @@ VALUES = st.lists(
 
 def a_study(
     conditions: Sequence[str], values: Sequence[Sequence[float]], tests: Sequence[Row]
-) -> tuple[list[Row], Told]:
+) -> tuple[list[Row], StudyFacts]:
     """The rows of comparisons of a measure m_s, and what sentences may say."""
     entries = [{"measure": "m_s", **one} for one in tests]
     study = Study.model_validate({"conditions": conditions, "measures": "m.csv", "comparisons": entries})
@@ -148,7 +148,7 @@ def a_study(
     )
     found = [{**whole, "details": row["details"]} for whole, row in zip(complete, rows, strict=True)]
     described = list(tables.records("descriptives", tables.frame("descriptives", descriptives(study, measures))))
-    return found, told_of(conditions, study.alpha, described)
+    return found, study_facts(conditions, study.alpha, described)
 
 
 def figures_of(value: Any) -> list[float]:

@@ -417,7 +417,7 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         "the conditions are equivalent within the bounds at the 5 % level",
         "the data are 2.20 times as likely under a difference as under none",
         "Bayes factor (JZS, prior scale 0.707): kinect − fusion, BF₁₀ = 2.20",
-        "Design: 1 remark, on effect of the period; see the table.",
+        "Design: 1 remark, about effect of the period; see the table.",
         "mixed model: linear mixed model, random intercept, REML, Satterthwaite degrees of freedom",
     ):
         assert sentence in text, sentence

@@ -41,5 +41,5 @@ def test_every_figure_for_a_notebook_is_in_the_tutorial() -> None:
 def test_words_say_what_the_figure_shows() -> None:
     wide = pd.DataFrame({"a": [1.0, 2.0, 4.0], "b": [0.5, 1.5, 1.0]})
     said = figures.paired.words(wide, "m")
-    assert said.caption.startswith("M by condition, 3 participants complete")
+    assert said.caption.startswith("M by condition, 3 complete participants")
     assert said.alt.startswith("M: one raincloud per condition")

@@ -47,7 +47,7 @@ def test_means_and_intervals_are_those_of_the_t_distribution() -> None:
     told = f"kinect − fusion: {difference.mean():.2f} [{low:.2f}, {high:.2f}] s, 4 of 5 lower under fusion"
     assert told.replace("-", "−") in said.caption
     assert told.replace("-", "−") in said.alt
-    assert "5 participants complete" in said.caption
+    assert "5 complete participants" in said.caption
 
 
 def test_a_caption_follows_the_data_and_not_a_wish() -> None:
@@ -60,7 +60,7 @@ def test_missing_cells_are_not_paired_and_n_says_so(tmp_path: Path) -> None:
     gap.loc["P2", "fusion"] = np.nan
     assert "Participants (n = 4 complete)" in texts(figures.paired(gap, MEASURE), tmp_path)
     said = figures.paired.words(gap, MEASURE).caption
-    assert "4 participants complete" in said
+    assert "4 complete participants" in said
     assert "(n = 5)" in said  # of kinect, which all have
     assert "(n = 4)" in said
 
@@ -139,7 +139,7 @@ def test_scales_are_of_one_height_and_none_is_cut() -> None:
     assert low == 0
     assert high > TIMES.to_numpy().max()
     said = figures.scales.words(wide).caption
-    assert "furthest apart in effort: 44.74 under kinect, 34.84 under fusion" in said
+    assert "differ most in effort: 44.74 under kinect, 34.84 under fusion" in said
 
 
 def test_the_box_plot_says_where_medians_are_lowest() -> None:
