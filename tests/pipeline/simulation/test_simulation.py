@@ -303,7 +303,7 @@ def test_a_run_that_is_stopped_leaves_the_files_of_the_run_before(
     ("change", "message"),
     [
         ({"task": None}, "selection needs a task: with targets"),
-        ({"task": {"window_mm": [80, 40], "targets_mm": [[0, 1]]}}, "with a window_mm there must be a path_mm"),
+        ({"task": {"window_mm": [80, 40], "targets_mm": [[0, 1]]}}, "window_mm needs a path_mm"),
         (
             {"task": {"path_mm": [[0, 500], [100, 500]], "targets_mm": [[50, 560]]}},
             "[50.0, 560.0] is 60 mm off what is left of the path",
