@@ -19,7 +19,7 @@ _EFFECT_SIZES = {
     "generalized eta squared": "η²G",
     "partial eta squared": "η²p",
     "Cohen's d_z": "d_z",
-    "Cohen's d_s": "d_s",
+    "Cohen's d_av": "d_av",
     "matched-pairs rank-biserial": "r_rb",
     "rank-biserial": "r_rb",
     "rank epsilon squared": "ε²",

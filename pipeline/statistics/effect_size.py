@@ -12,6 +12,7 @@ from pipeline.statistics.arrays import FloatArray
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 _STEP = np.array([-9.0, 9.0])  # where Φ is neither 0 nor 1
+_SMOOTH_FROM = 3  # degrees of freedom
 _WIDEST = 1e6  # beyond this times what was found, no bound is looked for
 _LARGEST = 1e5  # noncentrality for which SciPy's noncentral F is used: beyond it gives NaN
 
@@ -52,10 +53,14 @@ def noncentral_t_cdf(t: float, df: float, noncentrality: float) -> float:
     edges = _reach(df)
     if t != 0:
         edges = np.unique(np.clip([*edges, *((noncentrality + _STEP) / t)], *edges))
-    at = (_NODES + 1) / 2 * np.diff(edges)[:, None] + edges[:-1, None]
+    # Below three degrees of freedom s^(df − 1) is not smooth at 0, where of its fourth root u it is: s = u⁴.
+    power = 4 if df < _SMOOTH_FROM else 1
+    edges = edges ** (1 / power)
+    root = (_NODES + 1) / 2 * np.diff(edges)[:, None] + edges[:-1, None]
+    at, widths = root**power, power * root ** (power - 1) * np.diff(edges)[:, None] / 2
     # Of s: 2 (df/2)^(df/2) / Γ(df/2) · s^(df − 1) · exp(−df s² / 2)
     log_density = np.log(2) + df / 2 * np.log(df / 2) - special.gammaln(df / 2)
-    density = np.exp(log_density + (df - 1) * np.log(at) - df * at**2 / 2) * _WEIGHTS * np.diff(edges)[:, None] / 2
+    density = np.exp(log_density + (df - 1) * np.log(at) - df * at**2 / 2) * _WEIGHTS * widths
     return float(np.sum(density * special.ndtr(t * at - noncentrality)))
 
 

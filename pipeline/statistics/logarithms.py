@@ -19,7 +19,7 @@ from pipeline.statistics.descriptive import summarize
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import FollowUp, follow_ups
 from pipeline.statistics.result import Result
-from pipeline.statistics.welch import t_welch
+from pipeline.statistics.welch import D_AV, t_welch
 
 RATIO = "ratio of geometric means"
 _OF_LOGARITHMS = ", of the logarithms"
@@ -50,7 +50,7 @@ def as_ratio(result: Result) -> Result:
     else:
         low, high = details.pop("ci_difference")
         logs = [(low + high) / 2, low, high]
-        name = "cohen_ds" if result.effect_size_name == "Cohen's d_s" else "cohen_dz"
+        name = "cohen_dav" if result.effect_size_name == D_AV else "cohen_dz"
         details |= {name: result.effect_size, f"{name}_ci": [result.ci_low, result.ci_high]}
     ratio, low, high = (_exponential(log) for log in logs)
     return replace(

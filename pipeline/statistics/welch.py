@@ -19,6 +19,7 @@ from pipeline.statistics.result import Result
 
 Interval = tuple[float | None, float | None]
 
+D_AV = "Cohen's d_av"
 _GAMES_HOWELL = "Games and Howell's test, p over all pairs"
 _SPREADS: dict[str, Literal["mean", "median"]] = {"levene": "mean", "brown_forsythe": "median"}
 
@@ -26,11 +27,11 @@ _SPREADS: dict[str, Literal["mean", "median"]] = {"levene": "mean", "brown_forsy
 def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Result:
     """Welch's t of the means of first (n₁,) and second (n₂,), two-sided, with Satterthwaite's degrees of freedom.
 
-    Effect size: Cohen's d_s over the pooled SD with its noncentral-t interval (Lakens 2013). That interval takes the
-    variances as equal, as d_s does; of d_av in the details, over the root of their mean, it does not (Delacre et al.
-    2021), and leaves out 0 exactly where p is below .05.
+    Effect size: Cohen's d_av over the root of the mean of the two variances (Delacre et al. 2021), with the noncentral
+    t's interval at Welch's own t and degrees of freedom: it leaves out 0 exactly where p is below .05. The details
+    have d_s over the pooled SD, whose interval takes the variances as equal (Lakens 2013) and so can contradict p.
     """
-    blank = Result(effect, "t", "Welch's t test, two-sided", "Cohen's d_s", len(first) + len(second))
+    blank = Result(effect, "t", "Welch's t test, two-sided", D_AV, len(first) + len(second))
     (scaled_first, scaled_second), exponent = at_unit_scale([first, second])
     if status := untestable([scaled_first, scaled_second]):
         return replace(blank, status=status)
@@ -43,7 +44,7 @@ def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Res
     statistic, margin = difference / error, float(stats.t.ppf(0.975, df)) * error
     pooled_df = float(sizes.sum() - 2)
     pooled = float(np.sqrt(np.sum((sizes - 1) * variances) / pooled_df))
-    d, d_ci = _standardized(difference, pooled, pooled * float(np.sqrt(np.sum(1 / sizes))), pooled_df)
+    d_s, d_s_ci = _standardized(difference, pooled, pooled * float(np.sqrt(np.sum(1 / sizes))), pooled_df)
     d_av, d_av_ci = _standardized(difference, float(np.sqrt(variances.mean())), error, df)
     correction = hedges_correction(pooled_df) or 0.0
     return replace(
@@ -51,14 +52,14 @@ def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Res
         statistic=statistic,
         df2=df,
         p=float(2 * stats.t.sf(abs(statistic), df)),
-        effect_size=d,
-        ci_low=d_ci[0],
-        ci_high=d_ci[1],
+        effect_size=d_av,
+        ci_low=d_av_ci[0],
+        ci_high=d_av_ci[1],
         details={
-            "hedges_gs": correction * d,
-            "hedges_gs_ci": [None if bound is None else correction * bound for bound in d_ci],
-            "d_av": d_av,
-            "d_av_ci": list(d_av_ci),
+            "cohen_ds": d_s,
+            "cohen_ds_ci": list(d_s_ci),
+            "hedges_gs": correction * d_s,
+            "hedges_gs_ci": [None if bound is None else correction * bound for bound in d_s_ci],
             "ci_difference": [float(np.ldexp(difference + sign * margin, exponent)) for sign in (-1, 1)],
             "n_groups": [int(size) for size in sizes],
             **spreads([scaled_first, scaled_second]),
@@ -108,7 +109,7 @@ def games_howell(groups: Sequence[FloatArray], names: Sequence[str], effect: str
     ]
     scaled, exponent = at_unit_scale(groups)
     if status := unweightable(scaled):
-        blank = Result(effect, "t", _GAMES_HOWELL, "Cohen's d_s", 0, status=status)
+        blank = Result(effect, "t", _GAMES_HOWELL, D_AV, 0, status=status)
         return [replace(blank, n=result.n, contrast=result.contrast) for result in results]
     for at, (t, df, error, p) in enumerate(with_pingouin.games_howell(scaled)):
         margin = float(stats.studentized_range.ppf(0.95, len(groups), df)) / np.sqrt(2) * error

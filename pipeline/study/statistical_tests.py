@@ -134,7 +134,8 @@ TESTS: Mapping[str, StatisticalTest] = {
             "t_welch",
             "Welch's t",
             "Welch's t test",
-            "Welch's t tests between groups (two-sided; Cohen's d_s)",
+            "Welch's t tests between groups (two-sided; d_av, over the root of the mean of the variances, with its"
+            " noncentral-t interval)",
             options=("between",),
             assumes_normality=True,
             design="between",
@@ -199,7 +200,12 @@ ADJUSTMENTS: Mapping[str, Adjustment] = {
     for adjustment in (
         Adjustment("holm", "Holm", "holm1979"),
         Adjustment("bonferroni", "Bonferroni", "dunn1961"),
+        Adjustment("hochberg", "Hochberg", "hochberg1988"),
+        Adjustment("hommel", "Hommel", "hommel1988"),
+        Adjustment("sidak", "Šidák", "sidak1967"),
+        Adjustment("holm_sidak", "Holm-Šidák", "holland1987"),
         Adjustment("benjamini_hochberg", "Benjamini-Hochberg", "benjamini1995"),
+        Adjustment("benjamini_yekutieli", "Benjamini-Yekutieli", "benjamini2001"),
     )
 }
 """Every adjustment by its name in study.yaml."""

@@ -50,7 +50,7 @@ _COMPARISON = (
     DF2,
     P,
     number("p_adjusted", "p adjusted for the number of tests in the family; null where study.yaml asks for none"),
-    text("adjust", "how p was adjusted: none, holm, bonferroni or benjamini_hochberg"),
+    text("adjust", "how p was adjusted, by its name in study.yaml, such as holm; or none"),
     text("method", "how exactly the test was done"),
     text("effect_size_name", "what the effect size is"),
     number("effect_size", "its value; without a unit, except for an estimate, which is in the measure's unit"),

@@ -35,14 +35,31 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     ),
     (
         "Holm",
-        r"\bHolm\b",
+        r"\bHolm\b(?!-Š)",
         "A way of adjusting p: the smallest is multiplied by the number of tests, the next by one less, and so on.",
     ),
     ("Bonferroni", r"\bBonferroni\b", "A way of adjusting p: each is multiplied by the number of tests."),
     (
+        "Hochberg",
+        r"(?<!-)\bHochberg\b",
+        "A way of adjusting p: Holm's factors, from the largest p on; for tests that are independent or rise together.",
+    ),
+    (
+        "Hommel",
+        r"\bHommel\b",
+        "A way of adjusting p, never to more than Hochberg's; for tests that are independent or rise together.",
+    ),
+    ("Šidák", r"(?<!-)\bŠidák\b", "A way of adjusting p: exact for independent tests, a little below Bonferroni's."),
+    ("Holm-Šidák", r"\bHolm-Šidák\b", "Holm's steps with Šidák's adjustment in each."),
+    (
         "Benjamini-Hochberg",
         r"\bBenjamini-Hochberg\b",
         "A way of adjusting p that bounds the share of false findings among the findings.",
+    ),
+    (
+        "Benjamini-Yekutieli",
+        r"\bBenjamini-Yekutieli\b",
+        "Like Benjamini-Hochberg, but valid however the tests depend on each other; p values are larger.",
     ),
     (
         "Sphericity",
@@ -119,6 +136,7 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         "Partial eta squared: the effect's share of the variance of effect and error together, from 0 to 1.",
     ),
     ("d_z", r"\bd_z\b", "The mean difference in units of the differences' standard deviation."),
+    ("d_av", r"\bd_av\b", "The difference of two groups' means over the root of the mean of their variances."),
     ("r_rb", r"\br_rb\b", "Rank-biserial correlation: from −1 (second always larger) to 1 (first always larger)."),
     ("W", r"\bW = [.\d]", "Kendall's W: from 0 (participants rank the conditions differently) to 1 (all alike)."),
     ("Estimate", r"\bestimate = ", "A difference or slope estimated by the model, in the unit of the measure."),

@@ -17,6 +17,7 @@ PAPER = "feng2017"
 _OF_EFFECT_SIZE = {
     "generalized eta squared": "olejnik2003",
     "Cohen's d_z": "lakens2013",
+    "Cohen's d_av": "delacre2021",
     "matched-pairs rank-biserial": "kerby2014",
     "Kendall's W": "kendall1939",
 }

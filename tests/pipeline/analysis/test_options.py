@@ -1,0 +1,104 @@
+"""Options of an entry under `comparisons`, each through a study folder to its row and its words."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.statistics.multiplicity import METHODS, adjusted
+from pipeline.study.statistical_tests import ADJUSTMENTS
+from tests.pipeline.helpers import Steadyhand
+
+Row = dict[str, Any]
+Values = Mapping[str, Mapping[str, Sequence[float]]]
+"""Of each measure, by condition: a value for each participant."""
+
+TIMES: Values = {
+    "time_s": {
+        "A": [12.1, 15.4, 9.8, 22.6, 14.0, 11.7, 35.2, 13.3, 10.9, 18.8],
+        "B": [10.2, 12.9, 9.1, 15.3, 12.2, 11.9, 24.0, 10.8, 9.9, 14.1],
+    },
+    "errors": {"A": [3, 4, 2, 6, 3, 2, 5, 4, 3, 4], "B": [2, 4, 1, 4, 3, 2, 3, 3, 3, 2]},
+    "strain": {"A": [5, 6, 5, 7, 6, 5, 7, 6, 4, 6], "B": [4, 6, 5, 6, 6, 4, 5, 6, 4, 5]},
+    "doubt": {"A": [2, 3, 2, 4, 3, 2, 3, 3, 2, 3], "B": [2, 2, 3, 3, 3, 3, 3, 2, 2, 2]},
+}
+GROUPED: Values = {"m": {"A": [1, 2, 3, 4, 30, 5, 6], "B": [8, 9, 10, 11, 31, 12, 13]}}
+
+
+def study(folder: Path, values: Values, comparisons: Sequence[str], settings: str = "", people: str = "") -> Path:
+    """A study folder of measures, and of participants.csv where `people` holds its text."""
+    folder.mkdir()
+    conditions = list(next(iter(values.values())))
+    lines = ["participant,condition,measure,value"]
+    for measure, cells in values.items():
+        for condition, of_people in cells.items():
+            lines += [f"P{at + 1:02},{condition},{measure},{value}" for at, value in enumerate(of_people)]
+    (folder / "measures.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if people:
+        (folder / "participants.csv").write_text(people, encoding="utf-8")
+        settings += "participants: participants.csv\n"
+    entries = "".join(f"  - {{{entry}}}\n" for entry in comparisons)
+    text = f"conditions: [{', '.join(conditions)}]\nmeasures: measures.csv\n{settings}comparisons:\n{entries}"
+    (folder / "study.yaml").write_text(text, encoding="utf-8")
+    return folder
+
+
+def compared(steadyhand: Steadyhand, folder: Path) -> list[Row]:
+    ran = steadyhand("compare", folder)
+    assert ran.code == 0, ran.err
+    rows: list[Row] = steadyhand.results()["comparisons"]
+    return rows
+
+
+def read(steadyhand: Steadyhand, folder: Path) -> str:
+    """The words of the report, without its marks."""
+    ran = steadyhand("report", folder, "--format", "html,json,bib")
+    assert ran.code == 0, ran.err
+    page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
+    page = re.sub(r"<(script|style|svg)\b.*?</\1>", "", page, flags=re.DOTALL)
+    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", page)))
+
+
+def test_every_adjustment_that_can_be_computed_can_be_asked_for(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    assert set(ADJUSTMENTS) == set(METHODS)
+    entries = [f"measure: [{', '.join(TIMES)}], test: t_paired, adjust: {name}, family: {name}" for name in METHODS]
+    rows = compared(steadyhand, study(tmp_path / "study", TIMES, entries))
+    for name in METHODS:
+        family = [row for row in rows if row["adjust"] == name]
+        assert len(family) == 4
+        assert [row["p_adjusted"] for row in family] == adjusted([row["p"] for row in family], name)
+
+
+def test_an_adjustment_is_named_cited_and_explained(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    entry = f"measure: [{', '.join(TIMES)}], test: t_paired, adjust: hommel"
+    page = read(steadyhand, study(tmp_path / "study", TIMES, [entry]))
+    assert "Hommel-adjusted p = " in page
+    assert "p values are adjusted by Hommel over 4 tests" in page.replace("P values", "p values")
+    assert "never to more than Hochberg's" in page
+    assert "hommel1988" in (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+
+
+def test_an_unknown_adjustment_is_answered_with_what_was_meant(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: doubt, test: t_paired, adjust: homel"]))
+    assert ran.code == 2
+    assert "hommel" in ran.err
+
+
+def test_the_effect_size_of_welchs_t_does_not_contradict_its_p(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Groups of 4 and 12 that spread unlike: d_s, which takes them as alike, has an interval without 0 at p = .22."""
+    values: Values = {"m": {"A": [1, 9, 14, 22], "B": [4, 5, 4, 6, 5, 4, 5, 6, 4, 5, 6, 4]}}
+    folder = study(tmp_path / "study", values, ["measure: m, test: t_welch, between: condition"])
+    table = (folder / "measures.csv").read_text(encoding="utf-8").splitlines()
+    apart = [line.replace("P", "Q", 1) if ",B,m" in line else line for line in table]
+    (folder / "measures.csv").write_text("\n".join(apart) + "\n", encoding="utf-8")
+    page = read(steadyhand, folder)
+    (row,) = steadyhand.results()["comparisons"]
+    assert row["p"] > 0.05
+    assert row["effect_size_name"] == "Cohen's d_av"
+    assert row["ci_low"] < 0 < row["ci_high"]
+    assert row["details"]["cohen_ds_ci"][0] > 0
+    assert "d_av = " in page
+    assert "delacre2021" in (steadyhand.out / "references.bib").read_text(encoding="utf-8")
