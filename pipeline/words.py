@@ -262,7 +262,29 @@ def evidence(row: Row, digits: int = 4, before_interval: str = " ") -> str:
         parts.append(p_phrase(row["p_adjusted"], f"{adjustment(row['adjust'])}-adjusted p", digits))
     if row["effect_size"] is not None:
         parts.append(effect_size(row, before_interval))
+    parts += [text for text in (permutation(row, digits), bootstrap(row)) if text]
     return ", ".join(parts)
+
+
+def permutation(row: Row, digits: int = 4) -> str:
+    """`exact permutation p = .0312`, or nothing."""
+    details = row["details"] or {}
+    if details.get("permutation_p") is None:
+        return ""
+    return p_phrase(
+        details["permutation_p"], f"{'exact ' if details['permutation_exact'] else ''}permutation p", digits
+    )
+
+
+def bootstrap(row: Row) -> str:
+    """`mean difference = 6.10, bootstrap 95 % CI [3.20, 9.12]`, why there is no interval, or nothing."""
+    details = row["details"] or {}
+    if "bootstrap_seed" not in details:
+        return ""
+    bounds = details["bootstrap_ci_difference"]
+    if bounds is None:
+        return str(details["no_bootstrap"])
+    return f"mean difference = {number(row['mean_difference'])}, bootstrap 95 % CI {interval(*bounds)}"
 
 
 def adjustment(method: str) -> str:

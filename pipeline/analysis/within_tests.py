@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.analysis import complete_cases, model_rows
 from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of
 from pipeline.analysis.complete_cases import Request
-from pipeline.statistics import pairs
+from pipeline.statistics import OK, estimation, pairs
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.art import art_anova, art_contrasts
@@ -68,9 +68,26 @@ def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Calla
         cases = complete_cases.by_condition(request)
         of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
         rows = [pair_row(request, test(request, pair.first, pair.second), pair, cases) for pair in of_conditions]
+        if request.entry.bootstrap or request.entry.permutation:
+            rows = [_with_estimates(request, row, pair) for row, pair in zip(rows, of_conditions, strict=True)]
         return rows, cases.left_out
 
     return answer
+
+
+def _with_estimates(request: Request, row: Row, pair: pairs.Pair) -> Row:
+    """The row with a bootstrap interval and a permutation p of its mean difference, as far as the entry asks for them.
+
+    Both are of the differences alone, whatever the test: also where the ranks are tested, they are of the mean.
+    """
+    if row["status"] != OK:
+        return row
+    details = dict(row["details"])
+    if request.entry.bootstrap:
+        details |= estimation.bootstrap(pair.first, pair.second, request.entry.seed)
+    if request.entry.permutation:
+        details |= estimation.permutation(pair.first, pair.second, request.entry.seed)
+    return {**row, "details": details}
 
 
 def mixed_models(request: Request) -> Answer:

@@ -43,6 +43,9 @@ class Comparison(Frozen):
     bounds: tuple[Finite, Finite] | None = None
     prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
     fixed: tuple[Id, ...] = ("condition",)
+    bootstrap: bool = False
+    permutation: bool = False
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
 
     @model_validator(mode="after")
     def _fits_the_test(self) -> Comparison:
@@ -67,6 +70,14 @@ class Comparison(Frozen):
                     raise ValueError(f'fixed: "{term}" needs "{name}" as a term too')
             if len(parts) > 1 and "period" in parts and self.period_is_slope:
                 raise ValueError(f'fixed: "{term}" needs factor(period) in the place of period')
+        return self
+
+    @model_validator(mode="after")
+    def _options_fit_together(self) -> Comparison:
+        if "seed" in self.model_fields_set and not (self.bootstrap or self.permutation):
+            raise ValueError(
+                "seed is for the chance of a bootstrap or permutation; add bootstrap: true, or leave it out"
+            )
         return self
 
     @property

@@ -63,6 +63,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "paired t",
             "paired t test",
             "paired t tests (two-sided; d_z with its noncentral-t interval)",
+            options=("bootstrap", "permutation", "seed"),
             assumes_normality=True,
         ),
         StatisticalTest(
@@ -70,7 +71,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Wilcoxon",
             "Wilcoxon signed-rank test",
             "Wilcoxon signed-rank tests (two-sided; rank-biserial correlation)",
-            options=("zeros",),
+            options=("zeros", "bootstrap", "permutation", "seed"),
             symbol_tells=True,
             cite=("wilcoxon1945",),
             cited_for="signed-rank test",

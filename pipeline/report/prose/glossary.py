@@ -143,6 +143,16 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     ("Mean difference", r"^Mean difference$", "The mean under the first condition minus that under the second."),
     ("Reduction", r"^Reduction$", "By how much the mean is lower under the second condition, as a share of the first."),
     (
+        "Permutation p",
+        r"[Pp]ermutation p\b",
+        "The share of all ways to exchange participants' conditions that give a mean difference as far from zero.",
+    ),
+    (
+        "Bootstrap interval",
+        r"[Bb]ootstrap",
+        "An interval from how the mean difference varies when the participants are drawn anew with replacement.",
+    ),
+    (
         "Shapiro and Wilk's test",
         r"Shapiro",
         "Asks whether values look normally distributed; a small p speaks against it.",

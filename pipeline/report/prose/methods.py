@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from pipeline.sessions.estimators import build_estimator
+from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES
 from pipeline.study.comparison import Comparison
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
@@ -156,9 +157,21 @@ def _test_text(entry: Comparison, rows: Sequence[Row]) -> str:
     if "zeros" in options:
         zeros = "Pratt" if entry.zeros == "pratt" else "dropped"
         parts += dict.fromkeys(row["method"] for row in rows if zeros in row["method"])
+    parts += _estimates(entry, rows)
     if entry.adjust != "none":
         parts.append(f"p {adjustment(entry.adjust)}-adjusted")
     return ", ".join(parts)
+
+
+def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
+    """What is computed beside a test: bootstrap intervals and permutation p values, and by which chance."""
+    seed = f", seed {entry.seed}"
+    if entry.bootstrap:
+        yield f"BCa bootstrap intervals of the mean difference ({RESAMPLES:,} resamples of participants{seed})"
+    if entry.permutation:
+        drawn = any((row["details"] or {}).get("permutation_exact") is False for row in rows)
+        how = f"{PERMUTATIONS:,} exchanges drawn at random{seed}" if drawn else "all exchanges counted"
+        yield f"permutation p values of the mean difference (conditions exchanged within participants, {how})"
 
 
 def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:

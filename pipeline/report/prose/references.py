@@ -122,6 +122,10 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield _OF_EFFECT_SIZE[row["effect_size_name"]], row["effect_size_name"]
         if row["p_adjusted"] is not None:
             yield ADJUSTMENTS[row["adjust"]].cite, "adjusted p values"
+        if details.get("bootstrap_ci_difference") is not None:
+            yield "efron1987", "bootstrap intervals"
+        if details.get("permutation_p") is not None:
+            yield ("pitman1937" if details["permutation_exact"] else "phipson2010"), "permutation p values"
         if details.get("p_gg") is not None:
             yield "greenhouse1959", "correction for sphericity"
         if details.get("shapiro_w") is not None or details.get("residual_shapiro_w") is not None:

@@ -19,6 +19,7 @@ from pipeline.words import (
     counted,
     degrees_of_freedom,
     effect_size,
+    interval,
     listing,
     measure_label,
     number,
@@ -136,6 +137,19 @@ def _corrected_p(row: Row) -> str:
     return p_value((row["details"] or {}).get("p_gg"))
 
 
+def _bootstrap(row: Row) -> str:
+    """The bootstrap interval of the mean difference, or why there is none."""
+    details = row["details"] or {}
+    bounds = details.get("bootstrap_ci_difference")
+    return interval(*bounds) if bounds else str(details.get("no_bootstrap", NOTHING))
+
+
+ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
+    ("Bootstrap 95 % interval", _bootstrap),
+    ("Permutation p", lambda row: p_value((row["details"] or {}).get("permutation_p"))),
+)
+"""Columns of what entries may ask for beside a test, of the mean difference."""
+
 _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Measure", lambda row: measure_label(row["measure"])),
     ("Test", test_label),
@@ -148,6 +162,7 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("p adjusted", _adjusted_p),
     ("Effect size [95 % interval]", effect_size),
     ("Mean difference", lambda row: number(row["mean_difference"])),
+    *ESTIMATES,
     ("Reduction", lambda row: percent(reduction_of(row))),
 )
 """The table's columns; a column that no row fills is left out."""

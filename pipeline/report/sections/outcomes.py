@@ -9,12 +9,14 @@ from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
+from pipeline.report.sections.comparisons import ESTIMATES
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.study.measures import MEASURES, measure
 from pipeline.study.measures import Section as SectionName
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
+    NOTHING,
     capitalized,
     comparison_sentence,
     contrast,
@@ -199,6 +201,7 @@ def _ratings_table(material: Material, questionnaire: str, title: str, names: li
 
 
 def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
+    estimates = [(title, cell) for title, cell in ESTIMATES if any(cell(row) != NOTHING for row in rows)]
     titles = ("Scale", "Comparison", "n", "Statistic", "p", "p adjusted", "Effect size [95 % interval]")
     cells = tuple(
         (
@@ -209,6 +212,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
             p_value(row["p"]),
             p_value(row["p_adjusted"]),
             effect_size(row) if row["status"] == "ok" else row["status"],
+            *(cell(row) for _, cell in estimates),
         )
         for row in rows
     )
@@ -218,7 +222,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     return Table(
         f"table-{safe_name(questionnaire)}-tests",
         caption,
-        columns(titles, 2),
+        columns([*titles, *(title for title, _ in estimates)], 2),
         cells,
         note,
     )

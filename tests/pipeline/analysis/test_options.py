@@ -5,8 +5,11 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from pipeline.statistics.multiplicity import METHODS, adjusted
 from pipeline.study.statistical_tests import ADJUSTMENTS
@@ -102,3 +105,44 @@ def test_the_effect_size_of_welchs_t_does_not_contradict_its_p(tmp_path: Path, s
     assert row["details"]["cohen_ds_ci"][0] > 0
     assert "d_av = " in page
     assert "delacre2021" in (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+
+
+def test_bootstrap_intervals_and_permutation_p_stand_beside_the_test(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Ten differences, of which 4 of the 1024 ways to exchange the conditions have a mean as far from zero."""
+    options = "bootstrap: true, permutation: true"
+    entries = [f"measure: time_s, test: {test}, {options}" for test in ("t_paired", "wilcoxon")]
+    page = read(steadyhand, study(tmp_path / "study", TIMES, entries))
+    paired, ranked = steadyhand.results()["comparisons"]
+    first, second = (np.array(TIMES["time_s"][name]) for name in "AB")
+    signs = np.array(list(product((1, -1), repeat=10)))
+    as_far = np.abs(signs @ (first - second)) >= abs(np.sum(first - second)) - 1e-9
+    assert paired["details"]["permutation_p"] == ranked["details"]["permutation_p"] == np.mean(as_far)
+    low, high = paired["details"]["bootstrap_ci_difference"]
+    assert 0 < low < paired["mean_difference"] < high
+    assert paired["details"]["bootstrap_seed"] == 1
+    assert "exact permutation p = .004, mean difference = 3.34, bootstrap 95 % CI [" in page
+    assert "BCa bootstrap intervals of the mean difference (9,999 resamples of participants, seed 1)" in page
+    assert "permutation p values of the mean difference (conditions exchanged within participants, all" in page
+    bibliography = (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+    assert "efron1987" in bibliography
+    assert "pitman1937" in bibliography
+
+
+def test_the_seed_is_the_only_chance(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    entries = [f"measure: time_s, test: t_paired, bootstrap: true{seed}" for seed in ("", ", seed: 1", ", seed: 2")]
+    rows = compared(steadyhand, study(tmp_path / "study", TIMES, entries))
+    default, same, other = (row["details"]["bootstrap_ci_difference"] for row in rows)
+    assert default == same
+    assert default != other
+
+
+def test_too_few_to_resample_is_said(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    values: Values = {"m": {"A": [1, 2, 5], "B": [3, 1, 9]}}
+    page = read(steadyhand, study(tmp_path / "study", values, ["measure: m, test: t_paired, bootstrap: true"]))
+    assert page.count("no bootstrap: it needs 5 participants") >= 2
+
+
+def test_a_seed_without_chance_is_an_error(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: doubt, test: t_paired, seed: 3"]))
+    assert ran.code == 2
+    assert "add bootstrap: true, or leave it out" in ran.err
