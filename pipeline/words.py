@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from pipeline.statistics import OF_LOGARITHMS, RATIO
 from pipeline.study.measures import MEASURES, measure
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 
@@ -168,9 +169,11 @@ def degrees_of_freedom(row: Row) -> str:
 
 
 def effect_size(row: Row, before_interval: str = " ") -> str:
-    """`d_z = 0.65 [0.01, 1.27]`, `η²G = .10 [.00, .29]`."""
+    """`d_z = 0.65 [0.01, 1.27]`, `η²G = .10 [.00, .29]`; a ratio as `ratio_to_first` has it."""
     if row["effect_size"] is None:
         return NOTHING
+    if row["effect_size_name"] == RATIO and ratio_to_first(row):
+        return ratio_to_first(row, before_interval)
     bounds = effect_interval(row)
     value = f"{effect_name(row)} = {effect_value(row)}"
     return value if bounds == NOTHING else f"{value}{before_interval}{bounds}"
@@ -195,6 +198,22 @@ def effect_interval(row: Row) -> str:
     """An effect size's 95 % interval, or nothing."""
     bounded = effect_name(row) in _NEVER_OVER_1
     return (share_interval if bounded else interval)(row["ci_low"], row["ci_high"])
+
+
+def ratio_to_first(row: Row, before_interval: str = " ") -> str:
+    """`geometric mean 0.81 times that of kinect [0.71, 0.91]` of a test of logarithms, or nothing."""
+    details = row["details"] or {}
+    if details.get("ratio_to_first") is None:
+        return ""
+    of = "the first" if details["first"] is None else details["first"]
+    value = f"geometric mean {number(details['ratio_to_first'])} times that of {of}"
+    bounds = interval(*details["ratio_to_first_ci"])
+    return value if bounds == NOTHING else f"{value}{before_interval}{bounds}"
+
+
+def of_logarithms(row: Row) -> bool:
+    """Are the logarithms of the values tested?"""
+    return OF_LOGARITHMS in row["method"]
 
 
 def contrast(row: Row) -> str:
@@ -231,8 +250,8 @@ def decisive_p(row: Row) -> float | None:
 
 
 def test_label(row: Row) -> str:
-    """A row's test as tables name it: `paired t`."""
-    return TESTS[row["test"]].label
+    """A row's test as tables name it: `paired t`, `paired t of logarithms`."""
+    return TESTS[row["test"]].label + (" of logarithms" if of_logarithms(row) else "")
 
 
 def comparison_sentence(row: Row, with_change: bool = True) -> str:
@@ -240,7 +259,7 @@ def comparison_sentence(row: Row, with_change: bool = True) -> str:
     head = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f"{contrast(row)}, "
     if row["status"] != "ok":
         return f"{head}{test_label(row)}: {row['status']} (n = {row['n']})"
-    named = "" if TESTS[row["test"]].symbol_tells else f"{test_label(row)}: "
+    named = "" if TESTS[row["test"]].symbol_tells and not of_logarithms(row) else f"{test_label(row)}: "
     if TESTS[row["test"]].question == "evidence":
         named = f"{test_label(row)} (JZS, prior scale {row['details']['prior_scale']:g}): "
     parts = [f"{named}{head}{evidence(row)}", f"n = {row['n']}"]
@@ -248,6 +267,8 @@ def comparison_sentence(row: Row, with_change: bool = True) -> str:
         parts.append("singular fit: no variance between participants is found")
     if row["mean_difference"] is not None and with_change:
         parts.append(change_phrase(row))
+    elif row["effect_size_name"] != RATIO and ratio_to_first(row):
+        parts.append(ratio_to_first(row))
     return ", ".join(parts)
 
 
@@ -281,7 +302,9 @@ def bootstrap(row: Row) -> str:
     details = row["details"] or {}
     if "bootstrap_seed" not in details:
         return ""
-    bounds = details["bootstrap_ci_difference"]
+    if details.get("bootstrap_ci_ratio_to_first"):
+        return f"bootstrap 95 % CI of the ratio {interval(*details['bootstrap_ci_ratio_to_first'])}"
+    bounds = details.get("bootstrap_ci_difference")
     if bounds is None:
         return str(details["no_bootstrap"])
     return f"mean difference = {number(row['mean_difference'])}, bootstrap 95 % CI {interval(*bounds)}"

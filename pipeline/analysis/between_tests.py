@@ -9,22 +9,30 @@ import numpy as np
 from pipeline.analysis import groups
 from pipeline.analysis.comparison_rows import Answer, group_pair_row, row_of
 from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.ratios import follow_ups_of_logarithms, on_logarithms, results_of_logarithms
 from pipeline.statistics import mixed_anova, pairs
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.logarithms import t_welch_ratio
 from pipeline.statistics.result import Result
+from pipeline.statistics.welch import t_welch
 
 
-def pairs_of_groups(test: Callable[[FloatArray, FloatArray, str], Result]) -> Callable[[Request], Answer]:
+def welch_t(request: Request, first: FloatArray, second: FloatArray, effect: str) -> Result:
+    """Welch's t of values or of their logarithms."""
+    return (t_welch_ratio if on_logarithms(request) else t_welch)(first, second, effect)
+
+
+def pairs_of_groups(test: Callable[[Request, FloatArray, FloatArray, str], Result]) -> Callable[[Request], Answer]:
     """A test of every pair of groups: one row per pair."""
 
     def answer(request: Request) -> Answer:
         cases = groups.by_group(request)
         rows = [
-            group_pair_row(request, test(pair.first, pair.second, cases.factor), pair)
+            group_pair_row(request, test(request, pair.first, pair.second, cases.factor), pair)
             for pair in pairs.of_groups(cases.groups, cases.names, cases.factor)
         ]
         if not rows:
-            rows = [row_of(request, test(np.array([]), np.array([]), cases.factor))]
+            rows = [row_of(request, test(request, np.array([]), np.array([]), cases.factor))]
         return rows, cases.left_out
 
     return answer
@@ -55,12 +63,18 @@ def mixed_design(request: Request) -> Answer:
     """Rows of the groups, the factors within and their interactions, and the pairs that follow them up."""
     cases = groups.mixed(request)
     within = request.entry.within
-    rows = [
-        row_of(request, result) for result in mixed_anova.mixed_anova(cases.values, cases.codes, cases.factor, within)
-    ]
+
+    def analysed(values: FloatArray) -> list[Result]:
+        return mixed_anova.mixed_anova(values, cases.codes, cases.factor, within)
+
+    def followed_up(values: FloatArray) -> list[pairs.FollowUp]:
+        return mixed_anova.follow_ups(values, cases.codes, (cases.factor, cases.names), within, cases.levels)
+
+    log = on_logarithms(request)
+    results = results_of_logarithms(analysed, cases.values) if log else analysed(cases.values)
+    rows = [row_of(request, result) for result in results]
     if request.entry.follow_up != "none" and len(cases.values):
-        between = (cases.factor, cases.names)
-        for follow_up in mixed_anova.follow_ups(cases.values, cases.codes, between, within, cases.levels):
+        for follow_up in follow_ups_of_logarithms(followed_up, cases.values) if log else followed_up(cases.values):
             row = group_pair_row(request, follow_up.result, follow_up.pair)
             rows.append({**row, "adjust": request.entry.follow_up})
     return rows, cases.left_out

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.analysis.complete_cases import CompleteCases, Request
+from pipeline.analysis.ratios import may_have_zero, on_logarithms, with_ratio
 from pipeline.statistics import OK, diagnostics
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.result import Result
-from pipeline.study.measures import measure
 from pipeline.tables.table import Row
 
 Answer = tuple[list[Row], list[Row]]
@@ -17,7 +18,7 @@ Answer = tuple[list[Row], list[Row]]
 
 def group_pair_row(request: Request, result: Result, pair: Pair) -> Row:
     """The row of a test of two groups."""
-    return {**row_of(request, result), **change_of(request, pair), "contrast": pair.contrast}
+    return with_ratio({**row_of(request, result), **change_of(request, pair), "contrast": pair.contrast})
 
 
 def row_of(request: Request, result: Result) -> Row:
@@ -44,27 +45,32 @@ def row_of(request: Request, result: Result) -> Row:
     }
 
 
+def tested(request: Request, pair: Pair) -> tuple[FloatArray, FloatArray]:
+    """What of a pair is tested: its values, or their logarithms."""
+    return (np.log(pair.first), np.log(pair.second)) if on_logarithms(request) else (pair.first, pair.second)
+
+
 def change_of(request: Request, pair: Pair) -> Row:
-    """The mean difference of a pair and the reduction; empty where nobody is in the pair.
+    """The mean difference of a pair and the reduction; empty where nobody is in the pair, or logarithms are tested.
 
     A reduction is meaningful only on a scale whose zero means none: never on another scale, and not where a mean is
     zero or negative, which contradicts such a zero.
     """
-    if not len(pair.first):
+    if not len(pair.first) or on_logarithms(request):
         return {}
     first, second = float(np.mean(pair.first)), float(np.mean(pair.second))
-    has_zero = measure(request.measure).scale in ("ratio", "unknown") and first > 0 and second > 0
+    has_zero = may_have_zero(request.measure) and first > 0 and second > 0
     return {"mean_difference": first - second, "reduction": 1 - second / first if has_zero else None}
 
 
 def pair_row(request: Request, result: Result, pair: Pair, cases: CompleteCases) -> Row:
     """The row of a test of two conditions."""
-    return diagnosed({**row_of(request, result), **change_of(request, pair), "contrast": pair.contrast}, pair, cases)
+    return diagnosed(request, group_pair_row(request, result, pair), pair, cases)
 
 
-def diagnosed(row: Row, pair: Pair, cases: CompleteCases) -> Row:
-    """The row with diagnostics of its differences (their shape and outliers) among the details."""
+def diagnosed(request: Request, row: Row, pair: Pair, cases: CompleteCases) -> Row:
+    """The row with diagnostics of the differences that were tested (their shape and outliers) among the details."""
     if row["status"] != OK:
         return row
-    diagnosis = diagnostics.differences(pair.first, pair.second, cases.participants)
+    diagnosis = diagnostics.differences(*tested(request, pair), cases.participants)
     return {**row, "details": {**row["details"], **diagnosis}}

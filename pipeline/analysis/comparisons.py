@@ -9,18 +9,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import pandas as pd
 
 from pipeline.analysis import families
-from pipeline.analysis.between_tests import all_groups, mixed_design, pairs_of_groups
+from pipeline.analysis.between_tests import all_groups, mixed_design, pairs_of_groups, welch_t
 from pipeline.analysis.comparison_rows import Answer
 from pipeline.analysis.complete_cases import Request
-from pipeline.analysis.within_tests import anova, art, crossover_design, friedman_test, mixed_models, pairwise
+from pipeline.analysis.within_tests import anova, art, crossover_design, friedman_test, mixed_models, paired_t, pairwise
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.equivalence import tost
 from pipeline.statistics.kruskal import kruskal_pairs, kruskal_wallis
 from pipeline.statistics.mann_whitney import mann_whitney
-from pipeline.statistics.paired import t_paired
 from pipeline.statistics.rank import wilcoxon
-from pipeline.statistics.welch import anova_welch, games_howell, t_welch
+from pipeline.statistics.welch import anova_welch, games_howell
 from pipeline.study.comparison import Comparison
 from pipeline.study.measures import has_total, measure_order
 from pipeline.study.settings import Study
@@ -99,14 +98,14 @@ RUN: Mapping[str, Callable[[Request], Answer]] = {
     "rm_anova": anova,
     "art_anova": art,
     "friedman": friedman_test,
-    "t_paired": pairwise(lambda _, first, second: t_paired(first, second)),
+    "t_paired": pairwise(paired_t),
     "wilcoxon": pairwise(lambda request, first, second: wilcoxon(first, second, zeros=request.entry.zeros)),
     "tost": pairwise(lambda request, first, second: tost(first, second, request.entry.bounds or (0.0, 0.0))),
     "bayes_t": pairwise(lambda request, first, second: bayes_t(first, second, request.entry.prior_scale)),
     "mixed_model": mixed_models,
     "crossover": crossover_design,
-    "t_welch": pairs_of_groups(t_welch),
-    "mann_whitney": pairs_of_groups(mann_whitney),
+    "t_welch": pairs_of_groups(welch_t),
+    "mann_whitney": pairs_of_groups(lambda _, first, second, effect: mann_whitney(first, second, effect)),
     "anova_welch": all_groups(anova_welch, games_howell, adjusts_itself=True),
     "kruskal": all_groups(kruskal_wallis, kruskal_pairs, adjusts_itself=False),
     "mixed_anova": mixed_design,

@@ -13,6 +13,7 @@ from pipeline.analysis import model_rows, orders
 from pipeline.analysis.complete_cases import Request, rows_and_factors
 from pipeline.analysis.factors import Factors, missing_cells
 from pipeline.analysis.groups import one_condition_each
+from pipeline.analysis.kinds_of_values import skewed, yes_or_no
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
 from pipeline.statistics.counterbalancing import balance
@@ -28,7 +29,6 @@ from pipeline.words import counted, listing, p_phrase, statistic
 
 Order = tuple[str, ...]
 _NAMED = 5  # participants in a remark, before "… more"
-_WHOLE = 1e-9  # how far a count of yes may be from a whole number, for round-off
 
 
 def findings(
@@ -52,13 +52,19 @@ def findings(
         return [
             *_between(study, requests),
             *_trials(trials, one_per_measure),
+            *skewed(requests),
             *_sessions(requests[0].observations, sessions),
         ]
     rows = [*_known_orders(people, known), *_disagreements(order_rows)]
     if known:
         rows += _balance(study.conditions, list(known.values()))
         rows += [row for request in one_per_measure for row in _order_effects(request)]
-    rows += [*_complete_people(study, one_per_measure), *_trials(trials, one_per_measure), *_yes_or_no(requests)]
+    rows += [
+        *_complete_people(study, one_per_measure),
+        *_trials(trials, one_per_measure),
+        *yes_or_no(requests),
+        *skewed(requests),
+    ]
     return [*rows, *_sessions(requests[0].observations, sessions)]
 
 
@@ -254,21 +260,6 @@ def _trials(trials: pd.DataFrame, requests: Sequence[Request]) -> Iterator[Row]:
             yield _per_cell(
                 "values in each cell", request.measure, rows.groupby(["participant", "condition"])["n"].sum()
             )
-
-
-def _yes_or_no(requests: Sequence[Request]) -> Iterator[Row]:
-    """Measures whose values are all 0 or 1, in tests that treat them as measurements."""
-    for measure in dict.fromkeys(request.measure for request in requests):
-        of_measure = [request for request in requests if request.measure == measure]
-        rows = of_measure[0].observations[of_measure[0].observations["measure"] == measure]
-        ones = (rows["value"] * rows["n"].astype("float64")).to_numpy("float64")
-        whole = len(ones) > 0 and bool((abs(ones - ones.round()) < _WHOLE).all())
-        if not (whole and rows["value"].between(0, 1).all() and rows["value"].nunique() > 1):
-            continue
-        tests = listing(list(dict.fromkeys(TESTS[request.entry.test].label for request in of_measure)))
-        suited = "McNemar's or Cochran's test, or a logistic model, suits such data"
-        row = {"what": "kind of values", "measure": measure, "found": "0 or 1 in every trial"}
-        yield {**row, "expected": "measurements", "remark": f"{tests} treat yes and no as measurements; {suited}"}
 
 
 def _per_cell(what: str, measure: str | None, counts: pd.Series) -> Row:

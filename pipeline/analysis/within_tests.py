@@ -8,13 +8,15 @@ from itertools import groupby
 import numpy as np
 
 from pipeline.analysis import complete_cases, model_rows
-from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of
-from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of, tested
+from pipeline.analysis.complete_cases import CompleteCases, Request
+from pipeline.analysis.ratios import on_logarithms, results_of_logarithms, with_ratio, with_ratio_of
 from pipeline.statistics import OK, estimation, pairs
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.art import art_anova, art_contrasts
 from pipeline.statistics.crossover import crossover
+from pipeline.statistics.logarithms import exponential, ratio_follow_ups, rm_anova_of_logarithms, t_paired_ratio
 from pipeline.statistics.mixed import Factor, cells_of, mixed_model
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.rank import friedman
@@ -29,15 +31,39 @@ _ROWS_A_CELL = 1.5
 def anova(request: Request) -> Answer:
     """One row per effect, and the pairs that follow up those of more than two levels."""
     cases = complete_cases.by_factors_of(request)
-    rows = [row_of(request, result) for result in rm_anova(cases.values, request.entry.within)]
+    test = rm_anova_of_logarithms if on_logarithms(request) else rm_anova
+    rows = [row_of(request, result) for result in test(cases.values, request.entry.within)]
     if cases.values.shape[1:] == (2,):
         (pair,) = pairs.of_conditions(cases.values, cases.levels[0])
-        rows = [diagnosed({**rows[0], **change_of(request, pair)}, pair, cases)]
+        rows = [_with_ratio_of_two(request, {**rows[0], **change_of(request, pair)}, pair, cases)]
+        rows = [diagnosed(request, rows[0], pair, cases)]
     if request.entry.follow_up != "none":
-        for pair in pairs.follow_ups(cases.values, request.entry.within, cases.levels):
-            row = pair_row(request, t_paired(pair.first, pair.second, pair.effect), pair, cases)
+        for follow_up in _follow_ups(request, cases):
+            row = pair_row(request, follow_up.result, follow_up.pair, cases)
             rows.append({**row, "adjust": request.entry.follow_up})
     return rows, cases.left_out
+
+
+def _with_ratio_of_two(request: Request, row: Row, pair: pairs.Pair, cases: CompleteCases) -> Row:
+    """The row of an analysis of two conditions with the ratio of their geometric means, if it is of logarithms."""
+    if not on_logarithms(request) or row["status"] != OK:
+        return row
+    paired = t_paired_ratio(pair.first, pair.second)
+    return with_ratio_of(row, paired.details["log_ratio_ci"], cases.levels[0][0])
+
+
+def _follow_ups(request: Request, cases: CompleteCases) -> list[pairs.FollowUp]:
+    if on_logarithms(request):
+        return ratio_follow_ups(cases.values, request.entry.within, cases.levels)
+    return [
+        pairs.FollowUp(pair, t_paired(pair.first, pair.second, pair.effect))
+        for pair in pairs.follow_ups(cases.values, request.entry.within, cases.levels)
+    ]
+
+
+def paired_t(request: Request, first: FloatArray, second: FloatArray) -> Result:
+    """The paired t test of values or of their logarithms."""
+    return (t_paired_ratio if on_logarithms(request) else t_paired)(first, second)
 
 
 def art(request: Request) -> Answer:
@@ -83,18 +109,28 @@ def _with_estimates(request: Request, row: Row, pair: pairs.Pair) -> Row:
     if row["status"] != OK:
         return row
     details = dict(row["details"])
+    first, second = tested(request, pair)
     if request.entry.bootstrap:
-        details |= estimation.bootstrap(pair.first, pair.second, request.entry.seed)
+        details |= estimation.bootstrap(first, second, request.entry.seed)
+        if on_logarithms(request):
+            bounds = details.pop("bootstrap_ci_difference")
+            inverse = None if bounds is None else [exponential(-bound) for bound in reversed(bounds)]
+            details["bootstrap_ci_ratio_to_first"] = inverse
     if request.entry.permutation:
-        details |= estimation.permutation(pair.first, pair.second, request.entry.seed)
+        details |= estimation.permutation(first, second, request.entry.seed)
     return {**row, "details": details}
 
 
 def mixed_models(request: Request) -> Answer:
     """One row per term, and the pairs of levels of those that have more than two."""
     model = model_rows.of_model(request)
-    results = mixed_model(model.values, model.participants, model.columns, model.terms, _random_intercepts(model))
-    rows = [row_of(request, result) for result in results]
+    random = _random_intercepts(model)
+
+    def fitted(values: FloatArray) -> list[Result]:
+        return mixed_model(values, model.participants, model.columns, model.terms, random)
+
+    results = results_of_logarithms(fitted, model.values) if on_logarithms(request) else fitted(model.values)
+    rows = [with_ratio(row_of(request, result)) for result in results]
     if model_rows.CARRY_OVER in model.columns:
         rows = [
             {**row, "method": f"{row['method']}; without first periods, which have no preceding condition"}

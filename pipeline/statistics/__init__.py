@@ -29,6 +29,7 @@ NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
 NO_RESIDUAL = "undefined: no value varies within its cell, so the model has no residual"
 NOT_CONVERGED = "undefined: the fit of the model did not converge"
 NOT_POSITIVE = "undefined: a logarithm needs values above zero"
+NO_LOGARITHMS = "undefined: transform log needs values above zero; leave it out, or use a rank test"
 
 STATUSES = (
     OK,
@@ -55,4 +56,11 @@ STATUSES = (
     NO_RESIDUAL,
     NOT_CONVERGED,
     NOT_POSITIVE,
+    NO_LOGARITHMS,
 )
+
+OF_LOGARITHMS = ", of the logarithms"
+"""Part of the method of every test of logarithms."""
+
+RATIO = "ratio of geometric means"
+"""The effect size of a test of two means of logarithms."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.statistics import NOT_POSITIVE, OK
+from pipeline.statistics import NO_LOGARITHMS, OF_LOGARITHMS, OK, RATIO
 from pipeline.statistics.anova import effect_name, effects_of, rm_anova
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.descriptive import summarize
@@ -21,15 +21,13 @@ from pipeline.statistics.pairs import FollowUp, follow_ups
 from pipeline.statistics.result import Result
 from pipeline.statistics.welch import D_AV, t_welch
 
-RATIO = "ratio of geometric means"
-_OF_LOGARITHMS = ", of the logarithms"
 _PAIRED = "paired t test, two-sided"
 
 
 def logarithms(values: FloatArray) -> FloatArray | str:
     """Natural logarithms of values of any shape, or the status where one is not above zero."""
     if np.any(values <= 0):
-        return NOT_POSITIVE
+        return NO_LOGARITHMS
     result: FloatArray = np.log(values)
     return result
 
@@ -41,7 +39,7 @@ def as_ratio(result: Result) -> Result:
     whose effect size is the estimate itself (mixed_model, crossover). What was the effect size stands in the details,
     and so does the logarithm of the ratio, whose bounds are numbers also where the ratio's are beyond the largest one.
     """
-    named = replace(result, method=result.method + _OF_LOGARITHMS, effect_size_name=RATIO)
+    named = replace(result, method=result.method + OF_LOGARITHMS, effect_size_name=RATIO)
     if result.status != OK:
         return named
     details = dict(result.details)
@@ -52,7 +50,7 @@ def as_ratio(result: Result) -> Result:
         logs = [(low + high) / 2, low, high]
         name = "cohen_dav" if result.effect_size_name == D_AV else "cohen_dz"
         details |= {name: result.effect_size, f"{name}_ci": [result.ci_low, result.ci_high]}
-    ratio, low, high = (_exponential(log) for log in logs)
+    ratio, low, high = (exponential(log) for log in logs)
     return replace(
         named,
         effect_size=ratio,
@@ -62,7 +60,7 @@ def as_ratio(result: Result) -> Result:
     )
 
 
-def _exponential(log: float | None) -> float | None:
+def exponential(log: float | None) -> float | None:
     """None beyond the largest number."""
     with np.errstate(over="ignore"):
         result = None if log is None else float(np.exp(log))
@@ -73,7 +71,7 @@ def t_paired_ratio(first: FloatArray, second: FloatArray, effect: str = "conditi
     """The paired t test of logarithms: the ratio of the geometric means of first to second (n,)."""
     both = logarithms(np.stack([first, second]))
     if isinstance(both, str):
-        return _not_positive(effect, _PAIRED, len(first))
+        return _without_logarithms(effect, _PAIRED, len(first))
     return as_ratio(t_paired(both[0], both[1], effect))
 
 
@@ -81,12 +79,12 @@ def t_welch_ratio(first: FloatArray, second: FloatArray, effect: str = "group") 
     """Welch's t of logarithms: the ratio of the geometric means of two groups."""
     logs = logarithms(np.concatenate([first, second]))
     if isinstance(logs, str):
-        return _not_positive(effect, "Welch's t test, two-sided", len(first) + len(second))
+        return _without_logarithms(effect, "Welch's t test, two-sided", len(first) + len(second))
     return as_ratio(t_welch(logs[: len(first)], logs[len(first) :], effect))
 
 
-def _not_positive(effect: str, method: str, n: int) -> Result:
-    return Result(effect, "t", method + _OF_LOGARITHMS, RATIO, n, status=NOT_POSITIVE)
+def _without_logarithms(effect: str, method: str, n: int) -> Result:
+    return Result(effect, "t", method + OF_LOGARITHMS, RATIO, n, status=NO_LOGARITHMS)
 
 
 def rm_anova_of_logarithms(values: FloatArray, factors: Sequence[str]) -> list[Result]:
@@ -98,7 +96,7 @@ def rm_anova_of_logarithms(values: FloatArray, factors: Sequence[str]) -> list[R
         results = [replace(blank, effect=name, n=len(values), status=logs) for name in names]
     else:
         results = rm_anova(logs, factors)
-    return [replace(result, method=result.method + _OF_LOGARITHMS) for result in results]
+    return [replace(result, method=result.method + OF_LOGARITHMS) for result in results]
 
 
 def ratio_follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequence[Sequence[str]]) -> list[FollowUp]:
@@ -109,7 +107,7 @@ def ratio_follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequenc
     logs = logarithms(values)
     if isinstance(logs, str):
         return [
-            FollowUp(pair, replace(_not_positive(pair.effect, _PAIRED, len(values)), contrast=pair.contrast))
+            FollowUp(pair, replace(_without_logarithms(pair.effect, _PAIRED, len(values)), contrast=pair.contrast))
             for pair in follow_ups(values, factors, levels)
         ]
     results = []
@@ -125,4 +123,4 @@ def geometric_mean(values: FloatArray) -> dict[str, Any]:
     logs = logarithms(values)
     row = {} if isinstance(logs, str) or not len(values) else summarize(logs)
     names = {"geometric_mean": "mean", "geometric_ci_low": "ci_low", "geometric_ci_high": "ci_high"}
-    return {name: _exponential(row.get(of)) for name, of in names.items()}
+    return {name: exponential(row.get(of)) for name, of in names.items()}

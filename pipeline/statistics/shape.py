@@ -13,6 +13,7 @@ from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.groups import varies
+from pipeline.statistics.result import IntArray
 from pipeline.statistics.welch import spreads
 
 SKEWED = 1.0  # beyond: "highly skewed" (Bulmer 1979)
@@ -34,11 +35,22 @@ def cell_shape(values: FloatArray) -> dict[str, float | bool | None]:
     return {**own_scale, **{f"log_{name}": figure for name, figure in beside.items()}}
 
 
+def residual_skewness(values: FloatArray, cells: IntArray) -> float | None:
+    """Skewness of values (N,) less the mean of their cell (N,), adjusted Fisher-Pearson; None where it is undefined."""
+    (scaled,), _ = at_unit_scale([values])
+    means = np.bincount(cells, scaled) / np.maximum(np.bincount(cells), 1)
+    return _skewness(scaled - means[cells])
+
+
+def _skewness(apart: FloatArray) -> float | None:
+    return float(stats.skew(apart, bias=False)) if len(apart) > 2 and varies(apart) else None
+
+
 def _shape(cells: FloatArray) -> dict[str, float | bool | None]:
     """Of values (n, cells)."""
     n = len(cells)
     apart = cells - cells.mean(axis=0) if n else cells
-    skewness = float(stats.skew(apart.ravel(), bias=False)) if n > 2 and varies(apart.ravel()) else None
+    skewness = _skewness(apart.ravel()) if n > 2 else None
     ratio = p = None
     if n > 1 and all(varies(cell) for cell in cells.T):
         sds = np.std(cells, axis=0, ddof=1)

@@ -43,6 +43,7 @@ class Comparison(Frozen):
     bounds: tuple[Finite, Finite] | None = None
     prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
     fixed: tuple[Id, ...] = ("condition",)
+    transform: Literal["none", "log"] = "none"
     bootstrap: bool = False
     permutation: bool = False
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1

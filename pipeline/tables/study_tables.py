@@ -53,11 +53,14 @@ _COMPARISON = (
     text("adjust", "how p was adjusted, by its name in study.yaml, such as holm; or none"),
     text("method", "how exactly the test was done"),
     text("effect_size_name", "what the effect size is"),
-    number("effect_size", "its value; without a unit, except for an estimate, which is in the measure's unit"),
+    number("effect_size", "its value, first to second; without a unit, but for an estimate, in the measure's unit"),
     CI_LOW._replace(about="lower end of the effect size's 95 % interval"),
     CI_HIGH._replace(about="upper end of the effect size's 95 % interval"),
-    number("mean_difference", "mean under the first condition minus that under the second, in the measure's unit"),
-    number("reduction", "1 minus second mean over first mean"),
+    number(
+        "mean_difference",
+        "mean under the first condition minus that under the second, in the measure's unit; null for logarithms",
+    ),
+    number("reduction", "1 minus second mean over first mean; of geometric means where logarithms are tested"),
     text("status", "ok, or why the row could not be computed"),
     text("details", "what only this test has, as a JSON object"),
 )

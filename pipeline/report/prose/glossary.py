@@ -140,6 +140,11 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     ("r_rb", r"\br_rb\b", "Rank-biserial correlation: from −1 (second always larger) to 1 (first always larger)."),
     ("W", r"\bW = [.\d]", "Kendall's W: from 0 (participants rank the conditions differently) to 1 (all alike)."),
     ("Estimate", r"\bestimate = ", "A difference or slope estimated by the model, in the unit of the measure."),
+    (
+        "Geometric mean",
+        r"[Gg]eometric mean",
+        "The mean of the logarithms, taken back: for values that spread the more the larger they are, as times do.",
+    ),
     ("Mean difference", r"^Mean difference$", "The mean under the first condition minus that under the second."),
     ("Reduction", r"^Reduction$", "By how much the mean is lower under the second condition, as a share of the first."),
     (

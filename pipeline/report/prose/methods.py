@@ -148,6 +148,8 @@ def _test_text(entry: Comparison, rows: Sequence[Row]) -> str:
     parts = [TESTS[entry.test].methods_text]
     if len(entry.within) > 1:
         parts.append(f"of the factors {listing(list(entry.within))}")
+    if entry.transform == "log":
+        parts.append("of the natural logarithms of the participants' means, read as ratios of geometric means")
     if "fixed" in options:
         parts.append(f"fixed terms {listing(list(entry.fixed))}")
     if entry.bounds is not None:
@@ -166,12 +168,13 @@ def _test_text(entry: Comparison, rows: Sequence[Row]) -> str:
 def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
     """What is computed beside a test: bootstrap intervals and permutation p values, and by which chance."""
     seed = f", seed {entry.seed}"
+    of = "ratio of geometric means" if entry.transform == "log" else "mean difference"
     if entry.bootstrap:
-        yield f"BCa bootstrap intervals of the mean difference ({RESAMPLES:,} resamples of participants{seed})"
+        yield f"BCa bootstrap intervals of the {of} ({RESAMPLES:,} resamples of participants{seed})"
     if entry.permutation:
         drawn = any((row["details"] or {}).get("permutation_exact") is False for row in rows)
         how = f"{PERMUTATIONS:,} exchanges drawn at random{seed}" if drawn else "all exchanges counted"
-        yield f"permutation p values of the mean difference (conditions exchanged within participants, {how})"
+        yield f"permutation p values of the {of} (conditions exchanged within participants, {how})"
 
 
 def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:

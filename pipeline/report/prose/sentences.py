@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from pipeline.statistics import RATIO
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
@@ -18,7 +19,9 @@ from pipeline.words import (
     interval,
     listing,
     number,
+    of_logarithms,
     percent,
+    ratio_to_first,
     reduction_of,
     statistic_value,
     subject,
@@ -72,7 +75,8 @@ def sentence(row: Row, facts: StudyFacts) -> str:
 
 def _test(row: Row) -> str:
     follows_up = row["test"] == "rm_anova" and row["contrast"] is not None
-    return "follow-up t test" if follows_up else TESTS[row["test"]].long_name
+    named = "follow-up t test" if follows_up else TESTS[row["test"]].long_name
+    return f"{named} of the logarithms" if of_logarithms(row) else named
 
 
 def _directed(row: Row, facts: StudyFacts, what: str, pair: _Pair, difference: float) -> str:
@@ -84,13 +88,15 @@ def _directed(row: Row, facts: StudyFacts, what: str, pair: _Pair, difference: f
         inside = [amount, *_means(row, facts)]
     else:
         head = f"{what} did not differ significantly between {pair.first} and {pair.second}{pair.where}"
-        inside = [f"{side} {amount}".strip(), *_means(row, facts)]
+        inside = [amount if ratio_to_first(row) else f"{side} {amount}".strip(), *_means(row, facts)]
     said = "; ".join(part for part in inside if part)
     return f"{head}{f' ({said})' if said else ''}, {_evidence(row, facts)}."
 
 
 def _amount(row: Row, difference: float) -> str:
     """`by 6.10 s, 26.7 %`: the estimate or the difference of the means, where it goes the way that was tested."""
+    if ratio_to_first(row):
+        return ratio_to_first(row, _BEFORE_INTERVAL)
     value = row["effect_size"] if row["effect_size_name"] == "estimate" else row["mean_difference"]
     if value is None or difference == 0:
         return ""
@@ -150,10 +156,13 @@ def _evidence(row: Row, facts: StudyFacts) -> str:
     if row["test"] == "wilcoxon":
         named = f"{row['method'].split(', ')[0].split(' ')[0]} Wilcoxon signed-rank test, "
     elif row["test"] == "rm_anova" and row["contrast"] is not None:
-        named = "follow-up, "
-    elif not TESTS[row["test"]].symbol_tells:
+        named = "follow-up of the logarithms, " if of_logarithms(row) else "follow-up, "
+    elif not TESTS[row["test"]].symbol_tells or of_logarithms(row):
         named = f"{_test(row)}, "
-    figures = evidence(row, _digits(row, facts.alpha), _BEFORE_INTERVAL)
+    # A ratio to the first condition is said as the amount already.
+    said = row["effect_size_name"] == RATIO and _pair(row, facts.conditions) is not None and ratio_to_first(row)
+    shown = {**row, "effect_size": None} if said else row
+    figures = evidence(shown, _digits(row, facts.alpha), _BEFORE_INTERVAL)
     singular = ", singular fit" if finds_no_variance_between_people(row) else ""
     return f"{named}{figures}, n = {row['n']}{singular}"
 
@@ -175,6 +184,8 @@ def _difference(row: Row) -> float | None:
     """First minus second, as far as the test says it: by ranks, estimated, or of the means."""
     if row["test"] == "wilcoxon" or row["effect_size_name"] == "estimate":
         return None if row["effect_size"] is None else float(row["effect_size"])
+    if ratio_to_first(row):
+        return float(row["details"]["log_ratio"])
     if row["mean_difference"] is None:
         return None
     same = row["reduction"] is not None and abs(row["reduction"]) < _ROUND_OFF  # of the mean: the means are the same

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from pipeline.analysis.kinds_of_values import SHAPE
 from pipeline.report.document.model import Strong, Text
 from pipeline.report.sections import checks
 from pipeline.report.sections.material import Material
@@ -65,6 +66,10 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
     if skewed:
         text = f"(Shapiro-Wilk test) for {_named(skewed)}: check whether a rank test gives the same result."
         yield (Strong("Differences are not normally distributed "), text)
+    shaped = [row for row in material.rows("design_check") if row["what"] == SHAPE]
+    if shaped:
+        text = f"in {_named(shaped)}: transform: log in study.yaml tests the logarithms and says by what factor the"
+        yield (Strong("Skewed values "), f"{text} geometric means differ; see whether it gives the same result.")
     yield from _far_out(resting)
     yield from _aligned_ranks(rows)
     singular = [row for row in rows if finds_no_variance_between_people(row)]
@@ -112,7 +117,7 @@ def _far_out(rows: list[Row]) -> Iterator[Text]:
 
 def _of_design(material: Material) -> Iterator[Text]:
     """The remarks of the design check: order of the conditions, period, carry-over, cells."""
-    remarked = [row for row in material.rows("design_check") if row["remark"]]
+    remarked = [row for row in material.rows("design_check") if row["remark"] and row["what"] != SHAPE]
     told = [f"{row['what']}: {row['remark']}" for row in remarked]
     if told:
         more = f"; and {len(told) - _REMARKS_MAX} more" if len(told) > _REMARKS_MAX else ""

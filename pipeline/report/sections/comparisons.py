@@ -23,6 +23,7 @@ from pipeline.words import (
     listing,
     measure_label,
     number,
+    of_logarithms,
     p_value,
     percent,
     reduction_of,
@@ -52,13 +53,17 @@ def section(material: Material) -> Section | None:
         columns([title for title, _ in filled], 3),
         tuple(tuple(cell(row) for _, cell in filled) for row in rows),
         f"{_who_counts(tests)} Mean difference: first minus second condition. Reduction: relative to the first, for"
-        " measures whose zero means none.",
+        f" measures whose zero means none{_of_logarithms(rows)}.",
         tuple(anchor(at) for at in range(len(rows))),
     )
     where = "Every test of the study, one row each. The words and symbols are explained in the "
     explained = Paragraph((where, CrossReference("glossary", "glossary"), "."))
     blocks: list[Block] = [explained, table, Paragraph((Strong("Methods: "), _methods(rows)))]
     return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
+
+
+def _of_logarithms(rows: Sequence[Row]) -> str:
+    return "; of tests of logarithms, that of the geometric mean" if any(map(of_logarithms, rows)) else ""
 
 
 def _who_counts(tests: Sequence[str]) -> str:
@@ -140,7 +145,7 @@ def _corrected_p(row: Row) -> str:
 def _bootstrap(row: Row) -> str:
     """The bootstrap interval of the mean difference, or why there is none."""
     details = row["details"] or {}
-    bounds = details.get("bootstrap_ci_difference")
+    bounds = details.get("bootstrap_ci_difference") or details.get("bootstrap_ci_ratio_to_first")
     return interval(*bounds) if bounds else str(details.get("no_bootstrap", NOTHING))
 
 

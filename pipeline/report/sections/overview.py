@@ -40,6 +40,7 @@ from pipeline.words import (
     measure_label,
     number,
     p_phrase,
+    ratio_to_first,
     short_label,
     statistic,
     unit_of,
@@ -98,6 +99,11 @@ def _sentence(material: Material, row: Row) -> str:
         means = f"{_mean(told[second])} with {second} against {_mean(told[first])} with {first}"
         sure = "" if significant else ", a difference that is not statistically significant"
         return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({found})."
+    if ratio_to_first(row):
+        first, second = study.conditions
+        sure = "" if significant else ", a difference that is not statistically significant"
+        side = "lower" if row["details"]["ratio_to_first"] < 1 else "higher"
+        return f"{label} was {side} with {second} than with {first}{sure}: its {ratio_to_first(row)} ({found})."
     ranked = sorted((one for one in told.values() if one["mean"] is not None), key=lambda one: one["mean"])
     verb = "differs" if significant else "does not differ statistically significantly"
     if len(ranked) < 2:
@@ -229,6 +235,8 @@ def _key_figure(row: Row) -> KeyFigure:
         return KeyFigure("undefined", label, row["status"])
     p = p_phrase(decisive_p(row))
     evidence = f"{statistic(row)}, {p}, n = {row['n']}"
+    if ratio_to_first(row):
+        return KeyFigure(f"× {number(row['details']['ratio_to_first'])}", label, evidence)
     if row["mean_difference"] is None:
         return KeyFigure(p, label, f"{statistic(row)}, n = {row['n']}")
     sign = MINUS if row["mean_difference"] >= 0 else "+"

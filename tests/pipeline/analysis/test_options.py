@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from pipeline.statistics.multiplicity import METHODS, adjusted
 from pipeline.study.statistical_tests import ADJUSTMENTS
@@ -28,17 +30,24 @@ TIMES: Values = {
     "strain": {"A": [5, 6, 5, 7, 6, 5, 7, 6, 4, 6], "B": [4, 6, 5, 6, 6, 4, 5, 6, 4, 5]},
     "doubt": {"A": [2, 3, 2, 4, 3, 2, 3, 3, 2, 3], "B": [2, 2, 3, 3, 3, 3, 3, 2, 2, 2]},
 }
-GROUPED: Values = {"m": {"A": [1, 2, 3, 4, 30, 5, 6], "B": [8, 9, 10, 11, 31, 12, 13]}}
 
 
-def study(folder: Path, values: Values, comparisons: Sequence[str], settings: str = "", people: str = "") -> Path:
-    """A study folder of measures, and of participants.csv where `people` holds its text."""
+def study(
+    folder: Path,
+    values: Values,
+    comparisons: Sequence[str],
+    settings: str = "",
+    people: str = "",
+    apart: bool = False,
+) -> Path:
+    """A study folder of measures, with `people` as participants.csv; `apart`: each participant met one condition."""
     folder.mkdir()
     conditions = list(next(iter(values.values())))
     lines = ["participant,condition,measure,value"]
     for measure, cells in values.items():
         for condition, of_people in cells.items():
-            lines += [f"P{at + 1:02},{condition},{measure},{value}" for at, value in enumerate(of_people)]
+            named = f"{condition}-" if apart else "P"
+            lines += [f"{named}{at + 1:02},{condition},{measure},{value}" for at, value in enumerate(of_people)]
     (folder / "measures.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     if people:
         (folder / "participants.csv").write_text(people, encoding="utf-8")
@@ -93,11 +102,8 @@ def test_an_unknown_adjustment_is_answered_with_what_was_meant(tmp_path: Path, s
 def test_the_effect_size_of_welchs_t_does_not_contradict_its_p(tmp_path: Path, steadyhand: Steadyhand) -> None:
     """Groups of 4 and 12 that spread unlike: d_s, which takes them as alike, has an interval without 0 at p = .22."""
     values: Values = {"m": {"A": [1, 9, 14, 22], "B": [4, 5, 4, 6, 5, 4, 5, 6, 4, 5, 6, 4]}}
-    folder = study(tmp_path / "study", values, ["measure: m, test: t_welch, between: condition"])
-    table = (folder / "measures.csv").read_text(encoding="utf-8").splitlines()
-    apart = [line.replace("P", "Q", 1) if ",B,m" in line else line for line in table]
-    (folder / "measures.csv").write_text("\n".join(apart) + "\n", encoding="utf-8")
-    page = read(steadyhand, folder)
+    entry = "measure: m, test: t_welch, between: condition"
+    page = read(steadyhand, study(tmp_path / "study", values, [entry], apart=True))
     (row,) = steadyhand.results()["comparisons"]
     assert row["p"] > 0.05
     assert row["effect_size_name"] == "Cohen's d_av"
@@ -146,3 +152,107 @@ def test_a_seed_without_chance_is_an_error(tmp_path: Path, steadyhand: Steadyhan
     ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: doubt, test: t_paired, seed: 3"]))
     assert ran.code == 2
     assert "add bootstrap: true, or leave it out" in ran.err
+
+
+THREE: Values = {"time_s": {**TIMES["time_s"], "C": [11.0, 15.0, 9.9, 19.0, 13.2, 12.0, 30.0, 12.5, 10.1, 17.0]}}
+LOGS: Values = {"time_s": {name: [math.log(value) for value in values] for name, values in THREE["time_s"].items()}}
+PEOPLE = "participant,group\n" + "".join(f"P{at + 1:02},{'young' if at < 4 else 'old'}\n" for at in range(10))
+FIGURES = ("statistic", "df1", "df2", "p")
+
+
+@pytest.mark.parametrize(
+    ("test", "options"),
+    [
+        ("t_paired", ""),
+        ("rm_anova", ""),
+        ("mixed_model", ""),
+        ("t_welch", ", between: condition"),
+        ("mixed_anova", ", between: group"),
+    ],
+)
+def test_a_test_of_logarithms_is_that_of_values_that_are_logarithms(
+    tmp_path: Path, steadyhand: Steadyhand, test: str, options: str
+) -> None:
+    entry = f"measure: time_s, test: {test}{options}"
+    how: Row = {"apart": True} if test == "t_welch" else {"settings": "factors: {group: between}\n", "people": PEOPLE}
+    wanted = compared(steadyhand, study(tmp_path / "logs", LOGS, [entry], **how))
+    rows = compared(steadyhand, study(tmp_path / "values", THREE, [f"{entry}, transform: log"], **how))
+    assert len(rows) == len(wanted)
+    pairs = 0
+    for row, plain in zip(rows, wanted, strict=True):
+        assert (row["effect"], row["contrast"], row["n"]) == (plain["effect"], plain["contrast"], plain["n"])
+        for name in FIGURES:
+            assert row[name] == (None if plain[name] is None else pytest.approx(plain[name], rel=1e-6))
+        assert row["method"].startswith(plain["method"])
+        assert row["mean_difference"] is None
+        if row["contrast"] is not None:
+            pairs += 1
+            of_plain = plain["details"]
+            difference = plain["effect_size"] if test == "mixed_model" else sum(of_plain["ci_difference"]) / 2
+            assert row["effect_size_name"] == "ratio of geometric means"
+            assert row["effect_size"] == pytest.approx(math.exp(difference))
+            assert row["details"]["ratio_to_first"] == pytest.approx(math.exp(-difference))
+            low, high = row["details"]["ratio_to_first_ci"]
+            assert [low, high] == pytest.approx([1 / row["ci_high"], 1 / row["ci_low"]])
+            assert row["details"]["first"] == row["contrast"].split(" - ")[0]
+            assert row["reduction"] == pytest.approx(1 - math.exp(-difference))
+    assert pairs
+
+
+def test_a_ratio_is_said_relative_to_the_baseline(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    tests = ("t_paired", "rm_anova", "mixed_model")
+    entries = [f"measure: time_s, test: {test}, transform: log" for test in tests]
+    page = read(steadyhand, study(tmp_path / "study", {"time_s": TIMES["time_s"]}, entries))
+    logs = np.log([TIMES["time_s"][name] for name in "AB"])
+    ratio = np.exp(np.mean(logs[1]) - np.mean(logs[0]))
+    phrase = f"geometric mean {ratio:.2f} times that of A"
+    assert f"Time was lower with B than with A: its {phrase} [0.75, 0.91] (p = .0013, n = 10)." in page
+    assert page.count(f"Time was significantly lower with B than with A ({phrase}, 95 % CI [0.75, 0.91];") == 3
+    assert f"rm ANOVA of logarithms: F(1, 9) = 21.07, p = .0013, η²G = .08 [.01, .19], n = 10, {phrase}" in page
+    assert "paired t test of the logarithms, t(9) = 4.59, p = .001, n = 10." in page
+    assert "of the natural logarithms of the participants' means, read as ratios of geometric means" in page
+    assert "Skewed values" not in page
+    assert "bland1996" in (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+
+
+def test_a_value_without_a_logarithm_is_said_with_the_remedy(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    times = {**TIMES["time_s"], "B": [0, *TIMES["time_s"]["B"][1:]]}
+    names = ("t_paired", "rm_anova", "mixed_model", "t_welch, between: group", "mixed_anova, between: group")
+    entries = [f"measure: time_s, test: {name}, transform: log" for name in names]
+    folder = study(tmp_path / "study", {"time_s": times}, entries, "factors: {group: between}\n", PEOPLE)
+    page = read(steadyhand, folder)
+    # Each of the groups' values is the mean of two conditions, which is above zero.
+    undefined = [row for row in steadyhand.results()["comparisons"] if row["test"] != "t_welch"]
+    assert len(undefined) >= 4
+    for row in undefined:
+        assert row["status"] == "undefined: transform log needs values above zero; leave it out, or use a rank test"
+        assert (row["statistic"], row["p"], row["effect_size"]) == (None, None, None)
+    assert "undefined: transform log needs values above zero; leave it out, or use a rank test" in page
+
+
+def test_bootstrap_intervals_of_logarithms_are_of_the_ratio(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    entry = "measure: time_s, test: t_paired, bootstrap: true, permutation: true"
+    of_logs = {"time_s": {name: LOGS["time_s"][name] for name in "AB"}}
+    (plain,) = compared(steadyhand, study(tmp_path / "logs", of_logs, [entry]))
+    page = read(steadyhand, study(tmp_path / "values", {"time_s": TIMES["time_s"]}, [f"{entry}, transform: log"]))
+    (row,) = steadyhand.results()["comparisons"]
+    low, high = plain["details"]["bootstrap_ci_difference"]
+    assert row["details"]["bootstrap_ci_ratio_to_first"] == pytest.approx([math.exp(-high), math.exp(-low)])
+    assert row["details"]["permutation_p"] == plain["details"]["permutation_p"]
+    assert "bootstrap 95 % CI of the ratio [" in page
+
+
+def test_skewed_times_are_cautioned_of_and_other_scales_are_not(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """A time's zero means none; a score's may not, and its ratio would mean nothing."""
+    values: Values = {"time_s": TIMES["time_s"], "score": TIMES["time_s"], "calm_s": {"A": [3, 4, 5], "B": [4, 6, 5]}}
+    page = read(steadyhand, study(tmp_path / "study", values, ["measure: [time_s, score, calm_s], test: t_paired"]))
+    assert "Skewed values in Time (s): transform: log in study.yaml" in page
+    shape = [row for row in steadyhand.results()["design_check"] if row["what"] == "shape of values"]
+    assert [row["measure"] for row in shape] == ["time_s"]
+    assert "paired t with transform: log would compare geometric means" in shape[0]["remark"]
+
+
+def test_a_rank_test_takes_no_transform(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: doubt, test: wilcoxon, transform: log"]))
+    assert ran.code == 2
+    assert "wilcoxon does not take transform; it is for rm_anova and t_paired" in ran.err

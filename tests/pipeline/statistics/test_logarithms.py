@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.statistics import ALL_ZERO, NO_ERROR, NOT_POSITIVE, OK
+from pipeline.statistics import ALL_ZERO, NO_ERROR, NO_LOGARITHMS, OK
 from pipeline.statistics.logarithms import (
     as_ratio,
     geometric_mean,
@@ -90,7 +90,7 @@ def test_a_value_without_logarithm_is_said(lowest: float) -> None:
     ]
     assert len(found) == 6
     for result in found:
-        assert (result.status, result.p, result.effect_size) == (NOT_POSITIVE, None, None)
+        assert (result.status, result.p, result.effect_size) == (NO_LOGARITHMS, None, None)
         assert result.n in (3, 6)
     assert found[-1].contrast == "b - c"
     assert set(geometric_mean(second).values()) == {None}
