@@ -59,6 +59,7 @@ STAGES: tuple[Stage, ...] = (
             "data_origin",
             "conditions",
             "comparisons",
+            "question",
             "factors",
             "alpha",
             "exclusions",

@@ -36,7 +36,7 @@ def anova(request: Request) -> Answer:
     if cases.values.shape[1:] == (2,):
         (pair,) = pairs.of_conditions(cases.values, cases.levels[0])
         rows = [_with_ratio_of_two(request, {**rows[0], **change_of(request, pair)}, pair, cases)]
-        rows = [diagnosed(request, rows[0], pair, cases)]
+        rows = [_with_difference_interval(request, diagnosed(request, rows[0], pair, cases), pair)]
     if request.entry.follow_up != "none":
         for follow_up in _follow_ups(request, cases):
             row = pair_row(request, follow_up.result, follow_up.pair, cases)
@@ -50,6 +50,14 @@ def _with_ratio_of_two(request: Request, row: Row, pair: pairs.Pair, cases: Comp
         return row
     paired = t_paired_ratio(pair.first, pair.second)
     return with_ratio_of(row, paired.details["log_ratio_ci"], cases.levels[0][0])
+
+
+def _with_difference_interval(request: Request, row: Row, pair: pairs.Pair) -> Row:
+    """The row of an analysis of two conditions with the interval of their mean difference, that of the paired t."""
+    if on_logarithms(request) or row["status"] != OK:
+        return row
+    bounds = t_paired(pair.first, pair.second).details["ci_difference"]
+    return {**row, "details": {**row["details"], "ci_difference": bounds}}
 
 
 def _follow_ups(request: Request, cases: CompleteCases) -> list[pairs.FollowUp]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 
@@ -13,9 +14,12 @@ def printable(text: str) -> str:
     return "".join("□" if unicodedata.category(c) == "Cc" and c != "\n" else c for c in text)
 
 
-def say(text: str) -> None:
-    """Print a line of output."""
-    print(printable(text), flush=True)  # noqa: T201
+def say(text: str, strong: bool = False) -> None:
+    """Print a line of output, a strong one in bold green where the terminal shows colours."""
+    shown = printable(text)
+    if strong and sys.stdout.isatty() and "NO_COLOR" not in os.environ:
+        shown = f"\033[1;32m{shown}\033[0m"
+    print(shown, flush=True)  # noqa: T201
 
 
 def warn(text: str) -> None:
@@ -23,18 +27,23 @@ def warn(text: str) -> None:
     print(printable(text), file=sys.stderr, flush=True)  # noqa: T201
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> None:
-    """Print rows in columns: the first `left` columns to the left, the others, which are numbers, to the right."""
+def table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1, strong: Collection[int] = frozenset()
+) -> None:
+    """Print rows in columns: the first `left` columns to the left, the others, which are numbers, to the right.
+
+    `strong` are the places of the rows that stand out.
+    """
     from rich.cells import cell_len
 
     lines = [[cell.replace("\n", " ") for cell in line] for line in (header, *rows)]
     widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
-    for line in lines:
+    for at, line in enumerate(lines, start=-1):
         padded = []
         for place, (cell, width) in enumerate(zip(line, widths, strict=True)):
             room = " " * (width - cell_len(cell))
             padded.append(cell + room if place < left else room + cell)
-        say(f"  {'  '.join(padded)}".rstrip())
+        say(f"  {'  '.join(padded)}".rstrip(), strong=at in strong)
 
 
 def short_path(path: Path) -> str:

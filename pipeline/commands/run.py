@@ -9,7 +9,7 @@ from pathlib import Path
 from pipeline.commands import console
 from pipeline.commands.publish import FORMATS, publish, publish_results, refuse_study
 from pipeline.commands.studies import for_each_study, refuse_same_names
-from pipeline.commands.summary import summary
+from pipeline.commands.summary import say_results
 from pipeline.engine.folders import reports_folder
 from pipeline.engine.messages import computed_message, session_messages
 from pipeline.engine.result import Result
@@ -79,5 +79,4 @@ def _show(result: Result) -> None:
     """What happened to the sessions, and the results in a few lines."""
     for line in session_messages(result):
         console.warn(line)
-    for line in summary(results.read(result.entry("compare") / "results.json")):
-        console.say(line)
+    say_results(results.read(result.entry("compare") / "results.json"))

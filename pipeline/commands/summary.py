@@ -6,20 +6,28 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pipeline.analysis.audit.finding import CONTRADICTION
+from pipeline.commands import console
+from pipeline.report.prose.answer import HEADER, answer, not_answered, notes
 from pipeline.words import comparison_sentence, counted, measure_label, number
 
 
-def summary(results: Mapping[str, Any]) -> Iterator[str]:
-    """Title and origin, then every comparison, and each estimator's mean error."""
+def say_results(results: Mapping[str, Any]) -> None:
+    """Print title and origin, the table of pairs that the report's first page has, and what else is to be said."""
     study = results["study"]
-    yield f"{study['title']} (data: {study['data_origin']})"
-    rows = results["comparisons"]
-    if len(study["conditions"]) > 2:  # pairs are many; the page lists them
-        rows = [row for row in rows if row["contrast"] is None]
-    for row in rows:
+    console.say(f"{study['title']} (data: {study['data_origin']})")
+    lines = answer(results)
+    if lines:
+        significant = {at for at, line in enumerate(lines) if line.significant}
+        console.table(HEADER, [line.cells for line in lines], left=4, strong=significant)
+        console.say(f"  {notes(results)}")
+    for line in summary(results):
+        console.say(line)
+
+
+def summary(results: Mapping[str, Any]) -> Iterator[str]:
+    """Tests of all conditions or of other factors, and each estimator's mean error."""
+    for row in not_answered(results):
         yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
-    if len(rows) < len(results["comparisons"]):
-        yield f"  {len(results['comparisons']) - len(rows)} pairwise comparisons: see the report"
     for row in results["accuracy_means"]:
         yield f"  {row['estimator']}: RMSE {number(row['rmse_mm'])} mm (mean of {counted(row['n'], 'session')})"
     figures = [row for row in results["printed"] if row["check"] is None]

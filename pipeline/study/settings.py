@@ -116,6 +116,7 @@ class Study(Frozen):
     factors: Mapping[Id, Literal["between"]] = {}
     scoring: Mapping[Id, Scoring] = {}
     comparisons: tuple[Comparison, ...] = ()
+    question: tuple[tuple[Id, Id], ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()
     quality_limits: QualityLimits = QualityLimits()
@@ -141,6 +142,7 @@ class Study(Frozen):
                     f"comparisons: crossover is for two conditions, and there are {len(self.conditions)}; mixed_model"
                     " with fixed: [condition, period] takes more"
                 )
+        self._question_fits()
         self._families_fit()
         self._sensors_fit()
         for kind in ("reference", "display"):
@@ -153,6 +155,13 @@ class Study(Frozen):
             raise ValueError("has no data; add sessions, trials, questionnaires or measures")
         return self
 
+    def _question_fits(self) -> None:
+        """Raise ValueError where a pair that is asked about is not of two conditions."""
+        for pair in self.question:
+            unique("question", pair)
+            for condition in pair:
+                known("question", condition, self.conditions)
+
     def _families_fit(self) -> None:
         """Raise ValueError where the tests of one family are adjusted in different ways."""
         ways: dict[str, str] = {}
@@ -163,6 +172,14 @@ class Study(Frozen):
             ):
                 ways_named = f"{ways[comparison.family]} and {comparison.adjust}"
                 raise ValueError(f'comparisons: family "{comparison.family}" is adjusted by {ways_named}; keep one')
+
+    @property
+    def asked_pairs(self) -> tuple[tuple[str, str], ...]:
+        """The pairs of conditions to answer for, in their order in `conditions`: by default the baseline with each."""
+        if not self.question:
+            return tuple((self.conditions[0], other) for other in self.conditions[1:])
+        first, second = zip(*(sorted(pair, key=self.conditions.index) for pair in self.question), strict=True)
+        return tuple(dict.fromkeys(zip(first, second, strict=True)))
 
     def exclusion_of(self, session: Session) -> Exclusion | None:
         """The first decision by which a session is left out as a whole."""

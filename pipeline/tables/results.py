@@ -26,6 +26,7 @@ def write(path: Path, name: str, study: Study, frames: Mapping[str, pd.DataFrame
         "title": study.title,
         "data_origin": study.data_origin,
         "conditions": list(study.conditions),
+        "question": [list(pair) for pair in study.asked_pairs],
         "alpha": study.alpha,
         "participants": dict(people),
     }

@@ -15,9 +15,12 @@ from pipeline.report.document.model import (
     Paragraph,
     Section,
     Strong,
+    Table,
     Text,
+    columns,
 )
 from pipeline.report.figures.rainclouds import met_one_each
+from pipeline.report.prose.answer import HEADER, answer, notes, shown
 from pipeline.report.sections import traces
 from pipeline.report.sections.cautions import cautions
 from pipeline.report.sections.material import ORIGINS, Material
@@ -30,7 +33,6 @@ from pipeline.words import (
     NOTHING,
     adjustment,
     amount_of_change,
-    change_phrase,
     comparison_sentence,
     counted,
     decisive_p,
@@ -60,6 +62,7 @@ def section(material: Material) -> Section:
     keys = _key_figures(material)
     if keys:
         blocks.append(KeyFigures(tuple(keys)))
+    blocks += _pairs(material)
     blocks += _figure(material)
     blocks.append(Paragraph(_data(material)))
     found = cautions(material)
@@ -70,6 +73,24 @@ def section(material: Material) -> Section:
         told = "Look at every session closely, as the tracker recorded it and as each estimator reconstructed it: "
         blocks.append(Paragraph((told, Link(traces.PAGE, traces.PAGE), ".")))
     return Section("summary", "Summary", tuple(blocks))
+
+
+def _pairs(material: Material) -> list[Block]:
+    """The table of pairs, or as many of its lines as there is room for, with the rest named."""
+    lines = answer(material.results)
+    kept = shown(lines)
+    if not kept:
+        return []
+    left_out = list(dict.fromkeys(line.measure for line in lines[len(kept) :]))
+    more = f" Not shown here: {listing(left_out)}; see the results." if left_out else ""
+    table = Table(
+        "table-answer",
+        "The answer: by how much each pair differs, in the unit of the measure.",
+        columns(HEADER, 4),
+        tuple(line.cells for line in kept),
+        f"{notes(material.results)}{more}",
+    )
+    return [table]
 
 
 def _answer(material: Material) -> Text:
@@ -225,6 +246,9 @@ def _headline_rows(material: Material) -> list[Row]:
 
 
 def _key_figures(material: Material) -> list[KeyFigure]:
+    """Up to three large figures; of more than two conditions none, for no single one answers."""
+    if len(material.study.conditions) > 2 and material.rows("comparisons"):
+        return []
     keys = [_key_figure(row) for row in _headline_rows(material)]
     return (keys or _accuracy_keys(material))[:_KEY_FIGURES_MAX]
 
@@ -260,16 +284,11 @@ def _evidence(material: Material) -> list[Text]:
     """What the answer rests on: a sentence a headline, one for the questionnaires, one for the estimators."""
     answers: list[Text] = []
     for row in _headline_rows(material):
-        label = measure_label(row["measure"])
-        if row["status"] != "ok":
-            answers.append((Strong(f"{label}: "), f"{comparison_sentence(row)}."))
-            continue
-        change = ""
-        if row["mean_difference"] is not None:
-            first, second = material.study.conditions
-            change = f"{change_phrase(row)} with {second} relative to {first}; "
-        said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_change=False)})"
-        answers.append((Strong(f"{label}: "), f"{change}{said}."))
+        if row["contrast"] is None and row["mean_difference"] is None and not ratio_to_first(row):
+            said = comparison_sentence(row)
+            if row["status"] == "ok":
+                said = f"{verdict(row, material.study.alpha)} ({said})"
+            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     for row in _of_conditions(material):
         if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
             said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_change=False)})"
