@@ -3,6 +3,7 @@
 NumPy, SciPy and Numba only: no files, sockets, clocks or DataFrames. The README has the notation table.
 """
 
+from fusion_core.adaptive.fusion import FusionAdaptive
 from fusion_core.estimator import Estimator, replay_loop
 from fusion_core.filters import Holt, OneEuro, Raw
 from fusion_core.kalman.fusion import FusionKalman
@@ -12,13 +13,14 @@ from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import OPERATORS, Sensor, Term
 from fusion_core.window.gp import WindowGP
 
-ESTIMATORS: dict[str, type[Raw | OneEuro | Holt | PositionKalman | WindowGP | FusionKalman]] = {
+ESTIMATORS: dict[str, type[Raw | OneEuro | Holt | PositionKalman | WindowGP | FusionKalman | FusionAdaptive]] = {
     "raw": Raw,
     "one_euro": OneEuro,
     "holt": Holt,
     "position_kalman": PositionKalman,
     "window_gp": WindowGP,
     "fusion_kalman": FusionKalman,
+    "fusion_adaptive": FusionAdaptive,
 }
 """Every estimator by the name study.yaml gives as `type`."""
 
@@ -27,6 +29,7 @@ __all__ = [
     "OPERATORS",
     "Estimator",
     "FloatArray",
+    "FusionAdaptive",
     "FusionKalman",
     "Holt",
     "OneEuro",

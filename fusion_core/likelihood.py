@@ -56,7 +56,7 @@ def log_likelihood_by_replay(estimator: Estimator, samples: Mapping[str, Samples
     The estimate's SD and the tracker's noise together are taken as the SD of the position.
     """
     at_once = {
-        name: Samples(stream.time, stream.time, stream.value, stream.rotation)
+        name: Samples(stream.time, stream.time, stream.value, stream.rotation, stream.force)
         for name, stream in ((name, _by_time(stream)) for name, stream in samples.items())
     }
     tracker = position_sensor(estimator.sensors)
@@ -73,7 +73,8 @@ def _by_time(stream: Samples) -> Samples:
     """The readings in order of measurement."""
     order = np.argsort(stream.time, kind="stable")
     rotation = None if stream.rotation is None else stream.rotation[order]
-    return Samples(stream.time[order], np.sort(stream.arrival), stream.value[order], rotation)
+    force = None if stream.force is None else stream.force[order]
+    return Samples(stream.time[order], np.sort(stream.arrival), stream.value[order], rotation, force)
 
 
 def maximise(

@@ -42,6 +42,7 @@ def estimator(name: str) -> None:
 
 # The longest first, so that none of them is waited for at the end.
 PIECES: tuple[tuple[Callable[..., None], tuple[object, ...]], ...] = (
+    (estimator, ("fusion_adaptive",)),
     (estimator, ("fusion_kalman",)),
     (test_simulation.test_the_compiled_loop_is_the_plain_one, ("kinect",)),
     (estimator, ("window_gp",)),

@@ -103,7 +103,8 @@ def _part(samples: Mapping[str, Samples], since: float, until: float) -> dict[st
     for name, stream in samples.items():
         kept = (stream.arrival >= since) & (stream.arrival < until)
         rotation = None if stream.rotation is None else stream.rotation[kept]
-        part[name] = Samples(stream.time[kept], stream.arrival[kept], stream.value[kept], rotation)
+        force = None if stream.force is None else stream.force[kept]
+        part[name] = Samples(stream.time[kept], stream.arrival[kept], stream.value[kept], rotation, force)
     return part
 
 

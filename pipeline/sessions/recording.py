@@ -175,7 +175,7 @@ def _of_axes(samples: Samples, study: Study, name: str) -> Samples:
     """A sensor's readings, with those of its axes that are analysed."""
     index = [_AXES.index(axis) for axis in study.axes_of(name)]
     rotation = None if samples.rotation is None else samples.rotation[:, index]
-    return Samples(samples.time, samples.arrival, samples.value[:, index], rotation)
+    return Samples(samples.time, samples.arrival, samples.value[:, index], rotation, samples.force)
 
 
 def _only_stream_of(study: Study, kind: type, whole: dict[str, Samples]) -> Samples | None:

@@ -229,7 +229,7 @@ def _attempt(
     if ready is not None:
         loop_steps.run(*walking, ready, instants)
     else:
-        _run_uncompiled(estimator, (names, imu_name), rotation, instants, walking)
+        _run_uncompiled(estimator, (names, imu_name), (phone, rotation, np.array(imu.gravity_mm_s2)), instants, walking)
     step, shown_until = int(hand.progress[STEP]), int(session.next[2])
     outcome = Outcome(
         settings.still_before_s,
@@ -251,7 +251,7 @@ def _attempt(
 def _run_uncompiled(
     estimator: Estimator,
     names: tuple[str, str],
-    rotation: FloatArray,
+    held: tuple[sensing.Phone, FloatArray, FloatArray],
     instants: FloatArray,
     walking: tuple[Any, ...],
 ) -> None:
@@ -259,6 +259,7 @@ def _run_uncompiled(
     from fusion_core import Sample
 
     hand, sensed, readings, session = walking[4], walking[6], walking[7], walking[8]
+    phone, rotation, gravity_mm_s2 = held
     order = np.argsort(np.concatenate([readings.frame_arrival, readings.force_arrival]), kind="stable")
     state, upcoming, count = estimator.start(), 0, len(readings.frame_arrival)
     for index, now in enumerate(instants):
@@ -275,11 +276,24 @@ def _run_uncompiled(
             if is_frame:
                 sample = Sample(readings.frame_time[row], arrival, readings.frame_mm[row].copy())
             else:
-                sample = Sample(readings.force_time[row], arrival, readings.force_mm_s2[row].copy(), rotation[row])
+                force = _felt(phone, gravity_mm_s2, session.trace, row)
+                value = readings.force_mm_s2[row].copy()
+                sample = Sample(readings.force_time[row], arrival, value, rotation[row], force)
             state = estimator.update(state, names[0 if is_frame else 1], sample)
             upcoming += 1
         session.shown[index] = estimator.predict(state, float(now))[0]
         session.next[2] = index + 1
+
+
+def _felt(phone: sensing.Phone, gravity_mm_s2: FloatArray, trace: FloatArray, row: int) -> FloatArray:
+    """The specific force of a reading (3,), in the phone's frame, as the log will have it."""
+    time_ns = int(phone.time_ns[row])
+    step = max(-(-time_ns // loop_steps.STEP_NS), 1)
+    share = 1.0 - (step * loop_steps.STEP_NS - time_ns) / loop_steps.STEP_NS
+    acceleration = np.zeros(3)
+    acceleration[:2] = trace[step - 1, 2:4] + share * (trace[step, 2:4] - trace[step - 1, 2:4])
+    force: FloatArray = phone.to_body[row] @ (acceleration - gravity_mm_s2) + phone.error_mm_s2[row]
+    return force
 
 
 def _first(readings: Any, count: int) -> Any:

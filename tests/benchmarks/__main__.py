@@ -11,11 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fusion_core import ESTIMATORS, Estimator, FusionKalman, Samples, Sensor, WindowGP, replay_loop
+from fusion_core import ESTIMATORS, Estimator, FusionAdaptive, FusionKalman, Samples, Sensor, WindowGP, replay_loop
 from tests.benchmarks import archive, coverage, peers
 from tests.benchmarks.error_rates import error_rates
 from tests.benchmarks.people import people
 from tests.benchmarks.reading import reading
+from tests.benchmarks.stress import stress
 from tests.benchmarks.timing import fastest
 from tests.conftest import CLONE
 
@@ -59,6 +60,7 @@ OURS: dict[str, Estimator] = {
     "fusion_kalman, fixed gain": FusionKalman(
         RATED, bias_frame="tracker", gate_sd=0.0, adaptation=0.0, path="fixed_gain"
     ),
+    "fusion_adaptive": FusionAdaptive(RATED),
     "fusion_kalman, event time, body-frame bias": FusionKalman(RATED),
 }
 
@@ -149,3 +151,4 @@ if __name__ == "__main__":
     coverage.errors_and_counts()
     archive.measure(archive.SMALL)
     error_rates()
+    stress()

@@ -35,6 +35,8 @@ def build(name: str, **sensors: Sensor) -> Estimator:
     kind, used, parameters = VARIANTS[name]
     if sensors and parameters.get("path") == "fixed_gain":
         pytest.skip("fixed gains are of two sensors")
+    if sensors and kind == "fusion_adaptive":
+        pytest.skip("fusion_adaptive is of two sensors")
     return ESTIMATORS[kind](sensors or used, **parameters)
 
 

@@ -28,6 +28,7 @@ _OF_ESTIMATOR = {
     "position_kalman": "kalman1960",
     "window_gp": PAPER,
     "fusion_kalman": "kalman1960",
+    "fusion_adaptive": "kalman1960",
 }
 _OF_PACKAGE = {
     "numpy": "harris2020",

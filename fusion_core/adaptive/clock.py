@@ -1,0 +1,157 @@
+"""How far the tracker's clock is off: small filters that take each frame for earlier or later than its stamp says.
+
+All have one covariance, since the same readings reach each, only elsewhere in time; they differ in their means. Their
+log likelihoods, with forgetting, are a parabola about the true offset, whose vertex and bend are the offset and its SD.
+As a state of the large filter the offset would hang on an estimated velocity, and what is wrong with that (noise that
+is heavier or longer than thought) pulls it away; a likelihood is not pulled.
+
+Only the *difference* of the two clocks shows. The phone's is believed, unless its stamps are ahead of their arrival.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusion_core.adaptive import rows
+from fusion_core.adaptive.bank import weighed
+from fusion_core.adaptive.layout import (
+    AT,
+    BEGAN,
+    CLOCK_S,
+    CLOCK_VARIANCE,
+    NOISE,
+    NOISE_DRIFT,
+    NOISE_DRIFT_S,
+    OFFSETS,
+    ROWS,
+    TRUST,
+    VELOCITY,
+    Model,
+    State,
+)
+from fusion_core.compilation import compiled
+from fusion_core.samples import FloatArray
+
+STEP_S = 0.02  # between the offsets tried: less than the width of the likelihood of any motion but a thrust
+FIRST_S = -0.14  # the tracker is later than stated by so much
+MANY = OFFSETS  # up to 60 ms earlier
+_FORGET_S = 10.0  # as the bank does
+_PRIOR_SD_S = 0.02  # of a stated latency: trackers' own figures are right within a frame or so
+_LEAST_SD_S = 0.002  # the past is forgotten so far as to leave no more certainty: a latency wanders
+_RATE_SD, _RATE_PSD = 1000.0, 900.0  # of the acceleration error, as in the bank
+
+
+@compiled
+def begin(model: Model, state: State, position: FloatArray) -> None:
+    """At the first position."""
+    own = state.clock_covariance
+    state.clock_mean[:], own[:], state.clock_weight[:] = 0.0, 0.0, 0.0
+    begin_again(model, state, position)
+    judge(state)
+
+
+@compiled
+def begin_again(model: Model, state: State, position: FloatArray) -> None:
+    """The motion begins anew at a position; weights stay."""
+    own, drift = state.clock_covariance, state.fact[NOISE_DRIFT]
+    state.clock_mean[:], own[:] = 0.0, 0.0
+    own[0, 0], own[1, 1], own[2, 2] = state.fact[NOISE] + drift, model.prior[VELOCITY], _RATE_SD**2
+    own[3, 3], own[0, 3], own[3, 0] = drift, -drift, -drift
+    for one in range(MANY):
+        for axis in range(model.dimension):
+            state.clock_mean[one, 0, axis] = position[axis]
+
+
+@compiled
+def take_in(
+    model: Model, state: State, before: float, time: float, value: FloatArray, more_psd: float, more: float, news: bool
+) -> None:
+    """All moved from the stamp `before` to `time`, each by its own offset; and with `news` the position taken in."""
+    dt = time - before
+    if dt <= 0.0:
+        return
+    own, apart, net, arm = state.clock_covariance, np.empty((MANY, 3)), np.empty((2, 3)), np.empty(3)
+    _move(state, own, dt, more_psd)
+    first = rows.row_before(state, before + FIRST_S)
+    times = state.time[first : state.count[ROWS]]
+    accelerations, arms = np.empty((len(times), 3)), np.zeros((len(times), 3))
+    rows.corrected(state, first, model.dimension, accelerations, arms)
+    kept = np.exp(-dt / state.fact[NOISE_DRIFT_S]) if state.fact[NOISE_DRIFT_S] > 0.0 else 0.0
+    for one in range(MANY):
+        offset, mean = FIRST_S + one * STEP_S, state.clock_mean[one]
+        rows.integrate(times, accelerations, before + offset, time + offset, net)
+        rows.between(times, arms, time + offset, arm)
+        for axis in range(model.dimension):
+            mean[0, axis] += dt * mean[1, axis] + dt * dt / 2.0 * mean[2, axis] + net[1, axis]
+            mean[1, axis] += dt * mean[2, axis] + net[0, axis]
+            mean[3, axis] *= kept
+            apart[one, axis] = value[axis] - mean[0, axis] - mean[3, axis] - arm[axis]
+    if news:
+        _correct(model, state, own, apart, more, dt)
+
+
+@compiled
+def _move(state: State, own: FloatArray, dt: float, more_psd: float) -> None:
+    """The covariance of all moved over `dt` seconds, as that of a member of the bank."""
+    drift_s, half, psd = state.fact[NOISE_DRIFT_S], dt * dt / 2.0, state.fact[TRUST] + more_psd
+    kept = np.exp(-dt / drift_s) if drift_s > 0.0 else 0.0
+    for column in range(4):
+        own[0, column] += dt * own[1, column] + half * own[2, column]
+        own[1, column] += dt * own[2, column]
+        own[3, column] *= kept
+    for row in range(4):
+        own[row, 0] += dt * own[row, 1] + half * own[row, 2]
+        own[row, 1] += dt * own[row, 2]
+        own[row, 3] *= kept
+    own[0, 0] += psd * dt * half * 2.0 / 3.0
+    own[0, 1] += psd * half
+    own[1, 0] += psd * half
+    own[1, 1] += psd * dt
+    own[2, 2] += _RATE_PSD * dt
+    own[3, 3] += (1.0 - kept * kept) * state.fact[NOISE_DRIFT]
+
+
+@compiled
+def _correct(model: Model, state: State, own: FloatArray, apart: FloatArray, more: float, dt: float) -> None:
+    """A position taken in by all, with one gain, and their weights moved by how likely it was to each."""
+    kept = np.exp(-dt / min(_FORGET_S, 1.0 + (state.fact[AT] - state.fact[BEGAN]) / 2.0))
+    shared = np.empty(4)
+    for row in range(4):
+        shared[row] = own[0, row] + own[3, row]
+    variance = shared[0] + shared[3] + state.fact[NOISE] + more
+    best = np.inf
+    for one in range(MANY):
+        squared = 0.0
+        for axis in range(model.dimension):
+            squared += apart[one, axis] ** 2 / variance
+        best = min(best, squared)
+        state.clock_weight[one] = kept * state.clock_weight[one] + weighed(model, squared, variance)
+    variance *= max(best / model.surprise, 1.0)
+    for row in range(4):
+        for one in range(MANY):
+            for axis in range(model.dimension):
+                state.clock_mean[one, row, axis] += shared[row] / variance * apart[one, axis]
+    for row in range(4):
+        for column in range(4):
+            own[row, column] -= shared[row] * shared[column] / variance
+
+
+@compiled
+def judge(state: State) -> None:
+    """The offset and its variance: the vertex and bend of the log weights about the highest, with the prior's."""
+    prior, best, highest = 1.0 / _PRIOR_SD_S**2, 0, -np.inf
+    for one in range(1, MANY - 1):
+        offset = FIRST_S + one * STEP_S
+        log_weight = state.clock_weight[one] - 0.5 * prior * offset * offset
+        if log_weight > highest:
+            best, highest = one, log_weight
+    before, here, after = state.clock_weight[best - 1], state.clock_weight[best], state.clock_weight[best + 1]
+    bend = max(-(before - 2.0 * here + after) / STEP_S**2, 0.0)
+    most = 1.0 / _LEAST_SD_S**2
+    if bend > most:
+        state.clock_weight[:] *= most / bend
+    slope = (after - before) / (2.0 * STEP_S)
+    offset = FIRST_S + best * STEP_S
+    vertex = (bend * offset + slope) / (bend + prior)
+    state.fact[CLOCK_S] = min(max(vertex, offset - STEP_S), offset + STEP_S)
+    state.fact[CLOCK_VARIANCE] = 1.0 / (bend + prior)

@@ -1,0 +1,211 @@
+"""The adaptive filter as an estimator: its members and priors, states that are values, and replay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri
+
+from fusion_core.adaptive import layout, shown, steps
+from fusion_core.adaptive.layout import FELT, ORIENTED, ROWS, UNTURNED, Model, State
+from fusion_core.checks import require_positive
+from fusion_core.estimator import require_reading, require_readings
+from fusion_core.samples import FloatArray, Sample, Samples, Track
+from fusion_core.sensors import Sensor, position_sensor, require_covered, require_fit
+
+_RARE = 0.003  # how often a position of ordinary noise is taken for a surprise
+_ROOM = 64  # rows, more than are kept between two readings of most phones
+
+_PRIOR_SD = {
+    layout.BIAS: (3, 300.0, 10.0),  # how many, SD, walk per √s: mm/s²
+    layout.MOUNTING: (3, 0.05, 0.0),  # rad: 3°
+    layout.OFFSET: (3, 100.0, 5.0),  # mm/s²: half a degree of tilt
+    layout.TURN: (2, 0.1, 0.002),  # 6°, or 10 % of scale
+    layout.ARM: (3, 50.0, 0.0),  # mm
+}
+_SPEED_SD = 500.0  # mm/s, as of fusion_kalman: a hand that reaches
+
+_NOISE = (0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0)  # times the tracker's stated SD
+_TRUST = (30.0, 100.0, 300.0, 1e3, 1e4, 1e5, 1e6)  # densities of acceleration errors, mm²/s³
+_USUAL_TRUST, _TRUST_SPREAD = 200.0, 1.5  # what phones in the hand came to, and the SD of its logarithm
+_NOISE_SPREAD = 0.35  # SD of the logarithm of noise over stated noise
+# Correlated noise: its SD, times the stated one, its time in s, and the trust of accelerations with it.
+_DRIFT_NOISE, _DRIFT_S, _DRIFT_TRUST = (0.63, 1.0, 1.6), (0.2, 1.0), (30.0, 100.0, 300.0, 1e4)
+_DRIFT_WHITE = 0.1  # of the SD: with more, quick correlated noise is taken for a smaller one that is partly white
+_DRIFT_ODDS = -3.0  # log odds of such noise before any position, one recording in twenty
+_RATE_WALK = 30.0  # mm/s² per √s, of a member's acceleration error
+_JERK_PSD, _ALONE_NOISE = (1e6, 1e7, 1e8, 1e9), (1.0, 2.0)  # of members that do not use the phone
+
+
+@dataclass(frozen=True)
+class FusionAdaptive:
+    """One tracker and one accelerometer, which need be no more than roughly what they are stated to be.
+
+    Found from the readings: the tracker's noise, its correlation and its clock, the accelerometer's bias, mounting and
+    trust, and the lever arm from it to the tracked point. A stated latency is where the clock's search begins, a stated
+    noise where the noise's does. Readings later than `history_s` are left out.
+
+    Raises ValueError for other sensors than these two, or a sensor later than the history.
+    """
+
+    sensors: Mapping[str, Sensor]
+    history_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_fit(self.sensors)
+        require_positive(history_s=self.history_s)
+        require_covered(self.sensors, "history_s", self.history_s)
+        orders = sorted(-1 if sensor.order is None else sensor.order for sensor in self.sensors.values())
+        if orders != [0, 2] or any(sensor.axes is not None for sensor in self.sensors.values()):
+            raise ValueError(
+                "fusion_adaptive is for one tracker and one accelerometer, each of all axes; fusion_kalman takes any"
+            )
+
+    @cached_property
+    def tracker(self) -> str:
+        """The name of the position sensor."""
+        return position_sensor(self.sensors)
+
+    @property
+    def dimension(self) -> int:
+        """Of the position."""
+        return self.sensors[self.tracker].dimension
+
+    @cached_property
+    def model(self) -> Model:
+        """Priors and members, by what the sensors state."""
+        noise_sd, dimension = self.sensors[self.tracker].noise_sd, self.dimension
+        prior, walk = np.zeros(layout.SIZE), np.zeros(layout.SIZE)
+        prior[layout.POSITION : layout.POSITION + dimension] = noise_sd**2
+        prior[layout.VELOCITY : layout.VELOCITY + dimension] = _SPEED_SD**2
+        for begin, (count, sd, drift) in _PRIOR_SD.items():
+            end = begin + (dimension if begin == layout.OFFSET else count)
+            prior[begin:end], walk[begin:end] = sd**2, drift**2
+        member, log_prior = _members(noise_sd)
+        return Model(
+            dimension=dimension,
+            prior=prior,
+            walk=walk,
+            member=member,
+            log_member=np.log(np.maximum(member, np.finfo(float).tiny)),
+            first_alone=int(np.sum(member[layout.USES_PHONE])),
+            log_prior=log_prior,
+            surprise=float(chdtri(dimension, _RARE)),
+            history_s=float(self.history_s),
+        )
+
+    def start(self) -> State:
+        """Nothing seen. What a reading needs is compiled by now."""
+        return layout.empty(self.model, 1)
+
+    def update(self, state: State, sensor: str, sample: Sample) -> State:
+        """A copy of the state with the reading taken in; a position waits for the phone's readings up to its time."""
+        if sensor not in self.sensors:
+            return state
+        require_reading(sensor, self.sensors[sensor], sample)
+        room = layout.empty(self.model, int(state.count[ROWS]) + 1)
+        steps.copied(self.model, state, room)
+        is_frame = sensor == self.tracker
+        value = np.ascontiguousarray(sample.value, dtype=np.float64)
+        rotation, force, known = self._orientation(sample.rotation, sample.force)
+        steps.arrive(self.model, room, is_frame, sample.time, sample.arrival, value, rotation, force, known)
+        return room
+
+    @cached_property
+    def _upright(self) -> FloatArray:
+        return np.eye(self.dimension, 3)
+
+    def _orientation(
+        self, rotation: FloatArray | None, force: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Rotation (d, 3), force (3,), and how much of them is known."""
+        if rotation is None:
+            return self._upright, np.zeros(3), UNTURNED
+        if force is None:
+            return np.ascontiguousarray(rotation), np.zeros(3), ORIENTED
+        return np.ascontiguousarray(rotation), np.ascontiguousarray(force), FELT
+
+    def predict(self, state: State, time: float) -> tuple[FloatArray, FloatArray]:
+        """What is known, moved on to `time`."""
+        mean, sd = np.empty(self.dimension), np.empty(self.dimension)
+        shown.expect(self.model, state, time, mean, sd)
+        return mean, sd
+
+    def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
+        """The same steps in one compiled loop."""
+        require_readings(self.sensors, samples)
+        return self.traced(samples, times, np.empty((0, 0)))
+
+    def traced(self, samples: Mapping[str, Samples], times: FloatArray, trace: FloatArray) -> Track:
+        """The same; `trace` (n, FACTS + 2 SIZE) takes facts, mean and its SDs at `times`, which then must rise."""
+        order = np.argsort(times, kind="stable")
+        mean, sd = np.empty((2, len(times), self.dimension))
+        rising = np.asarray(times, dtype=np.float64)[order]
+        readings = self._readings(samples)
+        state = layout.empty(self.model, 2 * self._most_kept(samples) + _ROOM)
+        mean[order], sd[order] = steps.replay(self.model, state, *readings, rising, trace)  # type: ignore[call-arg]
+        return Track(times, mean, sd)
+
+    def _most_kept(self, samples: Mapping[str, Samples]) -> int:
+        """The largest number of the phone's readings within the time that rows are kept."""
+        most = 0
+        for name, stream in samples.items():
+            if name in self.sensors and name != self.tracker and len(stream):
+                time = np.sort(stream.time)
+                since = np.searchsorted(time, time - 2.0 * self.history_s - 1.0, side="left")
+                most = int(np.max(np.arange(len(time)) + 1 - since))
+        return most
+
+    def _readings(self, samples: Mapping[str, Samples]) -> tuple[Any, ...]:
+        """All readings by arrival, in the sensors' order where they arrive at once, as columns of `steps.replay`."""
+        columns = [self._columns(name, samples[name]) for name in self.sensors if name in samples]
+        if not columns:
+            columns = [self._columns(self.tracker, Samples(np.empty(0), np.empty(0), np.empty((0, self.dimension))))]
+        joined = [np.concatenate(column) for column in zip(*columns, strict=True)]
+        order = np.argsort(joined[2], kind="stable")
+        return tuple(column[order] for column in joined)
+
+    def _columns(self, name: str, stream: Samples) -> list[Any]:
+        count, dimension = len(stream), self.dimension
+        rotation = np.broadcast_to(self._upright, (count, dimension, 3)) if stream.rotation is None else stream.rotation
+        force = np.zeros((count, 3)) if stream.force is None else stream.force
+        known = UNTURNED if stream.rotation is None else ORIENTED if stream.force is None else FELT
+        return [
+            np.full(count, name == self.tracker),
+            np.asarray(stream.time, dtype=np.float64),
+            np.asarray(stream.arrival, dtype=np.float64),
+            np.asarray(stream.value, dtype=np.float64),
+            np.asarray(rotation, dtype=np.float64),
+            np.asarray(force, dtype=np.float64),
+            np.full(count, known),
+        ]
+
+
+def _members(noise_sd: float) -> tuple[FloatArray, FloatArray]:
+    """The bank's members (MEMBER, n) and their log priors (n,)."""
+    found: list[tuple[tuple[float, ...], float]] = []
+    for noise, trust in product(_NOISE, _TRUST):
+        parameters = ((noise * noise_sd) ** 2, trust, _RATE_WALK**2, 1.0, 0.0, 0.0)
+        found.append((parameters, _log_odds(noise) + _log_trust(trust)))
+    for noise, time_s, trust in product(_DRIFT_NOISE, _DRIFT_S, _DRIFT_TRUST):
+        drift = (noise * noise_sd) ** 2
+        parameters = (_DRIFT_WHITE**2 * drift, trust, _RATE_WALK**2, 1.0, drift, time_s)
+        found.append((parameters, _log_odds(noise) + _log_trust(trust) + _DRIFT_ODDS))
+    for noise, jerk_psd in product(_ALONE_NOISE, _JERK_PSD):
+        found.append((((noise * noise_sd) ** 2, 0.0, jerk_psd, 0.0, 0.0, 0.0), _log_odds(noise)))
+    columns = np.array([parameters for parameters, _ in found]).T.copy()
+    return columns, np.array([odds for _, odds in found])
+
+
+def _log_odds(noise: float) -> float:
+    """The stated noise is right within a factor of 1.4, more or less: a few seconds of positions say more."""
+    return float(-0.5 * (np.log(noise) / _NOISE_SPREAD) ** 2)
+
+
+def _log_trust(psd: float) -> float:
+    return float(-0.5 * (np.log(psd / _USUAL_TRUST) / _TRUST_SPREAD) ** 2)
