@@ -24,9 +24,11 @@ _EFFECT_SIZES = {
     "matched-pairs rank-biserial": "r_rb",
     "rank-biserial": "r_rb",
     "rank epsilon squared": "ε²",
+    "odds ratio": "OR",
+    "eta squared Q": "η²Q",
     "Kendall's W": "W",
 }
-_NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W", "ε²")  # printed without a leading zero, as APA has it
+_NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W", "ε²", "η²Q")  # printed without a leading zero, as APA has it
 EFFECTS_OF_CONDITION = ("condition", "treatment")
 """What a test calls the effect of the conditions."""
 _SEVERAL = "the differences between conditions are"
@@ -158,6 +160,8 @@ def statistic_value(row: Row) -> str:
     value = row["statistic"]
     if value is None or row["statistic_name"] == "BF10":
         return number(value)
+    if row["statistic_name"] == "b":
+        return f"{value:.0f}, c = {row['details']['c']}"
     if row["statistic_name"] == "W+":
         return f"{value:.0f}" if float(value).is_integer() else f"{value:.1f}"
     return _fixed(value, 2)
@@ -171,7 +175,7 @@ def degrees_of_freedom(row: Row) -> str:
 def effect_size(row: Row, before_interval: str = " ") -> str:
     """`d_z = 0.65 [0.01, 1.27]`, `η²G = .10 [.00, .29]`; a ratio as `ratio_to_first` has it."""
     if row["effect_size"] is None:
-        return NOTHING
+        return str((row["details"] or {}).get("no_effect_size", NOTHING))
     if row["effect_size_name"] == RATIO and ratio_to_first(row):
         return ratio_to_first(row, before_interval)
     bounds = effect_interval(row)
@@ -206,8 +210,8 @@ def ratio_to_first(row: Row, before_interval: str = " ") -> str:
     if details.get("ratio_to_first") is None:
         return ""
     of = "the first" if details["first"] is None else details["first"]
-    value = f"geometric mean {number(details['ratio_to_first'])} times that of {of}"
     bounds = interval(*details["ratio_to_first_ci"])
+    value = f"geometric mean {number(details['ratio_to_first'])} times that of {of}"
     return value if bounds == NOTHING else f"{value}{before_interval}{bounds}"
 
 
@@ -281,7 +285,7 @@ def evidence(row: Row, digits: int = 4, before_interval: str = " ") -> str:
         parts.append(corrected(row, digits) or "")
     if row["p_adjusted"] is not None:
         parts.append(p_phrase(row["p_adjusted"], f"{adjustment(row['adjust'])}-adjusted p", digits))
-    if row["effect_size"] is not None:
+    if row["effect_size"] is not None or row["ci_low"] is not None:
         parts.append(effect_size(row, before_interval))
     parts += [text for text in (permutation(row, digits), bootstrap(row)) if text]
     return ", ".join(parts)
@@ -292,9 +296,8 @@ def permutation(row: Row, digits: int = 4) -> str:
     details = row["details"] or {}
     if details.get("permutation_p") is None:
         return ""
-    return p_phrase(
-        details["permutation_p"], f"{'exact ' if details['permutation_exact'] else ''}permutation p", digits
-    )
+    exact = "exact " if details["permutation_exact"] else ""
+    return p_phrase(details["permutation_p"], f"{exact}permutation p", digits)
 
 
 def bootstrap(row: Row) -> str:
@@ -302,12 +305,11 @@ def bootstrap(row: Row) -> str:
     details = row["details"] or {}
     if "bootstrap_seed" not in details:
         return ""
-    if details.get("bootstrap_ci_ratio_to_first"):
-        return f"bootstrap 95 % CI of the ratio {interval(*details['bootstrap_ci_ratio_to_first'])}"
-    bounds = details.get("bootstrap_ci_difference")
-    if bounds is None:
-        return str(details["no_bootstrap"])
-    return f"mean difference = {number(row['mean_difference'])}, bootstrap 95 % CI {interval(*bounds)}"
+    of_ratio, of_difference = (details.get(f"bootstrap_ci_{of}") for of in ("ratio_to_first", "difference"))
+    if of_ratio:
+        return f"bootstrap 95 % CI of the ratio {interval(*of_ratio)}"
+    mean = f"mean difference = {number(row['mean_difference'])}, bootstrap 95 % CI "
+    return mean + interval(*of_difference) if of_difference else str(details["no_bootstrap"])
 
 
 def adjustment(method: str) -> str:
@@ -333,7 +335,8 @@ def verdict(row: Row, alpha: float) -> str:
 
 def reduction_of(row: Row) -> float | None:
     """A row's reduction, where a percentage means something: only on a scale known to have a zero that means none."""
-    return row["reduction"] if measure(row["measure"]).scale == "ratio" else None
+    none_is_zero = measure(row["measure"]).scale == "ratio" or TESTS[row["test"]].values == "counts"
+    return row["reduction"] if none_is_zero and TESTS[row["test"]].values != "answers" else None
 
 
 def amount_of_change(row: Row) -> str:
@@ -341,7 +344,15 @@ def amount_of_change(row: Row) -> str:
     reduction = reduction_of(row)
     if reduction is not None:
         return percent(abs(reduction))
-    return f"{number(abs(row['mean_difference']))} {unit_of(row['measure'])}".strip()
+    return difference_phrase(row)
+
+
+def difference_phrase(row: Row) -> str:
+    """`0.42 mm`: the size of the difference of the means in its unit; of answers in percentage points."""
+    size = abs(row["mean_difference"])
+    if TESTS[row["test"]].values == "answers":
+        return f"{number(100 * size, 1)} percentage points"
+    return f"{number(size)} {unit_of(row['measure'])}".strip()
 
 
 def direction(row: Row) -> str:

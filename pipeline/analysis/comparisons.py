@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import pandas as pd
 
-from pipeline.analysis import families
+from pipeline.analysis import error_tests, families
 from pipeline.analysis.between_tests import all_groups, mixed_design, pairs_of_groups, welch_t
 from pipeline.analysis.comparison_rows import Answer
 from pipeline.analysis.complete_cases import Request
@@ -103,6 +103,10 @@ RUN: Mapping[str, Callable[[Request], Answer]] = {
     "tost": pairwise(lambda request, first, second: tost(first, second, request.entry.bounds or (0.0, 0.0))),
     "bayes_t": pairwise(lambda request, first, second: bayes_t(first, second, request.entry.prior_scale)),
     "mixed_model": mixed_models,
+    "mcnemar": error_tests.mcnemar_pairs,
+    "cochran_q": error_tests.cochran,
+    "gee_logit": error_tests.logistic,
+    "gee_poisson": error_tests.counted,
     "crossover": crossover_design,
     "t_welch": pairs_of_groups(welch_t),
     "mann_whitney": pairs_of_groups(lambda _, first, second, effect: mann_whitney(first, second, effect)),

@@ -74,7 +74,9 @@ def _between(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
     counts = measures.groupby("condition")["participant"].nunique()
     sizes = ", ".join(f"{condition} {counts.get(condition, 0)}" for condition in study.conditions)
     within = list(
-        dict.fromkeys(request.entry.test for request in requests if TESTS[request.entry.test].design != "between")
+        dict.fromkeys(
+            request.entry.test for request in requests if TESTS[request.entry.test].design in ("within", "mixed")
+        )
     )
     remark = None
     if within:

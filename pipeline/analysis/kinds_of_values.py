@@ -26,10 +26,21 @@ def yes_or_no(requests: Sequence[Request]) -> Iterator[Row]:
         whole = len(ones) > 0 and bool((abs(ones - ones.round()) < _WHOLE).all())
         if not (whole and rows["value"].between(0, 1).all() and rows["value"].nunique() > 1):
             continue
-        suited = "McNemar's or Cochran's test, or a logistic model, suits such data"
         row = {"what": "kind of values", "measure": name, "found": "0 or 1 in every trial"}
-        remark = f"{_labels(of_measure)} treat yes and no as measurements; {suited}"
-        yield {**row, "expected": "measurements", "remark": remark}
+        of_answers = [one for one in of_measure if TESTS[one.entry.test].values == "answers"]
+        several = bool((rows["n"] > 1).any())
+        if several and any(TESTS[one.entry.test].complete_cases for one in of_answers):
+            remark = (
+                "mcnemar and cochran_q take one answer of each participant in each condition, and there are several"
+            )
+            yield {**row, "expected": "one in each cell", "remark": f"{remark}; test: gee_logit takes all of them"}
+        as_measured = [one for one in of_measure if one not in of_answers]
+        if as_measured:
+            of_one = "mcnemar" if len(of_measure[0].study.conditions) == 2 else "cochran_q"
+            suited = "gee_logit" if several else of_one
+            kinds = f"McNemar's or Cochran's test, or a logistic model, suits such data (test: {suited})"
+            remark = f"{_labels(as_measured)} treat yes and no as measurements; {kinds}"
+            yield {**row, "expected": "measurements", "remark": remark}
 
 
 def skewed(requests: Sequence[Request]) -> Iterator[Row]:

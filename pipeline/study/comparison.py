@@ -44,6 +44,7 @@ class Comparison(Frozen):
     prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
     fixed: tuple[Id, ...] = ("condition",)
     transform: Literal["none", "log"] = "none"
+    exposure: Id | None = None
     bootstrap: bool = False
     permutation: bool = False
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-Design = Literal["within", "between", "mixed"]
+Design = Literal["within", "between", "mixed", "either"]
+Values = Literal["measurements", "answers", "counts"]
 Question = Literal["difference", "equivalence", "evidence"]
 
 
@@ -21,7 +22,8 @@ class StatisticalTest:
 
     `label` is used in tables, `long_name` in sentences, `methods_text` in the methods paragraph. `options` are the keys
     of an entry that only some tests take. `symbol_tells` is true if the letter of the statistic says which test it was.
-    The p of a test whose `question` is not "difference" says nothing about a difference.
+    The p of a test whose `question` is not "difference" says nothing about a difference. `values` are what it takes:
+    measurements, answers that are 0 or 1, or counts. `followed_up_by` names the tests of the pairs after it.
     """
 
     name: str
@@ -36,6 +38,8 @@ class StatisticalTest:
     symbol_tells: bool = False
     question: Question = "difference"
     design: Design = "within"
+    values: Values = "measurements"
+    followed_up_by: str = "t tests"
     cite: tuple[str, ...] = ()
     cited_for: str = ""
 
@@ -104,6 +108,48 @@ TESTS: Mapping[str, StatisticalTest] = {
             cite=("laird1982", "satterthwaite1946"),
         ),
         StatisticalTest(
+            "mcnemar",
+            "McNemar",
+            "McNemar's test",
+            "McNemar's tests of one answer of each participant in each condition (exact, two-sided; odds ratio)",
+            values="answers",
+            cite=("mcnemar1947",),
+        ),
+        StatisticalTest(
+            "cochran_q",
+            "Cochran's Q",
+            "Cochran's Q test",
+            "Cochran's Q test of one answer of each participant in each condition (η²Q)",
+            options=("follow_up",),
+            values="answers",
+            followed_up_by="McNemar's tests",
+            cite=("cochran1950",),
+        ),
+        StatisticalTest(
+            "gee_logit",
+            "logistic GEE",
+            "logistic model",
+            "logistic models of every trial by generalized estimating equations, participants being the clusters"
+            " (Mancl and DeRouen's standard errors; odds ratio)",
+            options=("follow_up",),
+            complete_cases=False,
+            design="either",
+            values="answers",
+            cite=("liang1986", "mancl2001"),
+        ),
+        StatisticalTest(
+            "gee_poisson",
+            "Poisson GEE",
+            "Poisson model",
+            "log-linear models of the rate of events by generalized estimating equations, participants being the"
+            " clusters (Mancl and DeRouen's standard errors; rate ratio)",
+            options=("follow_up", "exposure"),
+            complete_cases=False,
+            design="either",
+            values="counts",
+            cite=("liang1986", "mancl2001"),
+        ),
+        StatisticalTest(
             "crossover",
             "crossover",
             "crossover analysis",
@@ -170,6 +216,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             options=("between", "follow_up"),
             symbol_tells=True,
             design="between",
+            followed_up_by="Mann-Whitney tests",
             cite=("kruskal1952",),
         ),
         StatisticalTest(

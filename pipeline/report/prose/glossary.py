@@ -96,6 +96,23 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     ),
     ("W₊", r"W₊", "The sum of the ranks of the differences in which the first condition's value is larger."),
     ("Friedman test", r"\bFriedman\b", "Compares conditions by how each participant's values rank them."),
+    (
+        "McNemar's test",
+        r"McNemar",
+        "Of those whose answer differs between two conditions: did as many change one way (b) as the other (c)?",
+    ),
+    ("Cochran's Q", r"Cochran's Q", "Asks of answers 0 or 1 whether some conditions have more of them than others."),
+    (
+        "Generalized estimating equations (GEE)",
+        r"\bGEE\b|estimating equations",
+        "A model of every trial that allows for a person's trials being alike, without saying how.",
+    ),
+    (
+        "Odds ratio, OR",
+        r"\bOR = |[Oo]dds ratio",
+        "The odds of a 1 (its share over that of 0) under the first condition divided by those under the second.",
+    ),
+    ("Rate ratio", r"[Rr]ate ratio", "The rate of events under the first condition divided by that under the second."),
     ("χ²", r"χ²", "The statistic of Friedman's test: how far apart the conditions' mean ranks lie."),
     (
         "Aligned rank transform (ART)",

@@ -45,6 +45,8 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     designs = {TESTS[row["test"]].design for row in results["comparisons"]}
     if designs == {"between"} and {row["effect"] for row in results["comparisons"]} == {"condition"}:
         how = "each participant met one"
+    elif designs == {"either"}:
+        how = "compared with participants as clusters"
     elif designs:
         how = (
             "compared within participants" if "within" in designs or "mixed" in designs else "met by every participant"
@@ -150,6 +152,8 @@ def _test_text(entry: Comparison, rows: Sequence[Row]) -> str:
         parts.append(f"of the factors {listing(list(entry.within))}")
     if entry.transform == "log":
         parts.append("of the natural logarithms of the participants' means, read as ratios of geometric means")
+    if entry.exposure is not None:
+        parts.append(f"rates per {unit_of(entry.exposure) or 'unit'} of {subject(entry.exposure).lower()}")
     if "fixed" in options:
         parts.append(f"fixed terms {listing(list(entry.fixed))}")
     if entry.bounds is not None:
@@ -183,7 +187,7 @@ def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
     followed = "follow_up" in TESTS[entry.test].options and any(row["adjust"] == entry.follow_up for row in pairs)
     if not followed or entry.follow_up == "none":
         return ""
-    return f", followed up pair by pair with {adjustment(entry.follow_up)}-adjusted t tests"
+    return f", followed up pair by pair with {adjustment(entry.follow_up)}-adjusted {TESTS[entry.test].followed_up_by}"
 
 
 def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from pipeline.statistics import RATIO
-from pipeline.study.statistical_tests import TESTS
+from pipeline.study.statistical_tests import TESTS, Values
 from pipeline.tables.table import Row
 from pipeline.words import (
     EFFECTS_OF_CONDITION,
     contrast,
     decisive_p,
+    difference_phrase,
     effect_size,
     evidence,
     finds_no_variance_between_people,
@@ -62,7 +63,7 @@ def sentence(row: Row, facts: StudyFacts) -> str:
     what = subject(row["measure"])
     if row["status"] != "ok":
         of = "" if row["contrast"] is None and row["effect"] in EFFECTS_OF_CONDITION else f" of {contrast(row)}"
-        return f"{what}: the {_test(row)}{of} is {row['status']} (n = {row['n']})."
+        return f"{what}: {with_article(_test(row))}{of} is {row['status']} (n = {row['n']})."
     if TESTS[row["test"]].question == "evidence":
         return _bayes(row, facts, what)
     if TESTS[row["test"]].question == "equivalence":
@@ -76,7 +77,14 @@ def sentence(row: Row, facts: StudyFacts) -> str:
 def _test(row: Row) -> str:
     follows_up = row["test"] == "rm_anova" and row["contrast"] is not None
     named = "follow-up t test" if follows_up else TESTS[row["test"]].long_name
+    if row["test"] == "cochran_q" and row["contrast"] is not None:
+        named = "follow-up, McNemar's test"
     return f"{named} of the logarithms" if of_logarithms(row) else named
+
+
+def with_article(name: str) -> str:
+    """`the paired t test`, `McNemar's test`."""
+    return name if "'s " in name else f"the {name}"
 
 
 def _directed(row: Row, facts: StudyFacts, what: str, pair: _Pair, difference: float) -> str:
@@ -100,7 +108,7 @@ def _amount(row: Row, difference: float) -> str:
     value = row["effect_size"] if row["effect_size_name"] == "estimate" else row["mean_difference"]
     if value is None or difference == 0:
         return ""
-    size = f"{number(abs(value))} {unit_of(row['measure'])}".strip()
+    size = difference_phrase({**row, "mean_difference": value})
     if value * difference < 0:
         return f"by ranks, while its mean was {'lower' if value > 0 else 'higher'} by {size}"
     reduction = None if row["effect_size_name"] == "estimate" else reduction_of(row)
@@ -161,7 +169,7 @@ def _evidence(row: Row, facts: StudyFacts) -> str:
         named = f"{_test(row)}, "
     # A ratio to the first condition is said as the amount already.
     said = row["effect_size_name"] == RATIO and _pair(row, facts.conditions) is not None and ratio_to_first(row)
-    shown = {**row, "effect_size": None} if said else row
+    shown = {**row, "effect_size": None, "ci_low": None} if said else row
     figures = evidence(shown, _digits(row, facts.alpha), _BEFORE_INTERVAL)
     singular = ", singular fit" if finds_no_variance_between_people(row) else ""
     return f"{named}{figures}, n = {row['n']}{singular}"
@@ -213,14 +221,39 @@ def _pair(row: Row, conditions: Sequence[str]) -> _Pair | None:
 
 def _means(row: Row, facts: StudyFacts) -> Iterator[str]:
     """M and SD of each condition, where all of them are compared and they are of the same people as the test."""
+    if (row["details"] or {}).get("means") is not None:
+        yield from _observed(row, facts)
+        return
     if row["effect"] not in EFFECTS_OF_CONDITION or (row["contrast"] is not None and len(facts.conditions) > 2):
         return
     found = [facts.descriptives.get((row["measure"], condition)) for condition in facts.conditions]
     if all(one is not None and one["n"] == row["n"] for one in found):
-        yield from (_mean(one) for one in found if one is not None)
+        yield from (_mean(one, TESTS[row["test"]].values) for one in found if one is not None)
 
 
-def _mean(described: Row) -> str:
+def _observed(row: Row, facts: StudyFacts) -> Iterator[str]:
+    """The share or rate of each condition over all trials, which the test rests on."""
+    means = (row["details"] or {}).get("means")
+    if means is None or row["effect"] not in EFFECTS_OF_CONDITION:
+        return
+    if row["contrast"] is not None and len(facts.conditions) > 2:
+        return
+    for condition, mean in zip(facts.conditions, means, strict=True):
+        answers = TESTS[row["test"]].values == "answers"
+        yield f"{condition}: {percent(mean) if answers else f'{number(mean)} per {_unit_of_exposure(row)}'}"
+
+
+def _unit_of_exposure(row: Row) -> str:
+    """What a rate is of: a trial, or a unit of the exposure."""
+    exposure = (row["details"] or {}).get("exposure")
+    if exposure is None:
+        return "trial"
+    return unit_of(exposure) or f"unit of {subject(exposure).lower()}"
+
+
+def _mean(described: Row, values: Values = "measurements") -> str:
+    if values == "answers":
+        return f"{described['condition']}: {percent(described['mean'])}"
     spread = "" if described["sd"] is None else f", SD = {number(described['sd'])}"
     return f"{described['condition']}: M = {number(described['mean'])}{spread}"
 

@@ -9,6 +9,7 @@ from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
+from pipeline.report.prose.sentences import with_article
 from pipeline.report.sections.comparisons import ESTIMATES
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.study.measures import MEASURES, measure
@@ -154,7 +155,9 @@ def _selected(material: Material) -> list[Block]:
 
 def _sentences(rows: Sequence[Row]) -> Iterator[str]:
     """One sentence per comparison; its follow-up pairs share one."""
-    whole = {(row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] == "F"}
+    whole = {
+        (row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] in ("F", "Q")
+    }
 
     def follows_up(row: Row) -> bool:
         return row["contrast"] is not None and (row["test"], row["effect"]) in whole
@@ -165,7 +168,7 @@ def _sentences(rows: Sequence[Row]) -> Iterator[str]:
             yield from (comparison_sentence(row) for row in pairs)
             continue
         told = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
-        yield f"follow-up of the {TESTS[test].label}, n = {pairs[0]['n']}: {'; '.join(told)}"
+        yield f"follow-up of {with_article(TESTS[test].label)}, n = {pairs[0]['n']}: {'; '.join(told)}"
 
 
 def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:

@@ -236,7 +236,7 @@ def test_aligned_ranks_of_cells_that_spread_unlike_are_cautioned_of(tmp_path: Pa
     shutil.copytree(CASES / "art", tmp_path / "art")
     assert steadyhand("report", tmp_path / "art").code == 0
     page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
-    assert "can find effects that are not there" in page
+    assert "can find effects that do not exist" in page
 
 
 def test_friedmans_p_of_two_conditions_is_exact(results: Results) -> None:
