@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pipeline.statistics import OF_LOGARITHMS, RATIO
@@ -15,6 +15,8 @@ Row = Mapping[str, Any]
 MINUS = "\u2212"
 THIN = "\u2009"
 NOTHING = "–"
+SMOOTHED = "smoothed readings"
+"""What estimates are held against where no reference was recorded; `accuracy.reference` has it too."""
 
 _EFFECT_SIZES = {
     "generalized eta squared": "η²G",
@@ -388,6 +390,14 @@ def reduction_phrase(reduction: float) -> str:
 def capitalized(sentence: str) -> str:
     """With a capital letter first, the rest as it is: names in it keep theirs."""
     return sentence[:1].upper() + sentence[1:]
+
+
+def held_against(references: Iterable[str]) -> str:
+    """What errors are distances from, for a sentence; `references` are those of rows of `accuracy`."""
+    names = set(references)
+    if SMOOTHED not in names:
+        return "the reference"
+    return f"the {SMOOTHED}" if names == {SMOOTHED} else f"the reference or {SMOOTHED}"
 
 
 def listing(words: list[str]) -> str:

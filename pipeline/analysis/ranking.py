@@ -7,6 +7,7 @@ import pandas as pd
 
 from pipeline.statistics.descriptive import summarize
 from pipeline.tables.table import Row
+from pipeline.words import SMOOTHED
 
 _POSSIBLE = {
     "rmse_mm": (0.0, np.inf),
@@ -20,7 +21,8 @@ _POSSIBLE = {
 def ranked(accuracy: pd.DataFrame, trials: pd.DataFrame) -> list[Row]:
     """Rows of `replay_means`, those with the least mean RMSE first: of each study, and of all where there are several.
 
-    All studies together are ranked over the variants that each of them has.
+    All studies together are ranked over the variants that each of them has. Where smoothed readings stand in for a
+    reference there is no rank, and the order is as asked for: how far from the hand a variant was is not known.
     """
     studies = list(dict.fromkeys([*accuracy["study"], *trials["study"]]))
     rows: list[Row] = []
@@ -48,6 +50,8 @@ def _ranked(study: str | None, accuracy: pd.DataFrame, trials: pd.DataFrame) -> 
         key = {(estimator, variant)}
         row: Row = {"study": study, "estimator": estimator, "variant": variant or None}
         rows.append(row | _means(_only(accuracy, key)) | _selections(_only(trials, key)))
+    if (accuracy["reference"] == SMOOTHED).any():
+        return [{**row, "rank": None} for row in rows]
     rows.sort(key=lambda row: row.get("rmse_mm", np.inf))  # stable: equals stand in the order asked for
     return [{**row, "rank": place if "rmse_mm" in row else None} for place, row in enumerate(rows, start=1)]
 

@@ -32,7 +32,7 @@ from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import in_results_of, written_by
 from pipeline.tables.table import Row
-from pipeline.words import interval, number, seconds
+from pipeline.words import SMOOTHED, held_against, interval, number, seconds
 
 _PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"
 _TABLES, _IN_RESULTS = written_by("replay"), in_results_of("replay")
@@ -190,7 +190,7 @@ def _write(gathered: _Gathered, folder: Path) -> None:
         for name in files:
             copy(Path(filled) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
-    _say(list(tables.records("replay_means", written["replay_means"])))
+    _say(list(tables.records("replay_means", written["replay_means"])), held_against(accuracy["reference"]))
     console.say(f"Report: {console.short_path(folder / _PAGE)}  {console.short_path(folder / _PRINT)}")
 
 
@@ -204,10 +204,11 @@ def _fill(studies: Sequence[Row], frames: Mapping[str, pd.DataFrame], drawn: Pat
     pdf.render(shown, drawn, folder / _PRINT)
 
 
-def _say(rows: Sequence[Row]) -> None:
-    """Print the ranking: of all studies where there are several, else of the one."""
+def _say(rows: Sequence[Row], standard: str) -> None:
+    """Print the means: of all studies where there are several, else of the one; ranked if there is a reference."""
     first = [row for row in rows if row["study"] == rows[0]["study"]]
-    header = ("variant", "sessions", "RMSE mm", "95 % interval", "lag ms", "jitter mm")
+    error = f"mm from {standard}" if SMOOTHED in standard else "RMSE mm"
+    header = ("variant", "sessions", error, "95 % interval", "lag ms", "jitter mm")
     lines = [
         (
             row["variant"] or row["estimator"],

@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.commands import console
 from pipeline.report.prose.answer import HEADER, answer, not_answered, notes
-from pipeline.words import comparison_sentence, counted, measure_label, number
+from pipeline.words import SMOOTHED, comparison_sentence, counted, held_against, measure_label, number
 
 
 def say_results(results: Mapping[str, Any]) -> None:
@@ -28,8 +28,12 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
     """Tests of all conditions or of other factors, and each estimator's mean error."""
     for row in not_answered(results):
         yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
+    known = SMOOTHED not in held_against(row["reference"] for row in results["accuracy"])
+    if not known:
+        yield "  No reference was recorded: absolute error and lag cannot be known, nor which estimator is best."
     for row in results["accuracy_means"]:
-        yield f"  {row['estimator']}: RMSE {number(row['rmse_mm'])} mm (mean of {counted(row['n'], 'session')})"
+        what = "RMSE {} mm" if known else "{} mm RMS from the smoothed readings"
+        yield f"  {row['estimator']}: {what.format(number(row['rmse_mm']))} (mean of {counted(row['n'], 'session')})"
     figures = [row for row in results["printed"] if row["check"] is None]
     if figures:
         agreeing = sum(row["verdict"] == "agrees" for row in figures)

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
-from pipeline.report.figures.rmse_axis import LAG_LABEL, along_rmse
+from pipeline.report.figures.rmse_axis import along_rmse, lag_label
 from pipeline.report.figures.style import (
     GREY,
     MARKS_MAX,
@@ -22,12 +22,20 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
-from pipeline.words import counted, listing, number, seconds
+from pipeline.words import SMOOTHED, counted, held_against, listing, number, seconds
 
 
 def _errors_words(accuracy: pd.DataFrame) -> Words:
-    """Which estimators have the smallest and the largest error, and which the smallest lag."""
+    """Which estimators have the smallest and the largest error, and which the smallest lag, where that is known."""
     n = counted(accuracy["session"].nunique(), "session")
+    standard = held_against(accuracy["reference"])
+    if SMOOTHED in standard:
+        return Words(
+            f"Distance from {standard} (left) and lag behind them (right) of each estimator over {n}: small marks are"
+            " sessions, large ones their mean with its 95 % interval. What the sensors have wrong together is in"
+            " neither.",
+            f"Dot plot of distance and lag from {standard} by estimator over {n}.",
+        )
     rmse = accuracy.groupby("estimator", sort=False)["rmse_mm"].mean().dropna().sort_values(kind="stable")
     lag = accuracy.groupby("estimator", sort=False)["lag_s"].mean().dropna()
     summary = ""
@@ -48,7 +56,7 @@ def _errors_words(accuracy: pd.DataFrame) -> Words:
 @styled
 def errors(accuracy: pd.DataFrame) -> Figure:
     """RMSE and lag of every estimator: one mark per session, and the mean over sessions with its 95 % t interval."""
-    names = list(dict.fromkeys(accuracy["estimator"]))
+    names, standard = list(dict.fromkeys(accuracy["estimator"])), held_against(accuracy["reference"])
     figure, axes = panels(1, 2, 1.1 + 0.36 * len(names), sharey=True)
     many = len(accuracy) > MARKS_MAX
     for index, estimator in enumerate(names):
@@ -61,10 +69,11 @@ def errors(accuracy: pd.DataFrame) -> Figure:
                 draw_mean(panel, index, known, (colour(index), marker(index)), upright=False)
     axes[0].set_yticks(range(len(names)), [as_label(estimator) for estimator in names])
     axes[0].invert_yaxis()
-    along_rmse(axes[0], accuracy["rmse_mm"])
-    axes[0].set_title(f"Error (n = {counted(accuracy['session'].nunique(), 'session')})")
+    along_rmse(axes[0], accuracy["rmse_mm"], standard)
+    what = "Distance" if SMOOTHED in standard else "Error"
+    axes[0].set_title(f"{what} (n = {counted(accuracy['session'].nunique(), 'session')})")
     axes[1].axvline(0, color=GREY, linewidth=0.8)
-    axes[1].set_xlabel(LAG_LABEL)
+    axes[1].set_xlabel(lag_label(standard))
     axes[1].set_title("Lag")
     for panel in axes:
         panel.grid(axis="y", color=PALE, linewidth=0.8)
@@ -73,7 +82,14 @@ def errors(accuracy: pd.DataFrame) -> Figure:
 
 
 def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
-    """Which estimators no other beats in both error and lag."""
+    """Which estimators no other beats in both error and lag, where that is known."""
+    n, standard = counted(accuracy["session"].nunique(), "session"), held_against(accuracy["reference"])
+    if SMOOTHED in standard:
+        return Words(
+            f"Lag behind {standard} against the distance from them: means over {n} with 95 % intervals; small marks are"
+            " sessions.",
+            f"Scatter plot of lag against distance from {standard} by estimator, {n}.",
+        )
     known = accuracy[accuracy["lag_s"].notna() & accuracy["rmse_mm"].notna()]
     means = known.groupby("estimator", sort=False)[["rmse_mm", "lag_s"]].mean()
     cost = means.assign(lag_s=means["lag_s"].abs()).to_numpy(np.float64)
@@ -93,6 +109,7 @@ def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
 def lag_and_error(accuracy: pd.DataFrame) -> Figure:
     """Lag against RMSE, one mark per estimator: means over sessions with 95 % t intervals; small marks are sessions."""
     figure, (axes,) = panels(height=3.4)
+    standard = held_against(accuracy["reference"])
     for index, (estimator, rows) in enumerate(accuracy.groupby("estimator", sort=False)):
         known = rows[rows["lag_s"].notna() & rows["rmse_mm"].notna()]
         if known.empty:
@@ -113,7 +130,7 @@ def lag_and_error(accuracy: pd.DataFrame) -> Figure:
             label=f"{as_label(estimator)} (n = {len(known)})",
         )
     axes.axhline(0, color=GREY, linewidth=0.8)
-    along_rmse(axes, accuracy["rmse_mm"])
-    axes.set_ylabel(LAG_LABEL)
+    along_rmse(axes, accuracy["rmse_mm"], standard)
+    axes.set_ylabel(lag_label(standard))
     legend(figure, [axes], 1, "outside right center")
     return figure

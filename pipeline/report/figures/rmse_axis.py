@@ -7,12 +7,23 @@ import matplotlib.ticker
 import pandas as pd
 from matplotlib.axes import Axes
 
-LAG_LABEL = "Lag behind the reference (ms)"
+from pipeline.words import SMOOTHED, held_against
+
+RECORDED = held_against(())
+
 _WIDE = 100.0  # ratio of the axis' ends above which only powers of ten have room for their numbers
 
 
-def along_rmse(axes: Axes, rmse_mm: pd.Series) -> None:
-    """Put RMSE along x, on a logarithmic scale if the largest is more than 15 times the smallest."""
+def lag_label(standard: str = RECORDED) -> str:
+    """What an axis of lags says; `standard` is what estimates are held against."""
+    return f"Lag behind {standard} (ms)"
+
+
+def along_rmse(axes: Axes, rmse_mm: pd.Series, standard: str = RECORDED) -> None:
+    """Put RMSE along x, on a logarithmic scale if the largest is more than 15 times the smallest.
+
+    `standard` is what estimates are held against, as in `held_against`.
+    """
     if rmse_mm.max() > 15 * rmse_mm.min() > 0:
         axes.set_xscale("log")
         low, high = axes.get_xlim()
@@ -21,4 +32,4 @@ def along_rmse(axes: Axes, rmse_mm: pd.Series) -> None:
         axes.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
     else:
         axes.set_xlim(left=0)
-    axes.set_xlabel("RMSE against the reference (mm)")
+    axes.set_xlabel(f"RMSE {'from' if SMOOTHED in standard else 'against'} {standard} (mm)")

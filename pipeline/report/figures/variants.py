@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures import label_places
 from pipeline.report.figures.drawing import Words, drawing
-from pipeline.report.figures.rmse_axis import LAG_LABEL, along_rmse
+from pipeline.report.figures.rmse_axis import along_rmse, lag_label
 from pipeline.report.figures.style import BLACK, GREY, arms, as_label, colour, legend, marker, panels, styled
 from pipeline.words import counted
 
@@ -39,7 +39,7 @@ def trade_off(means: pd.DataFrame) -> Figure:
 
     `means` has the columns of `replay_means`; a panel without values is left out.
     """
-    quantities = [("lag", "_s", 1000, LAG_LABEL), ("jitter", "_mm", 1, "Jitter at rest (mm)")]
+    quantities = [("lag", "_s", 1000, lag_label()), ("jitter", "_mm", 1, "Jitter at rest (mm)")]
     known = [quantity for quantity in quantities if means[f"{quantity[0]}{quantity[1]}"].notna().any()]
     figure, axes = panels(1, max(len(known), 1), 3.6)
     for panel, (stem, unit, scale, label) in zip(axes, known, strict=False):

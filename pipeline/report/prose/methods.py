@@ -13,7 +13,7 @@ from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
-from pipeline.words import adjustment, counted, listing, number, subject, unit_of
+from pipeline.words import SMOOTHED, adjustment, counted, listing, number, subject, unit_of
 
 _ORIGINS = {
     "simulated": "The data were simulated by a model, not measured with people.",
@@ -27,6 +27,7 @@ def methods(study: Study, results: Mapping[str, Any], versions: Mapping[str, str
         *_design(study, results),
         *_measures(study, results),
         *_estimators(study),
+        *_without_reference(results),
         *_tests(study, results["comparisons"]),
         *_exclusions(study, results["exclusions"]),
         *_software(versions),
@@ -105,6 +106,14 @@ def _estimators(study: Study) -> Iterator[str]:
     yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(told)}."
     for condition, name in study.shown.items():
         yield f"Condition {condition} displayed {name}."
+
+
+def _without_reference(results: Mapping[str, Any]) -> Iterator[str]:
+    if any(row["reference"] == SMOOTHED for row in results["accuracy"]):
+        yield (
+            "No reference was recorded, so absolute errors and lags are not known; estimates were held against the"
+            " readings of all sensors, smoothed."
+        )
 
 
 def _stated(stream: Sensing) -> Iterator[str]:

@@ -7,17 +7,18 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections.material import Material
-from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, number, percent, seconds
+from pipeline.words import NOTHING, SMOOTHED, counted, held_against, number, percent, seconds
 
 _ROWS_MAX = 40
 
 
 SMOOTHED_REMARK = (
-    " Estimates are held against all readings smoothed, before and after each instant, by the fusion filter. That"
-    " leaves out whatever all sensors have wrong together, and is kinder to estimators that resemble it."
+    " So absolute error and lag cannot be known. Estimates are held against smoothed readings instead: each instant"
+    " as the fusion filter sees it from all readings before and after it. What all sensors have wrong together, such as"
+    " a latency, does not show, and estimators that resemble the fusion filter come out too well: no estimator can be"
+    " called the best from these figures."
 )
 
 
@@ -37,7 +38,8 @@ def section(material: Material) -> Section | None:
     blocks += _session_figures(material)
     if rows and len(material.sessions) > 1:
         blocks.append(_session_table(rows))
-    return Section("accuracy", "Fusion accuracy", tuple(blocks))
+    smoothed = any(row["reference"] == SMOOTHED for row in rows)
+    return Section("accuracy", f"Fusion beside {SMOOTHED}" if smoothed else "Fusion accuracy", tuple(blocks))
 
 
 def _method(material: Material) -> tuple[str | Strong, ...]:
@@ -75,18 +77,27 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         for row in material.rows("accuracy_means")
     )
     n, axes = len({row["session"] for row in rows}), len(material.study.axes)
+    standard = held_against(row["reference"] for row in rows)
+    known = SMOOTHED not in standard
+    caption = (
+        f"Accuracy of each estimator against {standard}" if known else f"Distance of each estimator from {standard}"
+    )
+    judged = (
+        "Lower is better in all columns but the third, which should be near 95 %."
+        if known
+        else "No column says which estimator is best."
+    )
     where = f"{axes} axes together" if axes > 1 else f"along {material.study.axes[0]}"
     return Table(
         "table-accuracy",
-        f"Accuracy of each estimator against the reference, means over {counted(n, 'session')} ({where}). Lower is"
-        " better in all columns but the third, which should be near 95 %.",
+        f"{caption}, means over {counted(n, 'session')} ({where}). {judged}",
         columns(titles, 1),
         cells,
-        "RMSE: root mean square distance to the reference. Stated SD: the error the estimator says it makes. In 95 % "
-        "interval: share of instants and axes where the reference is within 1.96 stated SDs. Lag: the shift that fits "
-        "the reference best, positive = late. Lead: the paper's measure, the peak of the cross-correlation with the "
-        "tracker as it arrived, positive = ahead of it; fragile where the hand moves only once or drifts. Jitter: SD "
-        "while the hand is slower than 20 mm/s.",
+        f"RMSE: root mean square distance to {standard}. Stated SD: the error the estimator says it makes. In 95 %"
+        f" interval: share of instants and axes within 1.96 stated SDs of {standard}. Lag: the shift that fits"
+        f" {standard} best, positive = late. Lead: the paper's measure, the peak of the cross-correlation with the"
+        " tracker as it arrived, positive = ahead of it; fragile where the hand moves only once or drifts. Jitter: SD"
+        " while the hand is slower than 20 mm/s.",
     )
 
 

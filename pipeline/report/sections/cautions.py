@@ -11,21 +11,44 @@ from pipeline.report.sections import checks
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import counted, finds_no_variance_between_people, listing, measure_label
+from pipeline.words import (
+    SMOOTHED,
+    counted,
+    finds_no_variance_between_people,
+    held_against,
+    listing,
+    measure_label,
+)
 
 _REMARKS_MAX = 3
 _FEW = 8  # participants
+NOT_KNOWN = "Absolute error and lag cannot be known: no reference was recorded."
+
+
+def without_reference(material: Material) -> bool:
+    """Are estimates held against smoothed readings, because nothing recorded where the hand was?"""
+    return any(row["reference"] == SMOOTHED for row in material.rows("accuracy"))
 
 
 def cautions(material: Material) -> list[Text]:
     """From what the data contradict and where they come from, through assumptions and design, to what is missing."""
     return [
+        *_of_reference(material),
         *checks.caution(material),
         *_of_data(material),
         *_of_assumptions(material),
         *_of_design(material),
         *_of_gaps(material),
     ]
+
+
+def _of_reference(material: Material) -> Iterator[Text]:
+    if without_reference(material):
+        text = (
+            " Figures of accuracy are distances from the smoothed readings of the study's own sensors: what these have"
+            " wrong together, such as a latency, does not show, and no estimator can be called the best."
+        )
+        yield (Strong(NOT_KNOWN), text)
 
 
 def _of_data(material: Material) -> Iterator[Text]:
@@ -83,8 +106,9 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
     ]
     if narrow:
-        text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain the"
-        yield (Strong("Stated uncertainty too small "), f"{text} reference in less than 90 % of instants.")
+        standard = held_against(row["reference"] for row in material.rows("accuracy"))
+        text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain"
+        yield (Strong("Stated uncertainty too small "), f"{text} {standard} in less than 90 % of instants.")
 
 
 def _misshapen(row: Row) -> bool:

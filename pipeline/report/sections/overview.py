@@ -22,7 +22,7 @@ from pipeline.report.document.model import (
 from pipeline.report.figures.rainclouds import met_one_each
 from pipeline.report.prose.answer import HEADER, answer, notes, shown
 from pipeline.report.sections import traces
-from pipeline.report.sections.cautions import cautions
+from pipeline.report.sections.cautions import NOT_KNOWN, cautions, without_reference
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
 from pipeline.study.statistical_tests import TESTS
@@ -140,7 +140,12 @@ def _mean(row: Row) -> str:
 
 
 def _closest(material: Material) -> Text:
-    """The estimator with the smallest mean error and the one after it, with their range over sessions."""
+    """The estimator with the smallest mean error and the one after it, with their range over sessions.
+
+    Without a reference nobody knows which is closest to the hand.
+    """
+    if without_reference(material):
+        return (Strong(NOT_KNOWN), f" {_distances(material)}")
     means = list(_means(material).items())[:_SENTENCES]
     errors = {
         name: [row["rmse_mm"] for row in material.rows("accuracy") if row["estimator"] == name] for name, _ in means
@@ -175,9 +180,7 @@ def _figure(material: Material) -> list[Figure]:
         material.figure(
             "answer",
             figures.errors,
-            f"Error (left) and lag (right) of each estimator, small marks are sessions (n = {n}), large marks their"
-            " means. An estimator that helps sits to the left in both.",
-            f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
+            *_of_errors(material, n),
             rows,
         )
     ]
@@ -268,12 +271,36 @@ def _key_figure(row: Row) -> KeyFigure:
 
 
 def _means(material: Material) -> dict[str, tuple[float, int]]:
-    """Mean RMSE over sessions and their number, by estimator, best first."""
-    ranked = sorted(material.rows("accuracy_means"), key=lambda row: row["rmse_mm"])
+    """Mean RMSE over sessions and their number, by estimator, best first where that is known."""
+    ranked = material.rows("accuracy_means")
+    if not without_reference(material):
+        ranked = sorted(ranked, key=lambda row: row["rmse_mm"])
     return {row["estimator"]: (row["rmse_mm"], row["n"]) for row in ranked}
 
 
+def _distances(material: Material) -> str:
+    """Where no reference was recorded: how far each estimator is from the smoothed readings, in the study's order."""
+    told = listing([f"{name} {number(mean, 1)} mm" for name, (mean, _) in _means(material).items()])
+    return f"Root mean square distance from the smoothed readings, which is not an error: {told}."
+
+
+def _of_errors(material: Material, n: int) -> tuple[str, str]:
+    """Caption and alternative text of the figure of errors on the first page."""
+    marks = f"small marks are sessions (n = {n}), large marks their means"
+    if without_reference(material):
+        return (
+            f"Distance from the smoothed readings (left) and lag behind them (right) of each estimator, {marks}.",
+            f"Dot plot of distance and lag from the smoothed readings by estimator over {counted(n, 'session')}.",
+        )
+    return (
+        f"Error (left) and lag (right) of each estimator, {marks}. An estimator that helps sits to the left in both.",
+        f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
+    )
+
+
 def _accuracy_keys(material: Material) -> list[KeyFigure]:
+    if without_reference(material):
+        return []
     return [
         KeyFigure(f"{number(mean, 1)} mm", f"{name}: position error", f"mean RMSE of {counted(n, 'session')}")
         for name, (mean, n) in _means(material).items()
@@ -295,7 +322,10 @@ def _evidence(material: Material) -> list[Text]:
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
     means = _means(material)
-    if means:
+    if means and without_reference(material):
+        if answers:  # else the answer at the top of the page has the same distances
+            answers.append((Strong("Accuracy: "), _distances(material)))
+    elif means:
         best, (lowest, n) = next(iter(means.items()))
         others = "; ".join(f"{name} {number(mean, 1)} mm" for name, (mean, _) in list(means.items())[1:])
         tail = f" Others: {others}." if others else ""

@@ -17,7 +17,7 @@ from pipeline.report.sections.traces import PAGE as TRACES
 from pipeline.tables.catalogue import TABLES
 from pipeline.tables.columns import TEXT
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, measure_label, number, percent, seconds
+from pipeline.words import NOTHING, counted, held_against, measure_label, number, percent, seconds
 
 FOLDER = "participants"
 _MANY = 40  # of sessions or participants: the report's own tables show no more than the first rows then
@@ -38,7 +38,7 @@ _SHOWN: dict[str, tuple[str, tuple[tuple[str, str, Cell], ...]]] = {
         ),
     ),
     "accuracy": (
-        "How far each estimator was from the reference, and how late.",
+        "How far each estimator was from {standard}, and how late.",
         (
             ("Session", "session", str),
             ("Estimator", "estimator", str),
@@ -83,10 +83,11 @@ def write(material: Material, folder: Path) -> None:
     folder.mkdir()
     values = {name: material.participant_means(name) for name in dict.fromkeys(material.measures["measure"])}
     sessions, rows = _by_person(material)
+    standard = held_against(row["reference"] for row in material.rows("accuracy"))
     for name, person in people.items():
         sections = (
             Section("measures", "Measures", (_measures(material.study.conditions, values, person),)),
-            *_sessions(sessions.get(person, {}), rows.get(person, {})),
+            *_sessions(sessions.get(person, {}), rows.get(person, {}), standard),
         )
         html.render(_document(material, person, sections), folder, folder / name)
 
@@ -138,20 +139,20 @@ def _measures(conditions: Sequence[str], values: Mapping[str, pd.DataFrame], per
     )
 
 
-def _sessions(mine: Mapping[str, int], rows: Mapping[str, list[Row]]) -> Iterator[Section]:
-    """A participant's sessions, by their places, and the rows of each table."""
+def _sessions(mine: Mapping[str, int], rows: Mapping[str, list[Row]], standard: str) -> Iterator[Section]:
+    """A participant's sessions, by their places, and the rows of each table; `standard` is what errors are of."""
     blocks: list[Block] = []
     if mine:
         blocks.append(Pages("Traces", tuple(Link(f"Traces of {one}", f"../{TRACES}#{at}") for one, at in mine.items())))
-    blocks += [_table(name, rows[name]) for name in _SHOWN if name in rows]
+    blocks += [_table(name, rows[name], standard) for name in _SHOWN if name in rows]
     if blocks:
         yield Section("sessions", "Sessions and gaps", tuple(blocks))
 
 
-def _table(name: str, rows: Sequence[Row]) -> Table:
+def _table(name: str, rows: Sequence[Row], standard: str) -> Table:
     caption, shown = _SHOWN[name]
     titles = [title for title, _, _ in shown]
     kinds = {column.name: column.kind for column in TABLES[name].columns}
     texts = next((at for at, (_, key, _) in enumerate(shown) if kinds[key] != TEXT), len(titles))
     cells = tuple(tuple(cell(row[key]) for _, key, cell in shown) for row in rows)
-    return Table(f"table-{name}", caption, columns(titles, texts), cells)
+    return Table(f"table-{name}", caption.format(standard=standard), columns(titles, texts), cells)

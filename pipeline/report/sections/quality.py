@@ -224,7 +224,9 @@ def _noise(material: Material) -> list[Block]:
             "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",
             columns(titles, 3),
             cells,
-            "Still: the reference moves slower than 20 mm/s; without a reference, the accelerations vary little.",
+            "Still: the reference moves slower than 20 mm/s."
+            if material.study.stream_of_kind("reference")
+            else "Still: the accelerations vary little.",
         ),
     ]
 

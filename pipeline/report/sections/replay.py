@@ -22,10 +22,9 @@ from pipeline.report.document.model import (
 from pipeline.report.sections.accuracy import SMOOTHED_REMARK
 from pipeline.report.sections.material import ORIGINS, draw_now
 from pipeline.report.sections.provenance import libraries
-from pipeline.sessions.recording import SMOOTHED
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, interval, number, percent, seconds
+from pipeline.words import NOTHING, SMOOTHED, counted, held_against, interval, number, percent, seconds
 
 _ROWS_MAX = 120
 _TITLES = (
@@ -40,8 +39,8 @@ _TITLES = (
 _AT_SELECTION = ("At the selections, RMSE (mm)",)
 _NOTE = (
     "Means over sessions; in brackets 95 % t intervals over sessions, cut off where values end. RMSE: root mean square"
-    " distance to the reference. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In 95 %"
-    " interval: share of instants and axes where the reference is within 1.96 stated SDs."
+    " distance to {standard}. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In 95 %"
+    " interval: share of instants and axes within 1.96 stated SDs of {standard}."
 )
 _NOTE_SELECTION = (
     " At the selections: root of the mean over sessions of the mean squared distance to the target that the estimator"
@@ -75,7 +74,12 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
     for index, study in enumerate([None, *(study["name"] for study in studies)]):
         rows = [row for row in every if row["study"] == study]
         if rows:
-            yield from _one(rows, "all studies together" if study is None else f"study “{study}”", index, drawn)
+            of = found["accuracy"]
+            standard = held_against(of["reference"] if study is None else of.loc[of["study"] == study, "reference"])
+            where = "all studies together" if study is None else f"study “{study}”"
+            yield from _one(rows, where, standard, drawn / f"trade-off-{index}.svg")
+    if all(row["rank"] is None for row in every):
+        return
     yield Notice(
         "The best of many",
         (
@@ -87,7 +91,7 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
     )
 
 
-def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[Block]:
+def _one(rows: Sequence[Row], where: str, standard: str, path: Path) -> Iterator[Block]:
     """One study's table and figure, or those of all together."""
     best = rows[0]
     if best["rank"] is not None:
@@ -97,17 +101,21 @@ def _one(rows: Sequence[Row], where: str, index: int, drawn: Path) -> Iterator[B
     titles = _TITLES + (_AT_SELECTION if selections else ())
     shown = f" The first {_ROWS_MAX} of {len(rows)}." if len(rows) > _ROWS_MAX else ""
     yield Table(
-        f"table-variants-{index}",
-        f"Variants by their mean RMSE, {where}.{shown}",
+        path.stem.replace("trade-off", "table-variants"),
+        f"Variants by their mean RMSE, {where}.{shown}"
+        if SMOOTHED not in standard
+        else f"Variants in the order asked for, {where}: RMSE and lag are distances from {standard}.{shown}",
         tuple(Column(title, title != "Estimator") for title in titles),
         tuple(_cells(row)[: len(titles)] for row in rows[:_ROWS_MAX]),
-        _NOTE + (_NOTE_SELECTION if selections else ""),
+        _NOTE.format(standard=standard) + (_NOTE_SELECTION if selections else ""),
     )
     ranked = [row for row in rows if row["rank"] is not None and (row["lag_s"], row["jitter_mm"]) != (None, None)]
-    if not ranked:
+    if SMOOTHED in standard:
+        yield Paragraph(("Without a recorded reference variants are not ranked.",))
+    elif not ranked:
         yield Paragraph(("Neither lag nor jitter could be measured, so there is no figure of them against the error.",))
     else:
-        yield draw_now(drawn / f"trade-off-{index}.svg", figures.trade_off, tables.frame("replay_means", ranked))
+        yield draw_now(path, figures.trade_off, tables.frame("replay_means", ranked))
 
 
 def _called(row: Row) -> str:

@@ -320,11 +320,16 @@ def test_studies_without_reference_or_selections_have_no_such_figures(folder: Fo
     root = with_logs(folder("\n".join(line for line in SETTINGS.splitlines() if "/reference/" not in line)))
     settings = (root / "study.yaml").read_text()
     (root / "study.yaml").write_text(settings.replace("events: {topic: /events}", ""))
-    assert steadyhand("replay", root).code == 0
-    assert {row["reference"] for row in steadyhand.results()["accuracy"]} == {"smoothed"}
+    ran = steadyhand("replay", root)
+    assert ran.code == 0
+    assert {row["reference"] for row in steadyhand.results()["accuracy"]} == {"smoothed readings"}
     assert {row["selection_rmse_mm"] for row in steadyhand.results()["replay_means"]} == {None}
     page = (steadyhand.out / "replay.html").read_text()
     assert "No reference was recorded" in page
+    assert "Without a recorded reference variants are not ranked." in page
+    assert {row["rank"] for row in steadyhand.results()["replay_means"]} == {None}
+    assert "mm from the smoothed readings" in ran.out
+    assert "Least error" not in page and "to the reference" not in page
     assert "At the selections" not in page
 
 

@@ -13,6 +13,7 @@ from scipy import stats
 from pipeline.report import figures
 from pipeline.report.figures.stated_sd import nine_of_ten, shares
 from pipeline.tables import table as tables
+from pipeline.words import SMOOTHED
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
 
@@ -37,6 +38,18 @@ def test_least_error_and_least_lag_are_named(tmp_path: Path) -> None:
     assert "Error (n = 2 sessions)" in shown
     said = figures.errors.words(FOUND).caption
     assert "Smallest RMSE: good, 10.00 mm; largest: raw, 32.00 mm. Smallest lag: quick, 0 ms." in said
+
+
+def test_distances_from_smoothed_readings_are_no_errors_and_have_no_winner(tmp_path: Path) -> None:
+    found = FOUND.assign(reference=SMOOTHED)
+    axes = {"RMSE from the smoothed readings (mm)", "Lag behind the smoothed readings (ms)"}
+    for drawing in (figures.errors, figures.lag_and_error):
+        shown = texts(drawing(found), tmp_path)
+        assert axes <= set(shown)
+        assert "Error" not in " ".join(shown)
+        said = " ".join(drawing.words(found))
+        assert "the smoothed readings" in said
+        assert [word for word in ("eference", "mallest", "etter", "No other") if word in said] == []
 
 
 def test_intervals_of_the_trade_off_are_over_sessions(tmp_path: Path) -> None:
