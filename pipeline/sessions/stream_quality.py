@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.sessions.logs.log import IntArray, Readings
+from pipeline.sessions.sampling import sampling
 from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
 
@@ -35,15 +36,17 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
     steps: FloatArray = apart_ns[apart_ns > 0].astype(np.float64) * S_PER_NS
     if len(steps):
         usual = float(np.median(steps))
-        missing = int(np.sum(np.round(steps[steps > 1.5 * usual] / usual) - 1))
         intervals = np.diff(arrival) * S_PER_NS
         regular = intervals[intervals <= 1.5 * usual]
         row["rate_hz"] = len(steps) / float(steps.sum())
         row["gap_max_s"] = float(steps.max())
         row["jitter_ms"] = float(np.std(regular) * 1e3) if len(regular) > 1 else None
         row["latency_s"] = float(np.median(arrival - stamp) * S_PER_NS)
-        if missing and readings.sampled:
-            remarks.append(f"{missing} samples missing ({missing / (missing + len(steps) + 1):.1%})")
+        found = sampling(stamp)
+        if readings.sampled and found.missing is None:
+            remarks.append(f"its stamps {found.how}, so how many samples are missing cannot be told")
+        elif readings.sampled and found.missing:
+            remarks.append(f"{found.missing} samples missing ({found.share:.1%})")
     row["note"] = "; ".join(remarks) or None
     return row
 

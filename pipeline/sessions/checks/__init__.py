@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 
-from pipeline.sessions.checks import agreement, events, force, noise, orientation, publishers, repeats, stamps
+from pipeline.sessions.checks import agreement, counts, events, force, noise, orientation, publishers, repeats, stamps
 from pipeline.sessions.checks.finding import Finding, Status
 from pipeline.sessions.checks.recorded import Recorded
 from pipeline.tables.table import Row
@@ -22,6 +22,8 @@ CHECKS: tuple[Check, ...] = (
     stamps.bursts,
     stamps.regular,
     stamps.clock,
+    counts.missing,
+    counts.unusable,
     publishers.frame_ids,
     publishers.publishers,
     repeats.zeros,

@@ -42,11 +42,11 @@ def of_log(log: Log, study: Study) -> Recorded:
     )
 
 
-def times(readings: Readings, origin_ns: int, stream: Stream | None = None) -> Times:
+def times(readings: Readings, origin_ns: int, stream: Stream | None = None, left_out: int = 0) -> Times:
     """When readings were stamped and arrived, and how late the stamps are according to study.yaml."""
     late = stream is not None and (stream.stamp == "arrival" or stream.kind in ("reference", "display"))
     late_s = stream.latency_s if stream is not None and late else 0.0
-    return Times(readings.stamp_ns, readings.arrival_ns, origin_ns, late_s)
+    return Times(readings.stamp_ns, readings.arrival_ns, origin_ns, late_s, left_out)
 
 
 def of_positions(
@@ -64,7 +64,7 @@ def of_positions(
     return Positions(
         name,
         "position" if stream is None else stream.kind,
-        times(kept, origin_ns, stream),
+        times(kept, origin_ns, stream, readings.read - kept.read),
         value_mm,
         stream.noise_sd_mm if isinstance(stream, PositionStream) else None,
         _frames(readings, whole),
@@ -82,7 +82,7 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
 
     return Imu(
         name,
-        times(kept, origin_ns, stream),
+        times(kept, origin_ns, stream, readings.read - kept.read),
         kept.values[:, :3] if stream is None else turned(_unit(stream.mounting_xyzw), kept.values[:, :3]),
         kept.values[:, 3:6],
         kept.values[:, 6:10],

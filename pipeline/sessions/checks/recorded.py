@@ -24,12 +24,14 @@ class Times:
     """When each message was stamped and when it arrived, (n,) in ns, in the order of the file.
 
     `late_s` is how much later than the measurement study.yaml says that a stamp is: 0 for `stamp: measurement`.
+    `left_out` messages are not among them, because their values are no numbers or their times of another day.
     """
 
     stamp_ns: IntArray
     arrival_ns: IntArray
     origin_ns: int
     late_s: float = 0.0
+    left_out: int = 0
 
     @cached_property
     def stamp_s(self) -> FloatArray:

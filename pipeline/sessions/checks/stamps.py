@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Recorded, Times
 from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.sampling import BUNCHED
 from pipeline.statistics.arrays import FloatArray
 
 DOUBLED, ROUNDED, RATE, BURSTS, REGULAR, STEPS = (
@@ -24,7 +25,6 @@ _DOUBLED_AMBER, _DOUBLED_RED = 0.01, 0.5
 _FASTEST_HZ = 5_000.0  # no tracker or phone measures so often; stamps of ms or µs in a field of ns look like 1e6 Hz
 _SLOWEST_HZ = 1.0
 _ROUNDINGS_S = (1.0, 0.1, 0.01)
-_BUNCHED = 0.3  # of the mean step: the median of stamps that come in bursts is far below it
 _IRREGULAR = 0.5  # SD of the usual steps over their median; recordings without a fault: up to 0.1
 _STEP_S = 0.05  # of a clock
 _AROUND = 15  # messages to each side of a step
@@ -107,7 +107,7 @@ def bursts(recorded: Recorded) -> Iterator[Finding]:
         steps = times.steps_s
         mean = float(np.mean(steps[steps <= np.percentile(steps, 99.5)]))
         median = float(np.median(steps))
-        if mean <= 0 or median >= _BUNCHED * mean or float(np.mean(steps == 0)) > _DOUBLED_RED:
+        if mean <= 0 or median >= BUNCHED * mean or float(np.mean(steps == 0)) > _DOUBLED_RED:
             yield Finding(of(BURSTS, name), "green", "none", "none")
             continue
         size = max(2, round(1.0 / float(np.mean(steps > mean))))
