@@ -273,6 +273,27 @@ def in_degrees(value: np.ndarray) -> np.ndarray:
     return value
 
 
+def lost_now_and_then(value: np.ndarray) -> np.ndarray:
+    """Every fortieth value is NaN, as from a driver that sends a message whether or not it sees anything."""
+    value[::40] = np.nan
+    return value
+
+
+def thinned(readings: Readings) -> Readings:
+    """A third of the messages never come, at random."""
+    kept = np.random.default_rng(4).random(readings.read) > 1 / 3
+    claims = readings.claims
+    if len(claims.frame):
+        claims = replace(claims, frame=claims.frame[kept])
+    return replace(
+        readings,
+        stamp_ns=readings.stamp_ns[kept],
+        arrival_ns=readings.arrival_ns[kept],
+        values=readings.values[kept],
+        claims=claims,
+    )
+
+
 MM = ("speed", "millimetres")
 MEAN, LAG, FRAME = "mean acceleration", "lag", "frame of the movement"
 
@@ -333,6 +354,9 @@ FAULTS: tuple[Fault, ...] = (
     Fault("accelerometer all zero", force(lambda v: v * 0), "specific force", "all zero"),
     Fault("accelerometer clipped", force(lambda v: np.clip(v, -10.2, 9.3)), "clipped readings", "clipped"),
     Fault("noise understated", settings("tracker", noise_sd_mm=3.0), "tracker noise", "noise_sd_mm: "),
+    Fault("noise understated by a fifth", settings("tracker", noise_sd_mm=6.4), "tracker noise", "noise_sd_mm: "),
+    Fault("values that are no numbers", values(TRACKER, lost_now_and_then), "unusable samples", "send nothing while"),
+    Fault("most frames lost", change(TRACKER, thinned), "missing samples", "the recorder does not keep up"),
 )
 """Of streams and study.yaml."""
 
