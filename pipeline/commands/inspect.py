@@ -17,6 +17,8 @@ from pipeline.sessions.stream_quality import quality_row
 from pipeline.tables import table as tables
 from pipeline.words import counted, listing, number
 
+_GUESSED = "gravity_mm_s2 is a guess: the log has no orientation; give gravity as it points in the tracker's frame"
+
 
 def inspect(files: Sequence[Path], as_json: bool) -> None:
     """Print each topic, what it is usable as, a block for study.yaml and the checks.
@@ -84,7 +86,8 @@ def _block(seen: Inspection) -> Iterator[str]:
     if seen.streams:
         yield "streams:"
     for name, stream in seen.streams.items():
-        yield f"  {name}: {{{', '.join(f'{key}: {_yaml(value)}' for key, value in stream.items())}}}"
+        remark = f"  # {_GUESSED}" if name in seen.guessed else ""
+        yield f"  {name}: {{{', '.join(f'{key}: {_yaml(value)}' for key, value in stream.items())}}}{remark}"
     if seen.events is not None:
         yield f"events: {{topic: {_yaml(seen.events)}}}"
 

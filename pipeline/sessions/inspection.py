@@ -48,12 +48,16 @@ class Topic:
 
 @dataclass(frozen=True)
 class Inspection:
-    """The topics of a log, the streams it could have in study.yaml (as keys and values), and the checks' findings."""
+    """The topics of a log, the streams it could have in study.yaml (as keys and values), and the checks' findings.
+
+    `guessed` are the streams whose gravity the log does not show, so that the value given is a guess.
+    """
 
     topics: tuple[Topic, ...]
     streams: Mapping[str, Mapping[str, Any]]
     events: str | None
     findings: tuple[Finding, ...]
+    guessed: frozenset[str] = frozenset()
 
     @property
     def usable(self) -> bool:
@@ -68,10 +72,13 @@ def inspected(path: Path, counted: Log) -> Inspection:
     streams = _streams(topics)
     events = next((topic.name for topic in topics if topic.content == "events"), None)
     log = Log(counted.facts, {topic.name: topic.readings for topic in topics if topic.readings is not None})
+    guessed: frozenset[str] = frozenset()
     if streams:
-        streams = _measured(streams, of_log(log, _study(streams, events)))
+        recorded = of_log(log, _study(streams, events))
+        guessed = frozenset(imu.name for imu in recorded.imus if not _tells_gravity(imu))
+        streams = _measured(streams, recorded)
     findings = checked(of_log(log, _study(streams, events))) if streams else ()
-    return Inspection(topics, streams, events, findings)
+    return Inspection(topics, streams, events, findings, guessed)
 
 
 def _decoded(path: Path, counted: Log) -> dict[str, tuple[Content, Readings]]:
@@ -151,10 +158,16 @@ def _measured(streams: dict[str, dict[str, Any]], recorded: Recorded) -> dict[st
     return streams
 
 
+def _tells_gravity(imu: Imu) -> bool:
+    """Whether the log has orientations, without which the direction of gravity is not known."""
+    seen = gravity_seen_mm_s2(imu)
+    return seen is not None and bool(np.any(seen))
+
+
 def _gravity(imu: Imu) -> list[float]:
     """Gravity, 9806.65 mm/s² long: along the nearest axis if close to one; along −z if the log does not show it."""
     seen = gravity_seen_mm_s2(imu)
-    if seen is None or not np.any(seen):
+    if seen is None or not _tells_gravity(imu):
         return [0.0, 0.0, -_G_MM_S2]
     direction = seen / np.linalg.norm(seen)
     axis = int(np.argmax(np.abs(direction)))

@@ -57,6 +57,18 @@ def test_the_checks_are_made_without_a_study(tmp_path: Path, capsys: Capsys, mon
     assert "they are in g" in ran.out
 
 
+def test_gravity_that_the_log_does_not_tell_is_called_a_guess(
+    tmp_path: Path, capsys: Capsys, monkeypatch: Patch
+) -> None:
+    said = {}
+    for oriented in (True, False):
+        log, _ = session(Hand(oriented=oriented))
+        ran = run(capsys, monkeypatch, "inspect", write_session(tmp_path / f"{oriented}.mcap", messages(log)))
+        said[oriented] = "# gravity_mm_s2 is a guess: the log has no orientation" in ran.out
+        assert isinstance(block_of(ran.out)["streams"], dict)
+    assert said == {True: False, False: True}
+
+
 def test_a_log_that_no_study_can_use_ends_with_1_and_says_why(
     tmp_path: Path, capsys: Capsys, monkeypatch: Patch
 ) -> None:
