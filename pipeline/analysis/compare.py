@@ -25,6 +25,7 @@ from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import GATHERED, TABLES
 from pipeline.tables.table import Row
+from pipeline.words import listing
 
 
 def run(work: Work) -> Outcome:
@@ -51,6 +52,7 @@ def run(work: Work) -> Outcome:
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
     frames["design_check"] = tables.frame("design_check", design_rows)
     gathered = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
+    gathered["checks"] = pd.concat([tables.read("checks", work.entries[name]) for name in TABLES["checks"].stages[:-1]])
     left_out += _without_accuracy(work, gathered["quality"], gathered["accuracy"])
     frames["exclusions"] = pd.concat(
         [
@@ -91,17 +93,26 @@ def _comparisons_of_all_data(study: Study, folder: Path, people: People) -> tupl
 
 
 def _without_accuracy(work: Work, quality: pd.DataFrame, accuracy: pd.DataFrame) -> list[Row]:
-    """Sessions with a reference for which no accuracy could be computed."""
-    reference = work.study.stream_of_kind("reference")
-    if reference is None or not work.study.estimators:
+    """Sessions without accuracy, and estimators that have none in a session where others do, with the reason."""
+    study = work.study
+    if not study.estimators:
         return []
+    reference = study.stream_of_kind("reference")
     with_reference = set(quality.loc[quality["stream"] == reference, "session"])
-    with_accuracy = set(accuracy["session"])
-    reason = "the reference has no sample from 1 s after the first frame onwards"
-    lacking = with_reference - with_accuracy
-    return [
-        {**session.ids, "what": "no accuracy", "reason": reason} for session in work.sessions if session.id in lacking
-    ]
+    rows: list[Row] = []
+    for session in work.sessions:
+        rated = set(accuracy.loc[accuracy["session"] == session.id, "estimator"])
+        lacking = [name for name in study.estimators if name not in rated]
+        if not lacking or (reference is not None and session.id not in with_reference):
+            continue  # a session without its reference is listed as read in part, with the reason
+        if study.tracker is None:
+            reason = "study.yaml names no stream of kind position with all axes"
+        elif not rated:
+            reason = "the reference has no sample from 1 s after the first frame onwards"
+        else:
+            reason = f"{listing(lacking)}: no estimate from 1 s after the first frame onwards"
+        rows.append({**session.ids, "what": "no accuracy", "reason": reason})
+    return rows
 
 
 def _participant_facts(work: Work, measures: pd.DataFrame) -> Row:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.analysis import orders
+from pipeline.analysis import orders, table_checks
 from pipeline.analysis.missing import check_exclusion, excludable, finite_values, gaps, incomplete_trials, matches
 from pipeline.analysis.scores import instruments, items_of, reliability, score_values
 from pipeline.analysis.values import (
@@ -51,6 +51,7 @@ def run(work: Work) -> Outcome:
         ]
     ).reset_index(drop=True)
     _check_sources(values)
+    checked = _table_checks(work, values, selections)
     scored_by = instruments(study, sorted(set(values["measure"])))
     scores_by_item = items_of(scored_by)
     agreement = list(reliability(scored_by, values))
@@ -69,6 +70,8 @@ def run(work: Work) -> Outcome:
     measures = _with_totals(study, _cells(values, CELL), CELL, score_names)
     exclusions += gaps(work, measures)
     order_rows, sequences = _orders(work, tabled)
+    checked += table_checks.order_rows(order_rows, _starts(work))
+    tables.write("checks", tables.frame("checks", checked), work.out)
     _write_values(study, measures, orders.with_periods(values, order_rows, sequences), score_names, work.out)
     if study.exclusions:
         whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(all_values, [])
@@ -83,6 +86,28 @@ def run(work: Work) -> Outcome:
     tables.write("selections", selections, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
+
+
+def _table_checks(work: Work, values: pd.DataFrame, selections: pd.DataFrame) -> list[Row]:
+    """Rows of `checks` for what people typed or exported; what comes from logs was checked with them."""
+    typed = {str(name) for name in (work.study.questionnaires, work.study.measures) if name is not None}
+    path = table_path(work, "trials")
+    if path is None:
+        return table_checks.check_rows(values[values["source"].isin(typed)], None)
+    timed = (values["source"] == "the trials") & (values["measure"] == "trial_time_s")
+    trials = values[values["source"].isin(typed) | timed].replace({"source": {"the trials": path.name}})
+    return table_checks.check_rows(trials, selections)
+
+
+def _starts(work: Work) -> pd.DataFrame:
+    """When each session's first event was logged, in ns since 1970; of those that have events."""
+    rows = []
+    for session, folder in zip(work.sessions, work.entries["ingest"], strict=True):
+        times = tables.read_arrow("events", folder)["time_ns"]
+        if len(times):
+            ids = session.ids
+            rows.append((ids["participant"], ids["condition"], times.to_numpy().min()))
+    return pd.DataFrame(rows, columns=[*CELL, "start_ns"]).astype(dict.fromkeys(CELL, "string"))
 
 
 def _only_items(scores_by_item: Mapping[str, Sequence[str]]) -> list[str]:

@@ -10,6 +10,8 @@ from pipeline.commands import console
 from pipeline.report.prose.answer import HEADER, answer, not_answered, notes
 from pipeline.words import SMOOTHED, comparison_sentence, counted, held_against, measure_label, number
 
+_CHECKS_MAX = 5  # printed; the report has them all
+
 
 def say_results(results: Mapping[str, Any]) -> None:
     """Print title and origin, the table of pairs that the report's first page has, and what else is to be said."""
@@ -28,12 +30,8 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
     """Tests of all conditions or of other factors, and each estimator's mean error."""
     for row in not_answered(results):
         yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
-    known = SMOOTHED not in held_against(row["reference"] for row in results["accuracy"])
-    if not known:
-        yield "  No reference was recorded: absolute error and lag cannot be known, nor which estimator is best."
-    for row in results["accuracy_means"]:
-        what = "RMSE {} mm" if known else "{} mm RMS from the smoothed readings"
-        yield f"  {row['estimator']}: {what.format(number(row['rmse_mm']))} (mean of {counted(row['n'], 'session')})"
+    yield from _checks(results)
+    yield from _accuracy(results)
     figures = [row for row in results["printed"] if row["check"] is None]
     if figures:
         agreeing = sum(row["verdict"] == "agrees" for row in figures)
@@ -46,3 +44,26 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
         yield f"  printed figures that contradict others of the publication: {len(contradictions)}"
     for row in contradictions:
         yield f"    {row['what']}: {row['printed']}; {row['explanation']}"
+
+
+def _checks(results: Mapping[str, Any]) -> Iterator[str]:
+    """What is red, and what looks wrong in the study's own tables."""
+    rows = [row for row in results["checks"] if row["status"] == "red" or (row["message"] and not row["session"])]
+    for row in rows[:_CHECKS_MAX]:
+        yield f"  {row['status']}: {row['session'] or 'tables'}: {row['check']}: {row['message']}"
+    if len(rows) > _CHECKS_MAX:
+        yield f"  {len(rows) - _CHECKS_MAX} more of these: see the table of checks in the report"
+
+
+def _accuracy(results: Mapping[str, Any]) -> Iterator[str]:
+    """Each estimator's mean error, and why none is the best where that cannot be said."""
+    known = SMOOTHED not in held_against(row["reference"] for row in results["accuracy"])
+    if not known:
+        yield "  No reference was recorded: absolute error and lag cannot be known, nor which estimator is best."
+    rated = {row["session"] for row in results["accuracy"]}
+    red = {row["session"] for row in results["checks"] if row["status"] == "red"} & rated
+    if red:
+        yield f"  {len(red)} of {counted(len(rated), 'session')} with a red check: which estimator is best is not said"
+    for row in results["accuracy_means"]:
+        what = "RMSE {} mm" if known else "{} mm RMS from the smoothed readings"
+        yield f"  {row['estimator']}: {what.format(number(row['rmse_mm']))} (mean of {counted(row['n'], 'session')})"

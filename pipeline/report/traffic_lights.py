@@ -51,7 +51,9 @@ def judged(study: Study, quality: Sequence[Row], agreement: Sequence[Row], check
         apart = row["max_mm"]
         light: Light = "not judged" if apart is None else _above(apart, limits.agreement_mm)
         found.append(Judged(row["session"], "Replay", row["estimator"], f"{number(apart, 3)} mm apart", light))
-    found += [Judged(row["session"], "Checks", row["check"], row["found"], row["status"]) for row in checks]
+    found += [
+        Judged(row["session"], "Checks", row["check"], row["found"], row["status"]) for row in checks if row["session"]
+    ]
     return found
 
 

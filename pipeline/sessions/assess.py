@@ -15,6 +15,7 @@ from fusion_core.accuracy import noise
 from pipeline.engine.stage import Outcome, Work
 from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors
+from pipeline.sessions.fusion_checks import fusion_check_rows
 from pipeline.sessions.phone import described
 from pipeline.sessions.recording import SETTLED_S, Recording, Shown
 from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
@@ -36,7 +37,10 @@ def run(work: Work) -> Outcome:
     tracks = _tracks(study, tables.read_arrow("tracks", work.entry("fuse")))
     reference = recording.reference(study, loaded)
     rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
-    tables.write("accuracy", tables.of_rows("accuracy", [row for row in rows if row]), work.out)
+    known = [row for row in rows if row]
+    tables.write("accuracy", tables.of_rows("accuracy", known), work.out)
+    checked = fusion_check_rows(study, session.id, loaded, reference, known)
+    tables.write("checks", tables.of_rows("checks", checked), work.out)
     tables.write("replay_agreement", tables.of_rows("replay_agreement", _agreement(work, loaded)), work.out)
     phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]
     tables.write("phones", tables.of_rows("phones", phones), work.out)

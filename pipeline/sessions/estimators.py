@@ -37,6 +37,20 @@ def sensors(study: Study) -> dict[str, Sensor]:
     return {name: sensor(study, stream) for name, stream in study.sensor_streams.items()}
 
 
+_FUSING = ("window_gp", "fusion_kalman")  # the others take positions only, whatever sensors there are
+
+
+def fusing(study: Study) -> dict[str, str]:
+    """The estimators that use accelerations, and the stream that each has them from."""
+    found = {}
+    for name, settings in study.estimators.items():
+        streams = [one for one, stream in study.sensor_streams.items() if isinstance(stream, AccelerationStream)]
+        used = [one for one in streams if settings.use is None or one in settings.use]
+        if used and settings.type in _FUSING:
+            found[name] = used[0]
+    return found
+
+
 def build_estimator(study: Study, name: str, where: str | None = None) -> Estimator:
     """The study's estimator of that name. Raises PipelineError, saying which key or value is wrong.
 

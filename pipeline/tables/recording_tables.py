@@ -83,16 +83,16 @@ QUALITY = Table(
 
 CHECKS = Table(
     "checks",
-    "One row per session and check of what its log claims: readings against each other and against study.yaml.",
+    "One row per check of what a log or a table claims: against its own readings and against study.yaml.",
     (
-        SESSION,
+        SESSION._replace(about="the session; null for a check of a table"),
         text("check", "what was checked, and of which stream: as in rate: tracker"),
         text("status", "green, amber or red"),
         text("found", "what the readings say"),
         text("expected", "what they should say"),
         text("message", "the likely cause and the remedy; null where it is green"),
     ),
-    stages=("ingest", "compare"),
+    stages=("ingest", "assess", "measure", "compare"),
     key=("session", "check"),
     in_results=True,
     as_csv=True,

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import pandas as pd
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections.material import Material
+from pipeline.sessions.checks.finding import of
+from pipeline.sessions.estimators import fusing
+from pipeline.sessions.fusion_checks import USED
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 from pipeline.words import NOTHING, SMOOTHED, counted, held_against, number, percent, seconds
@@ -34,16 +39,39 @@ def section(material: Material) -> Section | None:
         blocks.append(_summary_table(material, rows))
         blocks += _over_sessions(material, tables.frame("accuracy", rows))
     else:
-        blocks.append(Paragraph(("The logs hold no reference position, so errors cannot be given.",)))
+        blocks.append(Paragraph((Strong("No accuracy: "), f"errors cannot be given, for {_why_none(material)}.")))
     blocks += _session_figures(material)
     if rows and len(material.sessions) > 1:
-        blocks.append(_session_table(rows))
+        blocks.append(_session_table(rows, _alone(material)))
     smoothed = any(row["reference"] == SMOOTHED for row in rows)
     return Section("accuracy", f"Fusion beside {SMOOTHED}" if smoothed else "Fusion accuracy", tuple(blocks))
 
 
+def _why_none(material: Material) -> str:
+    """Why no session has accuracy."""
+    reasons = [row["reason"] for row in material.rows("exclusions") if row["what"] == "no accuracy" and row["reason"]]
+    told = list(dict.fromkeys(reasons))
+    if told:
+        return "; ".join(f"{reason} ({counted(reasons.count(reason), 'session')})" for reason in told)
+    reference = material.study.stream_of_kind("reference")
+    return f'no log has a usable "{reference}"' if reference is not None else "no log could be used"
+
+
+def _alone(material: Material) -> dict[str, list[str]]:
+    """The sessions in which a fusing estimator could use no acceleration, by its name."""
+    unused = [row for row in material.rows("checks") if row["status"] == "red" and row["check"].startswith(USED)]
+    return {
+        name: [row["session"] for row in unused if row["check"] == of(USED, stream)]
+        for name, stream in fusing(material.study).items()
+    }
+
+
 def _method(material: Material) -> tuple[str | Strong, ...]:
-    listed = [f"{name} ({settings.type})" for name, settings in material.study.estimators.items()]
+    with_accelerations = fusing(material.study)
+    listed = [
+        f"{name} ({settings.type}{'' if name in with_accelerations else ', from the tracker alone'})"
+        for name, settings in material.study.estimators.items()
+    ]
     return (
         (
             "Every estimator was run over the same raw streams and asked, at the arrival of each acceleration, where"
@@ -64,9 +92,15 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         "Lead, paper's (ms)",
         "Jitter at rest (mm)",
     )
+    alone = {name: len(sessions) for name, sessions in _alone(material).items() if sessions}
     cells = tuple(
         (
-            row["estimator"],
+            row["estimator"]
+            + (
+                f" (no acceleration used in {alone[row['estimator']]} of {row['n']})"
+                if row["estimator"] in alone
+                else ""
+            ),
             number(row["rmse_mm"], 2),
             number(row["sd_mm"], 2),
             percent(row["coverage_95"], 0),
@@ -101,7 +135,7 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
     )
 
 
-def _session_table(rows: list[Row]) -> Table:
+def _session_table(rows: list[Row], alone: Mapping[str, Sequence[str]]) -> Table:
     titles = (
         "Session",
         "Estimator",
@@ -115,7 +149,7 @@ def _session_table(rows: list[Row]) -> Table:
     cells = tuple(
         (
             row["session"],
-            row["estimator"],
+            row["estimator"] + (" (tracker alone)" if row["session"] in alone.get(row["estimator"], ()) else ""),
             number(row["rmse_mm"], 2),
             number(row["sd_mm"], 2),
             percent(row["coverage_95"], 0),

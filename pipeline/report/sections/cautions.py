@@ -25,6 +25,21 @@ _FEW = 8  # participants
 NOT_KNOWN = "Absolute error and lag cannot be known: no reference was recorded."
 
 
+def contradicted(material: Material) -> str:
+    """Why no estimator is called the best although there is a reference: sessions with a red check; else nothing."""
+    sessions = list(dict.fromkeys(row["session"] for row in material.rows("accuracy")))
+    red = {row["session"] for row in material.rows("checks") if row["status"] == "red"}
+    named = [session for session in sessions if session in red]
+    if not named:
+        return ""
+    verb = "contradicts" if len(named) == 1 else "contradict"
+    shown = ", ".join(named[:_REMARKS_MAX]) + (", …" if len(named) > _REMARKS_MAX else "")
+    return (
+        f"Which estimator is best is not said: {len(named)} of {counted(len(sessions), 'session')} {verb} what"
+        f" study.yaml states or their own readings ({shown}); data quality has the checks."
+    )
+
+
 def without_reference(material: Material) -> bool:
     """Are estimates held against smoothed readings, because nothing recorded where the hand was?"""
     return any(row["reference"] == SMOOTHED for row in material.rows("accuracy"))
@@ -35,6 +50,8 @@ def cautions(material: Material) -> list[Text]:
     return [
         *_of_reference(material),
         *checks.caution(material),
+        *checks.worse_than_tracker(material),
+        *checks.of_tables(material),
         *_of_data(material),
         *_of_assumptions(material),
         *_of_design(material),

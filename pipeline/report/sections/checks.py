@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from pipeline.report.document.model import Block, Paragraph, Strong, Table, Text, columns
 from pipeline.report.sections.material import Material
 from pipeline.report.traffic_lights import LIGHTS, SYMBOLS
+from pipeline.sessions.fusion_checks import WORSE
 from pipeline.tables.table import Row
-from pipeline.words import counted, listing
+from pipeline.words import NOTHING, counted, listing
 
 _ROWS_MAX = 40
 _NAMED_MAX = 3
@@ -22,7 +23,7 @@ def blocks(material: Material) -> Iterator[Block]:
         return
     contradicted = sorted(_contradicted(rows), key=lambda row: -LIGHTS.index(row["status"]))
     found = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
-    text = f"{found} of the logs against each other and study.yaml; docs/checks.md describes each." + _lags(rows)
+    text = f"{found} of logs and tables against themselves and study.yaml; docs/checks.md describes each." + _lags(rows)
     yield Paragraph((Strong("Checks: "), text))
     if contradicted:
         yield _table(contradicted)
@@ -47,7 +48,7 @@ def _lags(rows: Sequence[Row]) -> str:
 def _table(rows: Sequence[Row]) -> Table:
     cells = tuple(
         (
-            row["session"],
+            row["session"] or NOTHING,
             row["check"],
             f"{SYMBOLS[row['status']]} {row['status']}",
             row["found"],
@@ -68,7 +69,7 @@ def _table(rows: Sequence[Row]) -> Table:
 
 def caution(material: Material) -> Iterator[Text]:
     """For the first page: what is red, and where; the figures of those sessions are not to be believed."""
-    red = [row for row in material.rows("checks") if row["status"] == "red"]
+    red = [row for row in material.rows("checks") if row["status"] == "red" and row["session"]]
     if not red:
         return
     sessions = list(dict.fromkeys(row["session"] for row in red))
@@ -82,3 +83,25 @@ def caution(material: Material) -> Iterator[Text]:
         "this is resolved; the table of checks is under “Data quality and exclusions”."
     )
     yield (Strong("The data contradict themselves or study.yaml "), text)
+
+
+def worse_than_tracker(material: Material) -> Iterator[Text]:
+    """For the first page: where fusion made it worse, by estimator and session."""
+    rows = [row for row in _contradicted(material.rows("checks")) if row["check"].startswith(WORSE)]
+    if not rows:
+        return
+    told = [
+        f"{row['check'].partition(': ')[2]} in {row['session']} (RMSE {row['found']}, the tracker {row['expected']})"
+        for row in rows[:_NAMED_MAX]
+    ]
+    more = f", and {len(rows) - _NAMED_MAX} more in the table of checks" if len(rows) > _NAMED_MAX else ""
+    yield (Strong("Fusion is worse than its tracker alone: "), f"{'; '.join(told)}{more}.")
+
+
+def of_tables(material: Material) -> Iterator[Text]:
+    """For the first page: values of the study's own tables that are probably not what they are taken for."""
+    rows = [row for row in _contradicted(material.rows("checks")) if not row["session"]]
+    for row in rows[:_NAMED_MAX]:
+        yield (Strong("Look at the values: "), f"{row['message']}.")
+    if len(rows) > _NAMED_MAX:
+        yield (f"The table of checks has {len(rows) - _NAMED_MAX} more such remarks.",)

@@ -22,7 +22,7 @@ from pipeline.report.document.model import (
 from pipeline.report.figures.rainclouds import met_one_each
 from pipeline.report.prose.answer import HEADER, answer, notes, shown
 from pipeline.report.sections import traces
-from pipeline.report.sections.cautions import NOT_KNOWN, cautions, without_reference
+from pipeline.report.sections.cautions import NOT_KNOWN, cautions, contradicted, without_reference
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
 from pipeline.study.statistical_tests import TESTS
@@ -146,6 +146,9 @@ def _closest(material: Material) -> Text:
     """
     if without_reference(material):
         return (Strong(NOT_KNOWN), f" {_distances(material)}")
+    unsure = contradicted(material)
+    if unsure and material.rows("accuracy_means"):
+        return (Strong(unsure), f" {_distances(material)}")
     means = list(_means(material).items())[:_SENTENCES]
     errors = {
         name: [row["rmse_mm"] for row in material.rows("accuracy") if row["estimator"] == name] for name, _ in means
@@ -273,15 +276,17 @@ def _key_figure(row: Row) -> KeyFigure:
 def _means(material: Material) -> dict[str, tuple[float, int]]:
     """Mean RMSE over sessions and their number, by estimator, best first where that is known."""
     ranked = material.rows("accuracy_means")
-    if not without_reference(material):
+    if not (without_reference(material) or contradicted(material)):
         ranked = sorted(ranked, key=lambda row: row["rmse_mm"])
     return {row["estimator"]: (row["rmse_mm"], row["n"]) for row in ranked}
 
 
 def _distances(material: Material) -> str:
-    """Where no reference was recorded: how far each estimator is from the smoothed readings, in the study's order."""
+    """How far each estimator is from what it is held against, in the study's order: none is called the best."""
     told = listing([f"{name} {number(mean, 1)} mm" for name, (mean, _) in _means(material).items()])
-    return f"Root mean square distance from the smoothed readings, which is not an error: {told}."
+    if without_reference(material):
+        return f"Root mean square distance from the smoothed readings, which is not an error: {told}."
+    return f"Root mean square error, means over all sessions, those included: {told}."
 
 
 def _of_errors(material: Material, n: int) -> tuple[str, str]:
@@ -299,7 +304,7 @@ def _of_errors(material: Material, n: int) -> tuple[str, str]:
 
 
 def _accuracy_keys(material: Material) -> list[KeyFigure]:
-    if without_reference(material):
+    if without_reference(material) or contradicted(material):
         return []
     return [
         KeyFigure(f"{number(mean, 1)} mm", f"{name}: position error", f"mean RMSE of {counted(n, 'session')}")
@@ -322,9 +327,10 @@ def _evidence(material: Material) -> list[Text]:
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
     means = _means(material)
-    if means and without_reference(material):
+    if means and (without_reference(material) or contradicted(material)):
         if answers:  # else the answer at the top of the page has the same distances
-            answers.append((Strong("Accuracy: "), _distances(material)))
+            unsure = contradicted(material)
+            answers.append((Strong("Accuracy: "), *([f"{unsure} "] if unsure else []), _distances(material)))
     elif means:
         best, (lowest, n) = next(iter(means.items()))
         others = "; ".join(f"{name} {number(mean, 1)} mm" for name, (mean, _) in list(means.items())[1:])

@@ -24,7 +24,8 @@ def section(material: Material) -> Section:
     blocks: list[Block] = []
     if material.rows("quality"):
         blocks += _lights(material)
-        blocks += checks.blocks(material)
+    blocks += checks.blocks(material)
+    if material.rows("quality"):
         blocks.append(_quality_table(material))
         blocks += timeline.blocks(material)
         if material.rows("sensor_noise"):
@@ -67,7 +68,7 @@ def _lights(material: Material) -> list[Block]:
         cells,
         f"Amber from here on (red): {limits}. A rate is held against the one that study.yaml states, or the median of "
         "three sessions and more; quality_limits in study.yaml moves the limits. Checks: what the readings "
-        "say of each other and of study.yaml, in the table of checks. Nobody is left out for a light.",
+        "say of each other and of study.yaml, in the table of checks. No session is excluded because of its light.",
     )
     text = f"{counted(len(found), 'session')}: {listing(shares)}.{_not_whole(material)}"
     return [Paragraph((Strong("Quality: "), text)), table]
@@ -259,12 +260,27 @@ def _agreement_table(material: Material) -> Table:
     )
 
 
+def _lacking(material: Material) -> list[str]:
+    """What is not in the report although no row of the exclusions says so."""
+    unused = sum(row["left_out"] for row in material.rows("phones"))
+    undefined = sum(row["status"] != "ok" for row in material.rows("comparisons"))
+    lost = [row for row in material.rows("quality") if row["messages_lost"] is None or row["messages_lost"]]
+    said = (
+        (unused, f"{counted(unused, 'acceleration')} of unknown orientation could not be used"),
+        (undefined, f"{counted(undefined, 'comparison')} cannot be computed"),
+        (len(lost), f"messages were lost in {counted(len(lost), 'stream')}, or nobody can say whether any were"),
+    )
+    return [text for count, text in said if count]
+
+
 def _exclusions(material: Material) -> list[Block]:
     rows = material.rows("exclusions")
     if not rows:
-        return [
-            Paragraph(("Nothing was left out: every session, participant and value of the study is in this report.",))
-        ]
+        lacking = _lacking(material)
+        whole = "Nothing was left out: every session, participant and value of the study is in this report."
+        if lacking:
+            whole = f"No session, participant or value was left out as a whole; but {listing(lacking)}."
+        return [Paragraph((whole,))]
     titles = ("Participant", "Condition", "Session", "Measure", "What", "Reason")
     cells = tuple(
         (

@@ -1,0 +1,180 @@
+"""Are the values of a study's own tables what they are taken for? Amber with the reason; nothing is left out for it.
+
+Each check looks for a value that its own column makes unlikely: the others of the same measure are the yardstick, so
+that a slow task or a coarse scale is no alarm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+
+from pipeline.sessions.checks.finding import Finding, of
+from pipeline.statistics.arrays import FloatArray
+from pipeline.study.measures import measure
+from pipeline.tables.table import Row
+from pipeline.words import listing
+
+UNIT, MISSING_CODE, SCALE, TARGETS, ORDER = (
+    "unit of time",
+    "code for missing",
+    "range of the scale",
+    "unit of the targets",
+    "order of the conditions",
+)
+
+_LONG_S, _LONG_TRIAL_S = 10_000.0, 200.0  # median of a session's time, and of a single trial's or movement's
+_OF_A_TRIAL = ("trial", "movement", "reaction", "response", "selection")
+_SINCE_1970 = {1e9: "seconds", 1e12: "milliseconds", 1e15: "microseconds", 1e18: "nanoseconds"}
+_CODES = (-9.0, -99.0, -999.0, -9999.0, 99.0, 999.0, 9999.0)
+_FAR = 3.0  # times the largest of the others: a code, not a slow participant
+_OTHERS_MIN = 3
+_RATED_FROM, _RATED_TO = 0.0, 100.0  # of the NASA-TLX, however it was asked
+_UNITS_APART = 50.0
+_FARTHEST_MM = 20_000.0
+_NAMED_MAX = 3
+
+
+def check_rows(values: pd.DataFrame, selections: pd.DataFrame | None) -> list[Row]:
+    """Rows of the table `checks`.
+
+    `values` are those of tables, one a row: `participant`, `measure`, `value` and the `source` they stand in.
+    `selections` have the targets and selections of trials.csv; None where there is none.
+    """
+    findings: list[Finding] = []
+    for (name, source), rows in values[np.isfinite(values["value"])].groupby(["measure", "source"], sort=False):
+        value = rows["value"].to_numpy(np.float64)
+        findings += unit_of_time(str(name), str(source), value)
+        findings += missing_code(str(name), str(source), value, rows["participant"])
+        findings += rated_range(str(name), str(source), value)
+    if selections is not None:
+        findings += targets(selections)
+    return [{"session": None, **asdict(one), "message": one.message or None} for one in findings]
+
+
+def unit_of_time(name: str, source: str, value: FloatArray) -> Iterator[Finding]:
+    """Seconds that are milliseconds, and times of day where a duration is expected."""
+    middle = float(np.median(np.abs(value)))
+    check = of(UNIT, name)
+    for unit, what in _SINCE_1970.items():
+        if np.all((value > unit) & (value < 3 * unit)) and np.all(value == np.round(value)):
+            message = (
+                f'"{name}" in {source} is near {value[0]:.3g} throughout: these are instants, in {what} since 1970, '
+                "not durations; give the time from start to end"
+            )
+            yield Finding(check, "amber", f"{value[0]:.3g}", "a duration", message)
+            return
+    if measure(name).unit != "s":
+        return
+    limit = _LONG_TRIAL_S if any(word in name for word in _OF_A_TRIAL) else _LONG_S
+    found, expected = f"median {middle:.4g} s", f"at most {limit:g} s"
+    if middle <= limit:
+        yield Finding(check, "green", found, expected)
+        return
+    message = (
+        f'"{name}" in {source} has a median of {middle:.4g} s: the values are probably milliseconds; divide them by '
+        "1000"
+    )
+    yield Finding(check, "amber", found, expected, message)
+
+
+def missing_code(name: str, source: str, value: FloatArray, participants: pd.Series) -> Iterator[Finding]:
+    """−99, 999 and their like, where all other values of the measure are far from them."""
+    codes = [code for code in _CODES if _stands_out(value, code)]
+    check = of(MISSING_CODE, name)
+    if not codes:
+        yield Finding(check, "green", "none", "none")
+        return
+    rows = np.isin(value, codes)
+    people = list(dict.fromkeys(participants[rows].astype(str)))
+    who = listing(people[:_NAMED_MAX]) + (", …" if len(people) > _NAMED_MAX else "")
+    named = listing([f"{code:g}" for code in codes])
+    rest = value[~rows]
+    message = (
+        f'"{name}" in {source} is {named} in {int(rows.sum())} rows ({who}) and {rest.min():.3g} to {rest.max():.3g}'
+        f" in all others: {named} probably stands for a missing value, and counts as a number; leave the cell empty"
+    )
+    yield Finding(check, "amber", f"{named} in {int(rows.sum())} rows", "none", message)
+
+
+def _stands_out(value: FloatArray, code: float) -> bool:
+    """Is the code among the values, and nothing else like it?"""
+    rest = value[~np.isin(value, _CODES)]
+    if not np.any(value == code) or len(rest) < _OTHERS_MIN:
+        return False
+    if code < 0:
+        return bool(rest.min() >= 0)
+    return bool(rest.max() * _FAR < code and rest.min() >= 0)
+
+
+def rated_range(name: str, source: str, value: FloatArray) -> Iterator[Finding]:
+    """Ratings of the NASA-TLX outside 0 to 100; instruments with a rule of scoring list such answers themselves."""
+    questionnaire, slash, scale = name.partition("/")
+    if not slash or questionnaire != "nasa_tlx" or scale == "total":
+        return
+    outside = (value < _RATED_FROM) | (value > _RATED_TO)
+    found, expected = f"{value.min():g} to {value.max():g}", f"{_RATED_FROM:g} to {_RATED_TO:g}"
+    message = ""
+    if outside.any():
+        message = (
+            f'{int(outside.sum())} ratings of "{name}" in {source} are outside the scale, such as '
+            f"{value[outside][0]:g}: correct them, or leave the cell empty"
+        )
+    yield Finding(of(SCALE, name), "amber" if outside.any() else "green", found, expected, message)
+
+
+def targets(selections: pd.DataFrame) -> Iterator[Finding]:
+    """Targets and selections of another unit, or beyond any room."""
+    axes = [axis for axis in "xyz" if selections[f"target_{axis}_mm"].notna().any()]
+    both = selections[[*(f"target_{axis}_mm" for axis in axes), *(f"{axis}_mm" for axis in axes)]].dropna()
+    if len(both) < _OTHERS_MIN:
+        return
+    aimed, chosen = (np.abs(both.to_numpy(np.float64)[:, half]) for half in (np.s_[: len(axes)], np.s_[len(axes) :]))
+    size, reached = float(np.percentile(aimed, 95)), float(np.percentile(chosen, 95))
+    found, expected = f"targets to {size:.3g} mm, selections to {reached:.3g} mm", "alike"
+    cause = ""
+    if max(size, reached) > _UNITS_APART * min(size, reached) > 0:
+        larger, smaller = ("targets", "selections") if size > reached else ("selections", "targets")
+        cause = f"{smaller} are probably in metres where {larger} are in millimetres; give both in millimetres"
+    elif max(size, reached) > _FARTHEST_MM:
+        cause = "no hand reaches so far: the unit is probably not millimetres; give millimetres"
+    message = (
+        f"in the table of trials targets reach {size:.3g} mm and selections {reached:.3g} mm: {cause}" if cause else ""
+    )
+    yield Finding(TARGETS, "amber" if cause else "green", found, expected, message)
+
+
+def order_rows(orders: pd.DataFrame, starts_ns: pd.DataFrame) -> list[Row]:
+    """Rows of `checks`: the stated order of the conditions against when the logs began.
+
+    `orders` has participant, condition, period and source; `starts_ns` participant, condition and start_ns.
+    """
+    rows = orders.merge(starts_ns, on=["participant", "condition"])
+    findings = []
+    for source, of_source in rows.groupby("source", sort=False):
+        wrong = [
+            str(person) for person, mine in of_source.groupby("participant") if len(mine) > 1 and _contradicts(mine)
+        ]
+        n = of_source["participant"].nunique()
+        message = ""
+        if wrong:
+            who = listing(wrong[:_NAMED_MAX]) + (", …" if len(wrong) > _NAMED_MAX else "")
+            message = (
+                f"{source} state another order of the conditions than the dates of the logs for {len(wrong)} of {n} "
+                f"participants ({who}): a label was exchanged or a session repeated; correct the table or the file name"
+            )
+        status = "amber" if wrong else "green"
+        findings.append(Finding(of(ORDER, str(source)), status, f"{len(wrong)} of {n}", "none", message))  # type: ignore[arg-type]
+    return [{"session": None, **asdict(one), "message": one.message or None} for one in findings]
+
+
+_SAME_NS = 60e9  # logs of one minute were not recorded one after the other
+
+
+def _contradicts(mine: pd.DataFrame) -> bool:
+    """Does a later period begin clearly before an earlier one?"""
+    start = mine.sort_values("period", kind="stable")["start_ns"].to_numpy(np.float64)
+    return bool(np.any(np.diff(start) < -_SAME_NS))
