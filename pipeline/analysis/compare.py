@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.audit.beside_computed import compare_printed
-from pipeline.analysis.comparisons import People, all_requests, compared
+from pipeline.analysis.comparisons import People, all_requests, compared, people_of
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.simulated_reductions import reductions
@@ -42,7 +42,7 @@ def run(work: Work) -> Outcome:
         "descriptives": tables.frame("descriptives", descriptives(study, measures)),
     }
     observations = tables.read("observations", measured)
-    people = _participant_columns(work)
+    people = people_of(study, work.folder)
     rows, left_out = compared(study, measures, observations, people)
     frames["comparisons"] = tables.frame("comparisons", rows)
     rows, uncomparable = _comparisons_of_all_data(study, measured / ALL_DATA, people)
@@ -121,14 +121,6 @@ def _participant_facts(work: Work, measures: pd.DataFrame) -> Row:
         return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants))
     people = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     return {"n": len(people)}
-
-
-def _participant_columns(work: Work) -> People:
-    """participants.csv by column: the value of each participant; empty without that file."""
-    if work.study.participants is None:
-        return {}
-    table = study_tables.read_participants(work.folder / work.study.participants).set_index("participant")
-    return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
 
 
 def _session_exclusions(work: Work) -> list[Row]:

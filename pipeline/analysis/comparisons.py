@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import pandas as pd
 
@@ -21,6 +23,7 @@ from pipeline.statistics.mann_whitney import mann_whitney
 from pipeline.statistics.rank import wilcoxon
 from pipeline.statistics.welch import anova_welch, games_howell
 from pipeline.study.comparison import Comparison
+from pipeline.study.csv_tables import read_participants
 from pipeline.study.measures import has_total, measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
@@ -29,29 +32,51 @@ People = Mapping[str, Mapping[str, str]]
 """participants.csv by column: the value of each participant."""
 
 
+def people_of(study: Study, folder: Path) -> People:
+    """participants.csv of a study folder by column; empty without that file."""
+    if study.participants is None:
+        return {}
+    table = read_participants(folder / study.participants).set_index("participant")
+    return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
+
+
 def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None) -> Answer:
     """Every row of `comparisons`, and every exclusion that results from them, once each.
 
     Raises PipelineError where an entry names no measure of the data or does not fit the design.
     """
-    rows: list[Row] = []
-    exclusions: list[Row] = []
-    if study.comparisons and len(study.conditions) < 2:
-        raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
-    by_entry: list[tuple[Comparison, list[Row]]] = []
-    for requests in all_requests(study, measures, observations, people):
-        entry_rows: list[Row] = []
-        for request in requests:
-            answer, incomplete = RUN[request.entry.test](request)
-            entry_rows += answer
-            exclusions += incomplete
-        by_entry.append((requests[0].entry, entry_rows))
-        rows += entry_rows
-    families.adjust(by_entry)
+    answers = answered(study, measures, observations, people)
+    rows = [row for one in answers for row in one.rows]
     for row in rows:
         row["details"] = json.dumps(row["details"]) if row["details"] else None
+    exclusions = (row for one in answers for row in one.exclusions)
     unique = {tuple(sorted(row.items())): row for row in exclusions}
     return rows, list(unique.values())
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A request, its rows of `comparisons` with `details` as a mapping, and the exclusions of incomplete people."""
+
+    request: Request
+    rows: list[Row]
+    exclusions: list[Row]
+
+
+def answered(
+    study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None
+) -> list[Answered]:
+    """Every request and its rows, in the order of study.yaml, with p values adjusted; raises as `compared` does."""
+    if study.comparisons and len(study.conditions) < 2:
+        raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
+    answers: list[Answered] = []
+    by_entry: list[tuple[Comparison, list[Row]]] = []
+    for requests in all_requests(study, measures, observations, people):
+        of_entry = [Answered(request, *RUN[request.entry.test](request)) for request in requests]
+        answers += of_entry
+        by_entry.append((requests[0].entry, [row for one in of_entry for row in one.rows]))
+    families.adjust(by_entry)
+    return answers
 
 
 def all_requests(

@@ -24,6 +24,12 @@ def adjust(entries: Sequence[tuple[Comparison, list[Row]]]) -> None:
 
     What is adjusted is the p by which the report judges: the Greenhouse-Geisser one, where sphericity is in question.
     """
+    for (name, *_), family in grouped(entries).items():
+        _adjust(name, family)
+
+
+def grouped(entries: Sequence[tuple[Comparison, list[Row]]]) -> dict[tuple[str, ...], list[Row]]:
+    """The rows of each family; a key begins with the name of its family, or with what it consists of."""
     families: dict[tuple[str, ...], list[Row]] = {}
     for number, (entry, rows) in enumerate(entries):
         pairs = Counter((row["measure"], row["effect"]) for row in rows if row["contrast"] is not None)
@@ -36,8 +42,7 @@ def adjust(entries: Sequence[tuple[Comparison, list[Row]]]) -> None:
             else:
                 key = (MEASURES, str(number), row["effect"])
             families.setdefault(key, []).append(row)
-    for (name, *_), family in families.items():
-        _adjust(name, family)
+    return families
 
 
 def _follows_up(entry: Comparison, row: Row, rows: Iterable[Row]) -> bool:

@@ -132,7 +132,7 @@ def _with_estimates(request: Request, row: Row, pair: pairs.Pair) -> Row:
 def mixed_models(request: Request) -> Answer:
     """One row per term, and the pairs of levels of those that have more than two."""
     model = model_rows.of_model(request)
-    random = _random_intercepts(model)
+    random = random_intercepts(model)
 
     def fitted(values: FloatArray) -> list[Result]:
         return mixed_model(values, model.participants, model.columns, model.terms, random)
@@ -153,7 +153,7 @@ def mixed_models(request: Request) -> Answer:
     return kept, model.left_out
 
 
-def _random_intercepts(model: model_rows.ModelRows) -> dict[str, IntArray]:
+def random_intercepts(model: model_rows.ModelRows) -> dict[str, IntArray]:
     """The random intercepts that a model needs beside those of participants.
 
     Where participants have several rows in a condition, each of their conditions has one: without it the rows count as
