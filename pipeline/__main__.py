@@ -82,15 +82,28 @@ def check(
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the outcome as JUnit XML too, for a CI page.")
     ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PROGRAM,…",
+            help="Compare with what other programs compute instead: scipy, pingouin, statsmodels, r. Says why their"
+            " figures differ, where that is known.",
+        ),
+    ] = None,
     jobs: Jobs = None,
     cache: CacheFolder = None,
     executor: ExecutorName = "process",
 ) -> None:
     """Recompute and compare with expected.json in the study folder: a table of what moved, and by how much.
 
-    Exit codes: 0 nothing moved, 1 some session was set aside or read in part, 2 a study could not be checked,
-    3 numbers moved.
+    Exit codes: 0 nothing moved, 1 some session was set aside or read in part, or with --against a figure differs for no
+    known reason, 2 a study could not be checked, 3 numbers moved.
     """
+    if against is not None:
+        from pipeline.commands.against import against as compare_programs
+
+        compare_programs(studies, against, accept, junit, jobs, cache, executor)
+        return
     from pipeline.commands import check as command
 
     command.check(studies, accept, junit, jobs, cache, executor)
