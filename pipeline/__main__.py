@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from pipeline.commands import planning
 from pipeline.engine import threads
 
 _INTERRUPTED = 130
@@ -233,68 +234,8 @@ def inspect(
     command.inspect(files, as_json)
 
 
-@app.command()
-def power(
-    *,
-    test: Annotated[str, typer.Option(help="t_paired, wilcoxon, or rm_anova.")] = "t_paired",
-    effect: Annotated[
-        float | None,
-        typer.Option(
-            help="The effect to be found. rm_anova: Cohen's f. t_paired, wilcoxon: d_z, the mean difference over the SD"
-            " of the differences; with --correlation instead d, the mean difference over the SD of a condition."
-        ),
-    ] = None,
-    difference: Annotated[
-        float | None,
-        typer.Option(help="Or the mean difference to be found, in the measure's unit; of rm_anova the largest."),
-    ] = None,
-    sd: Annotated[
-        float | None, typer.Option(help="With --difference: the SD of a condition, in the same unit.")
-    ] = None,
-    correlation: Annotated[
-        float | None,
-        typer.Option(help="Of a participant's values in two conditions; 0.5 is assumed where it is not given."),
-    ] = None,
-    conditions: Annotated[int, typer.Option(min=2, max=100, help="How many, for rm_anova.")] = 2,
-    target: Annotated[float, typer.Option("--power", help="Power: the chance wanted that the effect is found.")] = 0.8,
-    alpha: Annotated[float, typer.Option(help="The level of significance, two-sided.")] = 0.05,
-    simulations: Annotated[
-        int, typer.Option(min=100, max=1_000_000, help="Studies to simulate for each number of participants.")
-    ] = 10_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulation.")] = 1,
-    most: Annotated[int, typer.Option("--max-n", min=2, max=3000, help="The most participants to consider.")] = 1000,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write power.svg, power.csv and power.json there.")
-    ] = None,
-) -> None:
-    """How many participants? For a stated effect, in closed form and by simulation: a table and a curve."""
-    from pipeline.commands import power as command
-
-    expected = command.Expected(test, effect, difference, sd, correlation, conditions, alpha)
-    command.power(expected, command.Search(target, simulations, seed, most), out)
-
-
-@app.command()
-def plan(
-    *,
-    participants: Annotated[int, typer.Option("--participants", "-n", min=1, max=10_000, help="How many.")],
-    conditions: Annotated[
-        list[str] | None, typer.Argument(metavar="CONDITION...", help="The conditions, as study.yaml names them.")
-    ] = None,
-    study: Annotated[
-        Path | None, typer.Option(metavar="STUDY", help="Take the conditions of this study instead.")
-    ] = None,
-    prefix: Annotated[str, typer.Option(help="What the participants' ids begin with.")] = "P",
-    seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="Let chance decide who gets which sequence, within each square. Default: in turn."),
-    ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table there. Default: print it.")] = None,
-) -> None:
-    """Give each participant an order of the conditions: a balanced Latin square, as a participants.csv."""
-    from pipeline.commands import plan as command
-
-    command.plan(conditions or [], study, participants, prefix=prefix, seed=seed, out=out)
+app.command()(planning.power)
+app.command()(planning.plan)
 
 
 @app.command()

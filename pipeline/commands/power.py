@@ -1,50 +1,34 @@
-"""`power`: how many participants a stated effect takes, as a table, and as files with the curve."""
+"""`power`: how many participants a stated effect takes, as a table, and as files with the curve.
+
+This module answers that for one factor within people, with simulated studies beside every row; `power_of_plan` has
+the other designs, and the questions from the other side: which effect n participants find, and with which power.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 from pipeline.commands import console, power_output
+from pipeline.commands.power_options import ASSUMED_CORRELATION, Expected, Search, require_between, require_size
 from pipeline.commands.publish import refuse_study
-from pipeline.errors import PipelineError, did_you_mean
-from pipeline.statistics.power import TESTS, Design, closed_form, difference_of_dz, difference_of_f
+from pipeline.errors import PipelineError
+from pipeline.statistics.power import Design, closed_form, difference_of_dz, difference_of_f
 from pipeline.statistics.power_simulation import simulate
 from pipeline.statistics.sample_size import sample_size
 from pipeline.words import number, share
 
-_ASSUMED_CORRELATION = 0.5
-_LARGEST_EFFECT = 100.0
-
-
-@dataclass(frozen=True)
-class Expected:
-    """The planned study, as the command line states it."""
-
-    test: str
-    effect: float | None
-    difference: float | None
-    sd: float | None
-    correlation: float | None
-    conditions: int
-    alpha: float
-
-
-@dataclass(frozen=True)
-class Search:
-    """The power wanted, how many studies to simulate from which seed, and the most participants to look at."""
-
-    power: float
-    simulations: int
-    seed: int
-    most: int
-
 
 def power(expected: Expected, search: Search, out: Path | None) -> None:
     """Print the table and the answer; write the files into `out`."""
+    if not expected.is_one_factor:
+        from pipeline.commands import power_of_plan
+
+        power_of_plan.power(expected, search, out)
+        return
     design = _design(expected)
-    _within("--power", search.power, design.alpha, 1)
+    require_between("--power", search.power, design.alpha, 1)
     if out is not None:
         refuse_study(out)
     planned = sample_size(design, search.power, search.simulations, search.seed, search.most)
@@ -52,7 +36,7 @@ def power(expected: Expected, search: Search, out: Path | None) -> None:
         raise PipelineError(_not_enough(design, search))
     for line in (power_output.heading(design, search.power), *_effect(expected, design)):
         console.say(line)
-    console.table(*power_output.table(power_output.records(planned)), left=0)
+    console.table(*power_output.table(power_output.records(design, planned)), left=0)
     for line in power_output.answer(design, search.simulations, search.seed, planned):
         console.say(line)
     if out is not None:
@@ -63,16 +47,14 @@ def power(expected: Expected, search: Search, out: Path | None) -> None:
 def _design(expected: Expected) -> Design:
     """The study that the options describe. Raises PipelineError where there can be none."""
     test, k = expected.test, expected.conditions
-    if test not in TESTS:
-        raise PipelineError(f'--test: "{test}" is not known{did_you_mean(test, TESTS)}')
     if test != "rm_anova" and k != 2:
         raise PipelineError(
             f"--conditions {k}: {test} compares two conditions; take --test rm_anova, or plan for one pair"
             f" (--conditions 2) with --alpha divided by the {k * (k - 1) // 2} pairs"
         )
-    _within("--alpha", expected.alpha, 0, 1)
-    r = _ASSUMED_CORRELATION if expected.correlation is None else expected.correlation
-    _within("--correlation", r, -1 / (k - 1), 1)
+    require_between("--alpha", expected.alpha, 0, 1)
+    r = ASSUMED_CORRELATION if expected.correlation is None else expected.correlation
+    require_between("--correlation", r, -1 / (k - 1), 1)
     return Design(test, _difference(expected, r), r, k, expected.alpha)
 
 
@@ -81,7 +63,7 @@ def _difference(expected: Expected, correlation: float) -> float:
     if expected.effect is not None:
         if expected.difference is not None or expected.sd is not None:
             raise PipelineError("--effect says the same as --difference with --sd; give only one of them")
-        size = _size("--effect", expected.effect)
+        size = require_size("--effect", expected.effect)
         if expected.test == "rm_anova":
             return difference_of_f(size, expected.conditions)
         return difference_of_dz(size, correlation) if expected.correlation is None else size
@@ -89,20 +71,8 @@ def _difference(expected: Expected, correlation: float) -> float:
         raise PipelineError(
             "the effect is missing; give --effect 0.5, for example, or --difference and --sd in the measure's unit"
         )
-    _within("--sd", expected.sd, 0, math.inf)
-    return _size("--difference over --sd", expected.difference / expected.sd)
-
-
-def _size(option: str, value: float) -> float:
-    """An effect's size without its sign, which changes no power."""
-    if not 0 < abs(value) <= _LARGEST_EFFECT:
-        raise PipelineError(f"{option}: should not be 0, and its size at most {_LARGEST_EFFECT:g}, found {value:g}")
-    return abs(value)
-
-
-def _within(option: str, value: float, low: float, high: float) -> None:
-    if not low < value < high:
-        raise PipelineError(f"{option}: should lie between {low:.3g} and {high:g}, found {value:g}")
+    require_between("--sd", expected.sd, 0, math.inf)
+    return require_size("--difference over --sd", expected.difference / expected.sd)
 
 
 def _not_enough(design: Design, search: Search) -> str:

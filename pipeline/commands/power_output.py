@@ -10,6 +10,7 @@ from typing import Any
 
 from pipeline.statistics.counterbalancing import williams_design
 from pipeline.statistics.power import Design
+from pipeline.statistics.power_simulation import Share
 from pipeline.statistics.sample_size import Needed, SampleSize
 from pipeline.words import number, share
 
@@ -22,7 +23,10 @@ _NAMES = {
 _FORMULAS = {"t_paired": "noncentral t", "rm_anova": "noncentral F"}
 _SERIES = {"power_closed_form": "closed form", "power_simulated": "simulated", "power_corrected": "Greenhouse-Geisser"}
 _MEANING = {
-    "participants": "complete participants, without those who drop out",
+    "effect": "which effect of the design",
+    "effect_size": "its size: d, d_z, f, or the bound of an equivalence, as `effect` beside `rows` says",
+    "participants": "complete participants in all, without those who drop out",
+    "in_first_group": "how many of them are in the first group; all where there are no groups",
     "power_closed_form": "chance that p is below alpha if the effect is as stated; null where there is no formula",
     "power_simulated": "the same, as a share of simulated studies; low and high: its Clopper-Pearson 95 % interval",
     "power_corrected": "the same of p corrected for sphericity (Greenhouse-Geisser), by which a report judges more than"
@@ -31,16 +35,39 @@ _MEANING = {
 Record = dict[str, Any]
 
 
-def records(planned: SampleSize) -> list[Record]:
+def record(effect: str, effect_size: float, participants: int, in_first_group: int, **powers: Any) -> Record:
+    """A row of power.csv and power.json; what is not given of the powers does not apply and is None."""
+    columns = [key for key in _MEANING if key.startswith("power_")]
+    columns = [
+        name
+        for key in columns
+        for name in ([key] if key == "power_closed_form" else [key, f"{key}_low", f"{key}_high"])
+    ]
+    row = {"effect": effect, "effect_size": effect_size, "participants": participants, "in_first_group": in_first_group}
+    return {**row, **{column: powers.get(column) for column in columns}}
+
+
+def simulated(column: str, shares: Share | None) -> Record:
+    """The share of simulated studies, and its interval, under this column's name."""
+    low, high = (None, None) if shares is None else shares.interval()
+    return {column: shares and shares.power, f"{column}_low": low, f"{column}_high": high}
+
+
+def records(design: Design, planned: SampleSize) -> list[Record]:
     """One row per number of participants; the columns are always the same, None where they do not apply."""
-    rows = []
-    for row in planned.rows:
-        record: Record = {"participants": row.n, "power_closed_form": row.closed_form}
-        for column, each in (("power_simulated", row.simulated.own), ("power_corrected", row.simulated.corrected)):
-            low, high = (None, None) if each is None else each.interval()
-            record |= {column: each and each.power, f"{column}_low": low, f"{column}_high": high}
-        rows.append(record)
-    return rows
+    size = design.f if design.test == "rm_anova" else design.dz
+    return [
+        record(
+            "condition",
+            size,
+            row.n,
+            row.n,
+            power_closed_form=row.closed_form,
+            **simulated("power_simulated", row.simulated.own),
+            **simulated("power_corrected", row.simulated.corrected),
+        )
+        for row in planned.rows
+    ]
 
 
 def heading(design: Design, power: float) -> str:
@@ -113,26 +140,39 @@ def _assumed(design: Design) -> str:
 
 def write(folder: Path, design: Design, settings: Mapping[str, Any], planned: SampleSize) -> None:
     """The table as CSV and JSON, and the curve as SVG."""
-    rows = records(planned)
+    rows = records(design, planned)
+    effect = {"d": design.difference, "d_z": design.dz, "f": design.f, "correlation": design.correlation}
+    needed = {
+        "closed_form": planned.closed_form,
+        "simulated": vars(planned.simulated),
+        "corrected": planned.corrected and vars(planned.corrected),
+    }
+    write_files(folder, settings, effect, needed, rows)
+    _draw(folder / "power.svg", design, rows, planned, settings["power"])
+
+
+def write_files(
+    folder: Path,
+    settings: Mapping[str, Any],
+    effect: Mapping[str, Any],
+    needed: Mapping[str, Any],
+    rows: Sequence[Record],
+) -> None:
+    """power.csv and power.json."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "power.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(file, list(record("", 0, 0, 0)), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
     content = {
         "settings": dict(settings),
-        "effect": {"d": design.difference, "d_z": design.dz, "f": design.f, "correlation": design.correlation},
-        "needed": {
-            "closed_form": planned.closed_form,
-            "simulated": vars(planned.simulated),
-            "corrected": planned.corrected and vars(planned.corrected),
-        },
+        "effect": dict(effect),
+        "needed": dict(needed),
         "meaning": _MEANING,
-        "rows": rows,
+        "rows": list(rows),
     }
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     (folder / "power.json").write_text(text, encoding="utf-8")
-    _draw(folder / "power.svg", design, rows, planned, settings["power"])
 
 
 def _draw(path: Path, design: Design, rows: Sequence[Record], planned: SampleSize, target: float) -> None:
@@ -155,3 +195,20 @@ def _draw(path: Path, design: Design, rows: Sequence[Record], planned: SampleSiz
     labels = figures.Labels(f"{_named(design)}: {effect}", f"Power (chance that p < {design.alpha:g})")
     shown = pd.DataFrame(rows).dropna(axis="columns", how="all")
     figures.draw(figures.power, path, shown, series, target, planned.judged_by, labels)
+
+
+def draw_curves(path: Path, title: str, alpha: float, rows: Sequence[Record], target: float) -> None:
+    """power.svg with a curve for each effect in the rows, which are all of the same numbers of participants."""
+    import pandas as pd
+
+    from pipeline.report import figures
+
+    closed = rows[0]["power_closed_form"] is not None
+    ends = {"": "power_closed_form"} if closed else {end: f"power_simulated{end}" for end in ("", "_low", "_high")}
+    table: dict[int, Record] = {}
+    for row in rows:
+        at = table.setdefault(row["participants"], {"participants": row["participants"]})
+        at |= {f"{row['effect']}{end}": row[column] for end, column in ends.items()}
+    series = {name: name for name in dict.fromkeys(row["effect"] for row in rows)}
+    labels = figures.Labels(title, f"Power (chance that p < {alpha:g})")
+    figures.draw(figures.power, path, pd.DataFrame(list(table.values())), series, target, None, labels)

@@ -5,7 +5,7 @@ The tests here take many studies at once and decide as `t_welch`, `anova_welch`,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ from scipy import stats
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mann_whitney import rank_sum_p
 from pipeline.statistics.power_designs import SeveralGroups
-from pipeline.statistics.power_simulation import BoolArray, Share
+from pipeline.statistics.power_simulation import BoolArray, Share, crossings
 from pipeline.statistics.search import smallest
 
 TESTS = ("t_welch", "mann_whitney", "anova_welch", "kruskal")
@@ -62,27 +62,9 @@ def detectable_by_simulation(
 ) -> tuple[float, float, float] | None:
     """The smallest effect f that n find with this power, and between which the simulation's error leaves it.
 
-    None up to the largest. Studies of all effects are made of the same draws, so power rises with the effect but for
-    single studies.
+    None up to the largest.
     """
-
-    def crossing(reached: Callable[[Share], float]) -> float | None:
-        low, high = 0.0, largest
-        if reached(simulate_groups(design, high, n, studies, seed)) < power:
-            return None
-        while high - low > 1e-4 * high:
-            middle = (low + high) / 2
-            if reached(simulate_groups(design, middle, n, studies, seed)) >= power:
-                high = middle
-            else:
-                low = middle
-        return high
-
-    crossings = [crossing(lambda share: share.power), crossing(lambda share: share.interval()[1])]
-    certain = crossing(lambda share: share.interval()[0])
-    if crossings[0] is None:
-        return None
-    return crossings[0], crossings[1] or 0.0, largest if certain is None else certain
+    return crossings(lambda effect: simulate_groups(design, effect, n, studies, seed), power, largest)
 
 
 def _drawn(

@@ -5,9 +5,9 @@ The tests here take many studies at once and decide as `t_paired`, `wilcoxon` an
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -64,6 +64,33 @@ def simulate(design: Design, n: int, studies: int, seed: int, values_at_once: in
             own += int(np.sum(_significant(design, values[..., 0] - values[..., 1])))
     has_correction = design.test == "rm_anova" and design.conditions > 2
     return Simulated(Share(own, studies), Share(corrected, studies) if has_correction else None)
+
+
+def crossings(share_of: Callable[[float], Share], power: float, largest: float) -> tuple[float, float, float] | None:
+    """The smallest effect whose share reaches this power, and between which the simulation's error leaves it.
+
+    None where the largest does not reach it. `share_of` draws the same for every effect, so that power rises with the
+    effect but for single studies. Each of the three is looked for by halves, down to 1e-3 of itself.
+    """
+    share_of = cache(share_of)
+
+    def crossing(reached: Callable[[Share], float]) -> float | None:
+        low, high = 0.0, largest
+        if reached(share_of(high)) < power:
+            return None
+        while high - low > 1e-3 * high:
+            middle = (low + high) / 2
+            if reached(share_of(middle)) >= power:
+                high = middle
+            else:
+                low = middle
+        return high
+
+    effect = crossing(lambda share: share.power)
+    if effect is None:
+        return None
+    low, high = crossing(lambda share: share.interval()[1]), crossing(lambda share: share.interval()[0])
+    return effect, low or 0.0, largest if high is None else high
 
 
 def _drawn(

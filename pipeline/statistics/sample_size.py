@@ -68,16 +68,16 @@ def sample_size(design: Design, power: float, studies: int, seed: int, most: int
         if exact is None:
             return None
     start = min(most, exact or _likely_for_ranks(design, power, most))
-    simulated = _needed(lambda n: at(n).own, power, start, most)
+    simulated = needed(lambda n: at(n).own, power, start, most)
     if simulated.n is None and exact is None:
         return None
     corrected = None
     if at(start).corrected is not None:
-        corrected = _needed(lambda n: at(n).corrected or at(n).own, power, start, most)
+        corrected = needed(lambda n: at(n).corrected or at(n).own, power, start, most)
     middle = exact or simulated.n or most
     answers = (simulated, corrected) if corrected else (simulated,)
     answers_n = [n for answer in answers for n in (answer.n, answer.low, answer.high) if n]
-    numbers = {*_spread(middle, most), middle, max(FEWEST, middle - 1), *answers_n}
+    numbers = {*spread(middle, most), middle, max(FEWEST, middle - 1), *answers_n}
     rows = tuple(Row(n, closed_form(design, n), at(n)) for n in sorted(numbers))
     return SampleSize(rows, exact, simulated, corrected)
 
@@ -94,7 +94,8 @@ def _likely_for_ranks(design: Design, power: float, most: int) -> int:
     return max(int(np.ceil(by_t * np.pi / 3)), attainable)
 
 
-def _needed(share: Callable[[int], Share], power: float, start: int, most: int) -> Needed:
+def needed(share: Callable[[int], Share], power: float, start: int, most: int) -> Needed:
+    """The fewest participants by simulated studies, looked for from `start`, and what bounds the simulation's error."""
     n = smallest(lambda n: share(n).power >= power, FEWEST, most, start)
     low = smallest(lambda n: share(n).interval()[1] >= power, FEWEST, most, n or most)
     high = smallest(lambda n: share(n).interval()[0] >= power, FEWEST, most, n or most)
@@ -103,7 +104,7 @@ def _needed(share: Callable[[int], Share], power: float, start: int, most: int) 
     return Needed(n, low, high)
 
 
-def _spread(middle: int, most: int) -> Iterable[int]:
+def spread(middle: int, most: int) -> Iterable[int]:
     """Round numbers up to well beyond the middle."""
     last = min(most, max(middle + 4, round(1.6 * middle)))
     step = next((step for step in _STEPS if last / step <= _ROWS), _STEPS[-1])

@@ -296,7 +296,10 @@ def test_the_files(power: Power, tmp_path: Path) -> None:
     assert ran.code == 0
     content = json.loads((out / "power.json").read_text(encoding="utf-8"))
     rows = list(csv.DictReader((out / "power.csv").read_text(encoding="utf-8").splitlines()))
-    assert [{key: float(cell) for key, cell in row.items()} for row in rows] == content["rows"]
+    assert {row.pop("effect") for row in rows} == {"condition"}
+    numbers = [{key: float(cell) for key, cell in row.items()} for row in rows]
+    assert [{"effect": "condition", **row} for row in numbers] == content["rows"]
+    rows = list(csv.DictReader((out / "power.csv").read_text(encoding="utf-8").splitlines()))
     assert set(content["meaning"]) <= set(rows[0])
     assert content["settings"]["power"] == 0.8
     assert f"{content['needed']['closed_form']} participants" in ran.out
@@ -310,7 +313,7 @@ def test_the_files(power: Power, tmp_path: Path) -> None:
 
 def test_columns_of_the_files_do_not_vary(power: Power, tmp_path: Path) -> None:
     headers = set()
-    for test in ("t_paired", "wilcoxon", "rm_anova"):
+    for test in ("t_paired", "wilcoxon", "rm_anova", "t_welch", "kruskal", "mixed_anova"):
         assert power("--test", test, "--effect", "1", *QUICK, "--out", tmp_path / test).code == 0
         headers.add((tmp_path / test / "power.csv").read_text().splitlines()[0])
     assert len(headers) == 1
