@@ -1,38 +1,87 @@
-"""`plan`: who does the conditions in which order, as a participants table."""
+"""`plan`: who is in which group and does the conditions in which order, as a participants table; and every block."""
 
 from __future__ import annotations
 
 import csv
 import io
-import unicodedata
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.commands import console
+from pipeline.commands.plan_design import Design, Person, factor, people, require_printable, schedule
 from pipeline.errors import PipelineError
-from pipeline.statistics.counterbalancing import Order, assigned, balance, williams_design
+from pipeline.statistics.counterbalancing import Order, balance, williams_design
 from pipeline.study.fields import identifier
 from pipeline.study.folder import load_study
-from pipeline.words import counted
+from pipeline.words import counted, listing
 
 _NAMED_AS = "name them as study.yaml does, as in: steadyhand plan kinect fusion --participants 12"
+_RESERVED = ("participant", "sequence", "condition", "period", "block", "targets")
+_TARGETS_MAX = 100
 
 
-def plan(
-    names: Sequence[str], study: Path | None, participants: int, *, prefix: str, seed: int | None, out: Path | None
-) -> None:
-    """Print the table, or write it to `out`; beside it, print how balanced it is."""
-    conditions = _conditions(names, study)
-    _printable("--prefix", prefix)
-    orders = assigned(len(conditions), participants, seed)
-    text = _table(conditions, orders, prefix)
+@dataclass(frozen=True)
+class Asked:
+    """The options of `plan`, as the command line states them."""
+
+    names: Sequence[str]
+    study: Path | None
+    participants: int | None
+    prefix: str
+    seed: int | None
+    cross: str | None
+    between: str | None
+    blocks: int
+    targets: str | None
+
+
+def plan(asked: Asked, out: Path | None, schedule_file: Path | None) -> None:
+    """Print the table, or write it to `out`; beside it, print how balanced it is. Write every block to the schedule."""
+    design = _design(asked)
+    require_printable("--prefix", asked.prefix)
+    if (design.blocks > 1 or design.targets) and schedule_file is None:
+        raise PipelineError("--blocks and --targets go into a table of their own; name it, as in --schedule blocks.csv")
+    planned = people(design)
+    width = max(2, len(str(design.participants)))
+    ids = [f"{asked.prefix}{number:0{width}d}" for number in range(1, design.participants + 1)]
+    text = _as_csv(_rows(design, planned, ids))
+    for path, option in ((out, "--out"), (schedule_file, "--schedule")):
+        _refuse_existing(path, option)
     if out is None:
         print(text, end="", flush=True)  # noqa: T201 - the bytes of the file, whatever the names hold
     else:
         _write(out, text)
-        console.say(f"{out}: {counted(participants, 'participant')}, {counted(len(conditions), 'condition')}")
-    for line in _balance_lines(conditions, orders):
+        told = [counted(design.participants, "participant"), counted(len(design.conditions), "condition")]
+        console.say(f"{out}: {', '.join(told)}")
+    if schedule_file is not None:
+        _write(schedule_file, _as_csv(_blocks(design, planned, ids)))
+        console.warn(f"{schedule_file}: every block")
+    for line in _balance_lines(design, planned):
         console.warn(line)
+
+
+def _design(asked: Asked) -> Design:
+    within = None if asked.cross is None else factor("--cross", asked.cross)
+    between = None if asked.between is None else factor("--between", asked.between)
+    for option, one in (("--cross", within), ("--between", between)):
+        own = _RESERVED if option == "--cross" else [name for name in _RESERVED if name != "condition"]
+        if one is not None and (one.name in own or one.name.startswith("period_")):
+            raise PipelineError(f'{option}: a factor cannot be called "{one.name}", the plan has such a column already')
+    if within is not None and between is not None and within.name == between.name:
+        raise PipelineError(f'--cross and --between are both called "{within.name}"; each factor needs its own name')
+    alone = between is not None and between.name == "condition"
+    if alone and (asked.names or asked.study or within):
+        raise PipelineError("--between condition=… is for participants who meet one condition each; name no others")
+    if alone and (asked.blocks > 1 or asked.targets):
+        raise PipelineError("--between condition=…: blocks and targets need conditions that participants meet in turn")
+    conditions = [] if alone else _conditions(asked.names, asked.study)
+    if asked.participants is None:
+        raise PipelineError("plan: how many participants? Give --participants, as in -n 12")
+    return Design(
+        tuple(conditions), asked.participants, asked.seed, within, between, asked.blocks, _targets(asked.targets)
+    )
 
 
 def _conditions(names: Sequence[str], study: Path | None) -> list[str]:
@@ -44,53 +93,126 @@ def _conditions(names: Sequence[str], study: Path | None) -> list[str]:
             raise PipelineError(f'plan: condition "{name}" is listed twice; {_NAMED_AS}')
         if not name:
             raise PipelineError(f"plan: a condition has no name; {_NAMED_AS}")
-        _printable("condition", name)
+        require_printable("condition", name)
     if len(conditions) < 2:
         raise PipelineError(f"plan: an order needs at least two conditions, found {len(conditions)}; {_NAMED_AS}")
     return conditions
 
 
-def _printable(what: str, text: str) -> None:
-    """Refuse control characters: a line break or an escape in an id is a slip of the keyboard or worse."""
-    if any(unicodedata.category(character) in ("Cc", "Cs") for character in text):
-        raise PipelineError(f"plan: {what} {text!r} contains a character that cannot be printed; leave it out")
+def _targets(text: str | None) -> tuple[str, ...]:
+    """A number of targets, or their names."""
+    if text is None:
+        return ()
+    named = tuple(str(place) for place in range(1, int(text) + 1)) if text.isdecimal() else tuple(text.split(","))
+    named = tuple(name.strip() for name in named)
+    if not 2 <= len(named) <= _TARGETS_MAX or len(set(named)) < len(named) or not all(named):
+        raise PipelineError(
+            f"--targets {text}: needs 2 to {_TARGETS_MAX} targets, each once: a number, or names as in --targets a,b,c"
+        )
+    for name in named:
+        require_printable("--targets", name)
+    return named
 
 
-def _table(conditions: Sequence[str], orders: Sequence[Order], prefix: str) -> str:
-    """CSV with one row per participant: the sequence as a label, and a column for each period."""
-    width = max(2, len(str(len(orders))))
+def _rows(design: Design, planned: Sequence[Person], ids: Sequence[str]) -> Iterator[list[str]]:
+    """One row per participant, the header first: group, the sequence as a label, and a column for each period.
+
+    With a further factor there is a column for each period too that has the order of its levels there.
+    """
+    periods = range(1, len(design.conditions) + 1)
+    header = ["participant", *([design.between.name] if design.between else [])]
+    header += ["sequence"] if design.conditions else []
+    header += [f"period_{period}" for period in periods]
+    yield [*header, *(f"{design.within.name}_{period}" for period in periods if design.within)]
+    for person, name in zip(planned, ids, strict=True):
+        row = [name, *([_group(design, person)] if design.between else [])]
+        run = [design.conditions[at] for at in person.order]
+        row += [" > ".join(run)] if run else []
+        levels = design.within.levels if design.within else ()
+        yield [*row, *run, *(_in_order(levels, person.levels[at]) for at in person.order if levels)]
+
+
+def _blocks(design: Design, planned: Sequence[Person], ids: Sequence[str]) -> Iterator[list[str]]:
+    """One row per block, the header first."""
+    between, within = design.between, design.within
+    header = ["participant", *([between.name] if between else []), "period", "condition"]
+    yield [*header, *([within.name] if within else []), "block", *(["targets"] if design.targets else [])]
+    for block in schedule(design, planned):
+        row = [ids[block.person], *([_group(design, planned[block.person])] if between else [])]
+        row += [str(block.period), block.condition, *([block.level or ""] if within else []), str(block.number)]
+        yield [*row, *([" > ".join(block.targets)] if design.targets else [])]
+
+
+def _group(design: Design, person: Person) -> str:
+    return "" if design.between is None or person.group is None else design.between.levels[person.group]
+
+
+def _in_order(names: Sequence[str], order: Order) -> str:
+    return " > ".join(names[place] for place in order)
+
+
+def _as_csv(rows: Iterable[list[str]]) -> str:
     buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(["participant", "sequence", *(f"period_{place}" for place in range(1, len(conditions) + 1))])
-    for number, order in enumerate(orders, start=1):
-        run = [conditions[at] for at in order]
-        writer.writerow([f"{prefix}{number:0{width}d}", " > ".join(run), *run])
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
     return buffer.getvalue()
 
 
+def _refuse_existing(path: Path | None, option: str) -> None:
+    if path is not None and path.exists():
+        raise PipelineError(f"{option} {path}: already exists; choose another file, or remove this one")
+
+
 def _write(path: Path, text: str) -> None:
-    if path.exists():
-        raise PipelineError(f"--out {path}: already exists; choose another file, or remove this one")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _balance_lines(conditions: Sequence[str], orders: Sequence[Order]) -> list[str]:
-    """How often each condition is in each period and follows each other one, counted from the orders."""
+# How balanced it is -----------------------------------------------------------------------------------------------
+
+
+def _balance_lines(design: Design, planned: Sequence[Person]) -> Iterator[str]:
+    """Group sizes, and within each group how balanced the orders are, counted from them."""
+    if design.between is None:
+        yield from _orders_balanced(design, planned)
+        return
+    sizes = Counter(_group(design, person) for person in planned)
+    yield f"{design.between.name}: {listing([f'{sizes[level]} {level}' for level in design.between.levels])}."
+    for level in design.between.levels:
+        mine = [person for person in planned if _group(design, person) == level]
+        if mine and design.conditions:
+            yield f"{level}:"
+            yield from (f"  {line}" for line in _orders_balanced(design, mine))
+
+
+def _orders_balanced(design: Design, planned: Sequence[Person]) -> Iterator[str]:
+    """How often each condition is in each period and follows each other one, and where each level comes first."""
+    conditions, orders = design.conditions, [person.order for person in planned]
     counts = balance(orders)
-    lines = [
+    yield (
         f"Each condition is in each period {_times(counts.period)},"
         f" and directly follows each other one {_times(counts.neighbours)}."
-    ]
+    )
+    if design.within is not None:
+        first = Counter(
+            (at, period, person.levels[at][0]) for person in planned for period, at in enumerate(person.order)
+        )
+        places = range(len(conditions))
+        each = [
+            first[at, period, level] for at in places for period in places for level in range(len(design.within.levels))
+        ]
+        yield (
+            f"In each condition and period each level of {design.within.name} comes first"
+            f" {_times((min(each), max(each)))}."
+        )
     if counts.complete:
-        return [*lines, "Counterbalancing is complete."]
+        yield "Counterbalancing is complete."
+        return
     size, n = len(williams_design(len(conditions))), len(orders)
     fitting = [str(many) for many in (n // size * size, (n // size + 1) * size) if many]
-    return [
-        *lines,
+    yield (
         f"Counterbalancing is incomplete: {len(conditions)} conditions take {size} sequences, which"
-        f" {counted(n, 'participant')} cannot share evenly; {' or '.join(fitting)} participants could.",
-    ]
+        f" {counted(n, 'participant')} cannot share evenly; {' or '.join(fitting)} participants could."
+    )
 
 
 def _times(bounds: tuple[int, int]) -> str:

@@ -110,21 +110,58 @@ def power(
 
 def plan(
     *,
-    participants: Annotated[int, typer.Option("--participants", "-n", min=1, max=10_000, help="How many.")],
     conditions: Annotated[
-        list[str] | None, typer.Argument(metavar="CONDITION...", help="The conditions, as study.yaml names them.")
+        list[str] | None,
+        typer.Argument(metavar="CONDITION...", help="The conditions, as study.yaml names them."),
+    ] = None,
+    participants: Annotated[
+        int | None, typer.Option("--participants", "-n", min=1, max=10_000, help="How many participants.")
     ] = None,
     study: Annotated[
         Path | None, typer.Option(metavar="STUDY", help="Take the conditions of this study instead.")
     ] = None,
+    cross: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=LEVEL,...",
+            help="A second factor, done in full in every condition, such as task=easy,hard. The order of its levels is"
+            " balanced too, over conditions and periods.",
+        ),
+    ] = None,
+    between: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=GROUP,...",
+            help="Groups of participants, such as training=none,short. Sizes differ by one at most, and orders are"
+            " balanced within each group. condition=A,B: each participant meets one condition only.",
+        ),
+    ] = None,
+    blocks: Annotated[
+        int, typer.Option(min=1, max=1000, help="Blocks in each condition (and level); needs --schedule.")
+    ] = 1,
+    targets: Annotated[
+        str | None,
+        typer.Option(
+            metavar="K",
+            help="Targets in each block, a number or names joined by commas, each block in another order, so that each"
+            " target comes equally often in each place; needs --schedule.",
+        ),
+    ] = None,
     prefix: Annotated[str, typer.Option(help="What the participants' ids begin with.")] = "P",
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="Let chance decide who gets which sequence, within each square. Default: in turn."),
+        typer.Option(
+            min=0,
+            help="Let chance decide who gets which group and which sequence, as balanced as without. Default: in turn.",
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table there. Default: print it.")] = None,
+    schedule: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a second table there, with a row for every block.")
+    ] = None,
 ) -> None:
-    """Give each participant an order of the conditions: a balanced Latin square, as a participants.csv."""
+    """Give each participant a group and an order of the conditions: balanced Latin squares, as a participants.csv."""
     from pipeline.commands import plan as command
 
-    command.plan(conditions or [], study, participants, prefix=prefix, seed=seed, out=out)
+    asked = command.Asked(conditions or [], study, participants, prefix, seed, cross, between, blocks, targets)
+    command.plan(asked, out, schedule)

@@ -25,7 +25,10 @@ def williams_design(conditions: int) -> list[Order]:
     return square if conditions % 2 == 0 else square + [order[::-1] for order in square]
 
 
-def assigned(conditions: int, participants: int, seed: int | None = None) -> list[Order]:
+Seed = int | tuple[int, ...] | None
+
+
+def assigned(conditions: int, participants: int, seed: Seed = None) -> list[Order]:
     """One order per participant: whole squares one after the other, the last as far as it is needed.
 
     With a seed, chance decides within each square who gets which sequence.
@@ -39,6 +42,39 @@ def assigned(conditions: int, participants: int, seed: int | None = None) -> lis
         places = range(conditions) if random is None else random.permutation(conditions)
         orders += [square[place] for place in places]
     return orders[:participants]
+
+
+def allocated(groups: int, participants: int, seed: Seed = None) -> list[int]:
+    """A group a participant, counted from 0: one of each group in every so many participants, in turn.
+
+    With a seed, chance decides the order of the groups each time (permuted blocks), so that group sizes never differ by
+    more than one, whenever recruiting stops.
+    """
+    random = None if seed is None else np.random.default_rng(seed)
+    found: list[int] = []
+    while len(found) < participants:
+        found += range(groups) if random is None else random.permutation(groups).tolist()
+    return found[:participants]
+
+
+def nested(conditions: int, levels: int, participants: int, seed: Seed = None) -> list[tuple[Order, ...]]:
+    """For each participant the order of a second factor's levels in each condition, the conditions from 0 on.
+
+    Participants who share a round of all sequences of conditions (`assigned`) share their orders of levels, the next
+    round has the next ones, so that which level comes first is tied neither to a condition nor to its period; from one
+    condition to the next the orders move on by one. With a seed, chance decides in which succession they come.
+    """
+    design, sequences = williams_design(levels), len(williams_design(conditions))
+    random = None if seed is None else np.random.default_rng(seed)
+    found: list[tuple[Order, ...]] = []
+    succession = [0] * len(design)
+    for participant in range(participants):
+        turn, within_round = divmod(participant, sequences)
+        if within_round == 0 and turn % len(design) == 0:
+            places = range(len(design)) if random is None else random.permutation(len(design))
+            succession = [int(place) for place in places]
+        found.append(tuple(design[succession[(turn + condition) % len(design)]] for condition in range(conditions)))
+    return found
 
 
 @dataclass(frozen=True)

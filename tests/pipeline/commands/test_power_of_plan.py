@@ -178,7 +178,10 @@ def test_the_files_hold_every_effect(power: Power, tmp_path: Path) -> None:
         (("--test", "t_welch", "--effect", "1", "--levels", "2,3"), "--levels is not for t_welch, but for rm_anova"),
         (("--effect", "1", "--epsilon", "0.5"), "--epsilon is not for t_paired, but for rm_anova, mixed_anova"),
         (("--n", "12", "--conditions", "3"), "is for rm_anova and mixed_anova"),
-        (("--test", "rm_anova", "--levels", "2,x", "--n", "9"), "is not a list of numbers; write it as in --levels 2,3"),
+        (
+            ("--test", "rm_anova", "--levels", "2,x", "--n", "9"),
+            "is not a list of numbers; write it as in --levels 2,3",
+        ),
         (("--test", "rm_anova", "--levels", "1,3", "--n", "9"), "a factor has 2 to 100 levels"),
         (("--test", "rm_anova", "--levels", "2,2,2,2", "--n", "9"), "three factors are the most"),
         (

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.statistics.counterbalancing import assigned, balance, williams_design
+from pipeline.statistics.counterbalancing import allocated, assigned, balance, nested, williams_design
 from pipeline.study.csv_tables import read_participants
 from tests.pipeline.helpers import Ran, run
 
@@ -72,6 +72,30 @@ def test_any_number_of_participants_is_spread_as_evenly_as_it_can_be(
         assert found.complete
         assert sorted(set(orders)) == sorted(williams_design(conditions))
     assert orders == assigned(conditions, participants, seed)
+
+
+@given(groups=st.integers(2, 6), participants=st.integers(1, 60), seed=st.none() | st.integers(0, 99))
+def test_groups_differ_by_one_at_most_whenever_recruiting_stops(
+    groups: int, participants: int, seed: int | None
+) -> None:
+    found = allocated(groups, participants, seed)
+    for stop in range(1, participants + 1):
+        sizes = [found[:stop].count(group) for group in range(groups)]
+        assert max(sizes) - min(sizes) <= 1
+    assert found == allocated(groups, participants, seed)
+
+
+@given(conditions=st.integers(2, 4), levels=st.integers(2, 4), seed=st.none() | st.integers(0, 99))
+def test_orders_of_levels_are_tied_to_neither_condition_nor_sequence(
+    conditions: int, levels: int, seed: int | None
+) -> None:
+    """Over all sequences of conditions times all orders of levels, every pair of both comes equally often."""
+    people = len(williams_design(conditions)) * len(williams_design(levels))
+    orders, of_levels = assigned(conditions, people, seed), nested(conditions, levels, people, seed)
+    for condition in range(conditions):
+        pairs = [(order, each[condition]) for order, each in zip(orders, of_levels, strict=True)]
+        assert len(set(pairs)) == people
+        assert {pairs.count(pair) for pair in set(pairs)} == {1}
 
 
 def test_one_condition_has_no_order() -> None:
