@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pipeline.engine.stage import Stage
+from pipeline.study.folder import PREREGISTERED
 from pipeline.study.settings import Study
 
 STAGES: tuple[Stage, ...] = (
@@ -70,8 +71,12 @@ STAGES: tuple[Stage, ...] = (
             "estimators",
             "simulation",
             "repeats",
+            "scoring",
+            "shown",
+            "preregistration",
         ),
         files=("participants", "printed", "repeats"),
+        fixed_files=(PREREGISTERED,),
         label="comparing",
     ),
     Stage(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from pipeline.analysis.audit.beside_computed import compare_printed
 from pipeline.analysis.comparisons import People, all_requests, compared, people_of
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.measure import ALL_DATA
+from pipeline.analysis.preregistration.hypotheses import Done
+from pipeline.analysis.preregistration.plan_and_done import plan_and_done
 from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
@@ -19,6 +22,7 @@ from pipeline.sessions.estimators import build_estimator
 from pipeline.statistics.descriptive import summarize
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.measures import measure_order
+from pipeline.study.preregistration import read_preregistered
 from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.tables import results
@@ -73,10 +77,24 @@ def run(work: Work) -> Outcome:
         repeats = study_tables.read_repeats(work.folder / study.repeats, study.conditions)
         rows = list(reductions(study.simulation, study.conditions, repeats))
         frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
+    facts = _participant_facts(work, measures)
+    frames["preregistration"] = tables.frame("preregistration", _beside_plan(work, frames, facts["n"]))
     for name, table in frames.items():
         tables.write(name, table, work.out)
-    results.write(work.out / "results.json", work.study_name, study, frames, _participant_facts(work, measures))
+    results.write(work.out / "results.json", work.study_name, study, frames, facts)
     return Outcome()
+
+
+def _beside_plan(work: Work, frames: Mapping[str, pd.DataFrame], participants: int) -> list[Row]:
+    """What was done beside what was preregistered; nothing where nothing was."""
+    frozen = read_preregistered(work.folder)
+    if frozen is None:
+        return []
+    comparisons = list(tables.records("comparisons", frames["comparisons"]))
+    details = [json.loads(row["details"]) if row["details"] else None for row in comparisons]
+    rows = [{**row, "details": detail} for row, detail in zip(comparisons, details, strict=True)]
+    known = sorted(set(frames["measures"]["measure"]), key=measure_order)
+    return plan_and_done(frozen, work.study, Done(known, participants, rows))
 
 
 def _comparisons_of_all_data(study: Study, folder: Path, people: People) -> tuple[list[Row], list[Row]]:

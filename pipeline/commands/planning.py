@@ -112,7 +112,10 @@ def plan(
     *,
     conditions: Annotated[
         list[str] | None,
-        typer.Argument(metavar="CONDITION...", help="The conditions, as study.yaml names them."),
+        typer.Argument(
+            metavar="CONDITION...",
+            help="The conditions, as study.yaml names them; with --preregister a study folder.",
+        ),
     ] = None,
     participants: Annotated[
         int | None, typer.Option("--participants", "-n", min=1, max=10_000, help="How many participants.")
@@ -156,11 +159,24 @@ def plan(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table there. Default: print it.")] = None,
+    preregister: Annotated[
+        bool,
+        typer.Option(
+            "--preregister",
+            help="Freeze what a study's study.yaml will test: preregistered.yaml, and preregistration.md to paste into"
+            " AsPredicted or OSF, in the study's folder. A later report lists every deviation.",
+        ),
+    ] = False,
     schedule: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a second table there, with a row for every block.")
     ] = None,
 ) -> None:
     """Give each participant a group and an order of the conditions: balanced Latin squares, as a participants.csv."""
+    if preregister:
+        from pipeline.commands import preregister as registering
+
+        registering.preregister(conditions or [])
+        return
     from pipeline.commands import plan as command
 
     asked = command.Asked(conditions or [], study, participants, prefix, seed, cross, between, blocks, targets)

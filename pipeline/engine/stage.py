@@ -18,8 +18,8 @@ class Stage:
 
     `function` is "module:function", imported only when there is something to compute. A stage of scope "session" runs
     once per session, one of scope "study" once. `reads` names earlier stages, `settings` keys of study.yaml, `files`
-    keys of study.yaml that name a file. `label` and `unit` are shown as progress: what is being done, and what its
-    steps are.
+    keys of study.yaml that name a file, `fixed_files` files under a fixed name that a study may have. `label` and
+    `unit` are shown as progress: what is being done, and what its steps are.
     """
 
     name: str
@@ -28,6 +28,7 @@ class Stage:
     reads: tuple[str, ...] = ()
     settings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    fixed_files: tuple[str, ...] = ()
     reads_log: bool = False
     names_inputs: bool = False  # its output lists every file of the study that was read
     label: str = ""

@@ -11,7 +11,7 @@ from pipeline.engine.input_digests import file_digests
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Outcome
 from pipeline.errors import PipelineError
-from pipeline.study.folder import TABLE_FIELDS, find_sessions, load_study
+from pipeline.study.folder import TABLE_FIELDS, files_by_fixed_name, find_sessions, load_study
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
@@ -35,6 +35,7 @@ def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache:
         name = getattr(study, field_name)
         if name is not None:
             paths.append(root / name)
+    paths += [root / name for name in files_by_fixed_name(root)]
     files = {path.relative_to(root).as_posix(): path for path in paths}
     return file_digests(files, root, cache.inputs)
 

@@ -69,7 +69,9 @@ class Participants:
     @property
     def judged_by(self) -> int | None:
         """The closed form's answer where there is one, for it has no error of simulation."""
-        return self.closed_form if self.closed_form is not None else self.simulated and self.simulated.n
+        if self.closed_form is not None or self.simulated is None:
+            return self.closed_form
+        return self.simulated.n
 
 
 def effect_for(planned: PlannedEffect, n: int, power: float) -> SmallestEffect:

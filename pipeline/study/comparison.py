@@ -25,7 +25,8 @@ AdjustmentName = Annotated[str, AfterValidator(_known_adjustment)]
 
 
 _PERIOD_AS_FACTOR = "factor(period)"
-_OPTIONS = {option for test in TESTS.values() for option in test.options}
+OPTIONS = {option for test in TESTS.values() for option in test.options}
+"""The keys that only some tests take."""
 
 
 class Comparison(Frozen):
@@ -48,10 +49,12 @@ class Comparison(Frozen):
     bootstrap: bool = False
     permutation: bool = False
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
+    hypothesis: Annotated[str, Field(min_length=1)] | None = None
+    direction: Literal["less", "greater"] | None = None
 
     @model_validator(mode="after")
     def _fits_the_test(self) -> Comparison:
-        for key in _OPTIONS - set(TESTS[self.test].options):
+        for key in OPTIONS - set(TESTS[self.test].options):
             if getattr(self, key) != type(self).model_fields[key].default:
                 raise ValueError(f"{self.test} does not take {key}; it is for {' and '.join(tests_that_take(key))}")
         if self.family is not None and self.adjust == "none":
@@ -82,6 +85,12 @@ class Comparison(Frozen):
             )
         return self
 
+    @model_validator(mode="after")
+    def _has_a_direction(self) -> Comparison:
+        if self.direction is not None and TESTS[self.test].question == "equivalence":
+            raise ValueError(f"{self.test} supposes that there is no difference, so direction has no meaning there")
+        return self
+
     @property
     def measures(self) -> tuple[str, ...]:
         """The measures that the entry names, each a name or a pattern."""
@@ -91,6 +100,11 @@ class Comparison(Frozen):
     def title(self) -> str:
         """The measures as an error names them."""
         return ", ".join(self.measures)
+
+    @property
+    def is_within(self) -> bool:
+        """Does its test compare conditions within participants?"""
+        return TESTS[self.test].design == "within"
 
     @property
     def options(self) -> tuple[str, ...]:

@@ -13,6 +13,8 @@ from pipeline.study.settings import Study
 from pipeline.study.yaml_text import parse, read_yaml
 
 SETTINGS_FILE = "study.yaml"
+PREREGISTERED = "preregistered.yaml"
+FIXED_NAMES = (PREREGISTERED,)  # files that a study may have, and that no key of study.yaml names
 
 
 TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed", "repeats")  # files of a study
@@ -42,6 +44,11 @@ def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
     if study.sessions is not None:
         inside(folder, study.sessions, f"{path}: sessions", must_exist=False)
     return study
+
+
+def files_by_fixed_name(folder: Path) -> list[str]:
+    """Those that the study has. PipelineError for one that is a link out of its folder."""
+    return [name for name in FIXED_NAMES if inside(folder, name, str(folder / name), must_exist=False).is_file()]
 
 
 def inside(folder: Path, name: str, field: str, must_exist: bool = True) -> Path:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.study.comparison import Comparison
 from pipeline.study.fields import Axes, Frozen, Id, Positive, known, unique
+from pipeline.study.preregistration_settings import Preregistration
 from pipeline.study.scoring_settings import Scoring
 from pipeline.study.session import Session, check_pattern
 from pipeline.study.simulation import Simulation, Task
@@ -120,6 +121,7 @@ class Study(Frozen):
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()
     quality_limits: QualityLimits = QualityLimits()
+    preregistration: Preregistration = Preregistration()
     task: Task | None = None
     simulation: Simulation | None = None
 
@@ -136,12 +138,7 @@ class Study(Frozen):
         for name, estimator in self.estimators.items():
             for stream in estimator.use or ():
                 known(f"estimators.{name}.use", stream, self.sensor_streams)
-        for comparison in self.comparisons:
-            if comparison.test == "crossover" and len(self.conditions) != 2:
-                raise ValueError(
-                    f"comparisons: crossover is for two conditions, and there are {len(self.conditions)}; mixed_model"
-                    " with fixed: [condition, period] takes more"
-                )
+        self._comparisons_fit()
         self._question_fits()
         self._families_fit()
         self._sensors_fit()
@@ -154,6 +151,20 @@ class Study(Frozen):
         if not (self.sessions or self.trials or self.questionnaires or self.measures):
             raise ValueError("has no data; add sessions, trials, questionnaires or measures")
         return self
+
+    def _comparisons_fit(self) -> None:
+        """Raise ValueError where a comparison is for another number of conditions."""
+        for comparison in self.comparisons:
+            if comparison.test == "crossover" and len(self.conditions) != 2:
+                raise ValueError(
+                    f"comparisons: crossover is for two conditions, and there are {len(self.conditions)}; mixed_model"
+                    " with fixed: [condition, period] takes more"
+                )
+            if comparison.direction is not None and comparison.is_within and len(self.conditions) > 2:
+                raise ValueError(
+                    f"comparisons: direction says which of two conditions has the greater values, and there are"
+                    f" {len(self.conditions)}; say it in hypothesis"
+                )
 
     def _question_fits(self) -> None:
         """Raise ValueError where a pair that is asked about is not of two conditions."""

@@ -243,6 +243,25 @@ STUDY_TABLES = (
         as_csv=True,
     ),
     Table(
+        "preregistration",
+        "One row per point of the preregistration beside what was done; empty for a study that was not preregistered.",
+        (
+            text("what", "which point, such as a test, an adjustment of p, an exclusion or the participants"),
+            MEASURE._replace(about="the measures it is of; null for the whole study"),
+            text("planned", "what preregistered.yaml says"),
+            text("done", "what study.yaml says now, or what was found"),
+            text(
+                "verdict",
+                "as planned, deviation, exploratory (not planned), or altered (the file itself); of a hypothesis:"
+                " supported, not supported, opposite or see the comparisons",
+            ),
+        ),
+        stages=("compare",),
+        key=("what", "measure", "planned"),
+        in_results=True,
+        as_csv=True,
+    ),
+    Table(
         "measures",
         "One row per participant, condition and measure, and level of further factors.",
         (

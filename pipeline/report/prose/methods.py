@@ -136,7 +136,7 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     for entry in study.comparisons:
         of = listing([_named(pattern) for pattern in entry.measures])
         mine = [row for row in rows if row["test"] == entry.test]
-        said.setdefault(_test_text(entry, mine) + _followed_up(entry, mine), []).append(of)
+        said.setdefault(test_in_words(entry, mine) + _followed_up(entry, mine), []).append(of)
     for test, measures in said.items():
         yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
@@ -153,7 +153,7 @@ def _level(alpha: float) -> str:
     return f"{alpha:g}".removeprefix("0")
 
 
-def _test_text(entry: Comparison, rows: Sequence[Row]) -> str:
+def test_in_words(entry: Comparison, rows: Sequence[Row]) -> str:
     """`Wilcoxon signed-rank tests (…), exact, midranks, zeros dropped, p Holm-adjusted`; rows are of its test."""
     options = TESTS[entry.test].options
     parts = [TESTS[entry.test].methods_text]

@@ -14,6 +14,7 @@ from pipeline.report.sections import (
     participants,
     paste,
     paths,
+    preregistration,
     printed,
     provenance,
     quality,
@@ -24,6 +25,7 @@ from pipeline.report.sections.material import Material
 SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     overview.section,
     design.section,
+    preregistration.section,
     quality.section,
     accuracy.section,
     paths.section,

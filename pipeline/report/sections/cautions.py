@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pipeline.analysis.kinds_of_values import SHAPE
 from pipeline.report.document.model import Strong, Text
-from pipeline.report.sections import checks
+from pipeline.report.sections import checks, preregistration
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
@@ -49,6 +49,7 @@ def cautions(material: Material) -> list[Text]:
     """From what the data contradict and where they come from, through assumptions and design, to what is missing."""
     return [
         *_of_reference(material),
+        *preregistration.caution(material),
         *checks.caution(material),
         *checks.worse_than_tracker(material),
         *checks.of_tables(material),

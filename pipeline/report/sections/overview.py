@@ -21,7 +21,7 @@ from pipeline.report.document.model import (
 )
 from pipeline.report.figures.rainclouds import met_one_each
 from pipeline.report.prose.answer import HEADER, answer, notes, shown
-from pipeline.report.sections import traces
+from pipeline.report.sections import preregistration, traces
 from pipeline.report.sections.cautions import NOT_KNOWN, cautions, contradicted, without_reference
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
@@ -65,6 +65,7 @@ def section(material: Material) -> Section:
     blocks += _pairs(material)
     blocks += _figure(material)
     blocks.append(Paragraph(_data(material)))
+    blocks += preregistration.notice(material)
     found = cautions(material)
     if found:
         blocks.append(Notice("To be careful about", tuple(found)))

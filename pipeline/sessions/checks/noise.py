@@ -8,8 +8,8 @@ that of a filtered tracker, gives less and is not noticed. The quietest quarter 
 by simulation, by a seventh for windows of 30 readings of three axes and by a quarter for one axis. The result is
 corrected for that.
 
-Where the steps of twenty windows are nothing but noise, the result is within a tenth of the true value (at most 1.09 times it
-in 500 simulated sessions), so an excess of a fifth is reported there; elsewhere only one of a half is.
+Where the steps of twenty windows are nothing but noise, the result is within a tenth of the true value (at most 1.09
+times it in 500 simulated sessions), so an excess of a fifth is reported there; elsewhere only one of a half is.
 """
 
 from __future__ import annotations
