@@ -15,6 +15,7 @@ from pipeline.analysis.factors import BETWEEN_FACTORS, missing_cells
 from pipeline.errors import PipelineError
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column, Covariate, Factor
+from pipeline.statistics.result import IntArray
 from pipeline.tables.table import Row
 
 CARRY_OVER = "carry_over"
@@ -26,17 +27,21 @@ _WHERE = (
 
 @dataclass(frozen=True)
 class ModelRows:
-    """Values (N,) of a mixed model, the participant of each, the model's columns and terms, and who was left out."""
+    """Values (N,) of a mixed model, the participant of each, the model's columns and terms, and who was left out.
+
+    `crossed` has, by the name of the entry's `random`, which of its levels each value is of (N,).
+    """
 
     values: FloatArray
     participants: list[str]
     columns: dict[str, Column]
     terms: list[str]
+    crossed: dict[str, IntArray]
     left_out: list[Row]
 
 
 def of_model(request: Request) -> ModelRows:
-    """Each participant's mean in each combination of the levels that `fixed` names and that they have; not listwise.
+    """Each participant's mean in each combination of the levels that the entry names and that they have; not listwise.
 
     `period` is a slope, `factor(period)` a factor; `carry_over` is the condition of the preceding period, so the
     first period, which has none, does not count.
@@ -45,10 +50,12 @@ def of_model(request: Request) -> ModelRows:
     names = list(dict.fromkeys(name for term in terms for name in term.split(":")))
     own_columns = ("condition", "period", "sequence", CARRY_OVER)
     observations, factors = complete_cases.rows_and_factors(request, request.observations)
-    rows = complete_cases.with_factors(request, observations, [name for name in names if name not in own_columns])
+    random = [] if request.entry.random is None else [request.entry.random]
+    further = [*(name for name in names if name not in own_columns), *random]
+    rows = complete_cases.with_factors(request, observations, further)
     left_out: list[Row] = complete_cases.rare_levels(request, factors)
     if request.entry.missing == "listwise":
-        outside = {name: levels for name, levels in factors.crossed.items() if name not in names}
+        outside = {name: levels for name, levels in factors.crossed.items() if name not in further}
         rows, partial = _without_partial_conditions(request, rows, outside)
         left_out += partial
     for name in ("period", "sequence"):
@@ -58,9 +65,22 @@ def of_model(request: Request) -> ModelRows:
     if CARRY_OVER in names:
         rows, unknown = _with_carry_over(request, rows)
         left_out += unknown
-    means = _means(_means(rows, ["participant", *names, "factors"]), ["participant", *names])
+    cell = ["participant", *names, *random]
+    means = _means(_means(rows, [*cell, "factors"]), cell)
     columns = {name: _column(request, name, means[name]) for name in names}
-    return ModelRows(means["value"].to_numpy(np.float64), list(means["participant"]), columns, terms, left_out)
+    crossed = {name: _crossed(request, name, means[name]) for name in random}
+    values = means["value"].to_numpy(np.float64)
+    return ModelRows(values, list(means["participant"]), columns, terms, crossed, left_out)
+
+
+def _crossed(request: Request, name: str, values: pd.Series) -> IntArray:
+    """The level of a random factor that each row has; PipelineError for a factor with one level."""
+    codes, levels = pd.factorize(values, sort=True)
+    if len(levels) == 1:
+        raise PipelineError(
+            f'study.yaml: comparisons: random: "{name}" of "{request.measure}" has one level; leave random out'
+        )
+    return np.asarray(codes, dtype=np.int64)
 
 
 def _without_partial_conditions(

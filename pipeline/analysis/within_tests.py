@@ -161,10 +161,10 @@ def random_intercepts(model: model_rows.ModelRows) -> dict[str, IntArray]:
     """
     condition = model.columns.get("condition")
     if not isinstance(condition, Factor):
-        return {}
+        return model.crossed
     cells = cells_of(model.participants, condition)
     repeated = len(cells) >= _ROWS_A_CELL * len(np.unique(cells))
-    return {"participant:condition": cells} if repeated else {}
+    return {**({"participant:condition": cells} if repeated else {}), **model.crossed}
 
 
 def crossover_design(request: Request) -> Answer:

@@ -44,6 +44,7 @@ class Comparison(Frozen):
     bounds: tuple[Finite, Finite] | None = None
     prior_scale: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.707
     fixed: tuple[Id, ...] = ("condition",)
+    random: Id | None = None
     transform: Literal["none", "log"] = "none"
     exposure: Id | None = None
     bootstrap: bool = False
@@ -83,6 +84,8 @@ class Comparison(Frozen):
             raise ValueError(
                 "seed is for the chance of a bootstrap or permutation; add bootstrap: true, or leave it out"
             )
+        if self.random in {name for term in self.terms for name in term.split(":")}:
+            raise ValueError(f'random: "{self.random}" is a fixed term already; leave it out of one of them')
         return self
 
     @model_validator(mode="after")

@@ -103,7 +103,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "mixed model",
             "linear mixed models with a random intercept for each participant"
             " (REML, Satterthwaite's degrees of freedom)",
-            options=("follow_up", "fixed", "transform"),
+            options=("follow_up", "fixed", "random", "transform"),
             complete_cases=False,
             cite=("laird1982", "satterthwaite1946"),
         ),

@@ -165,6 +165,8 @@ def test_in_words(entry: Comparison, rows: Sequence[Row]) -> str:
         parts.append(f"rates per {unit_of(entry.exposure) or 'unit'} of {subject(entry.exposure).lower()}")
     if "fixed" in options:
         parts.append(f"fixed terms {listing(list(entry.fixed))}")
+    if entry.random is not None:
+        parts.append(f"a crossed random intercept for each {entry.random}")
     if entry.bounds is not None:
         parts.append(f"bounds {number(entry.bounds[0])} and {number(entry.bounds[1])}")
     if "prior_scale" in options:

@@ -117,6 +117,7 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
     if singular:
         text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so it"
         yield (Strong("Singular fit "), f"{text} treats all rows as if they came from different people.")
+    yield from _left_out_intercepts(rows)
     undefined = sum(row["status"] != "ok" for row in rows)
     if undefined:
         yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
@@ -127,6 +128,18 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         standard = held_against(row["reference"] for row in material.rows("accuracy"))
         text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain"
         yield (Strong("Stated uncertainty too small "), f"{text} {standard} in less than 90 % of instants.")
+
+
+def _left_out_intercepts(rows: list[Row]) -> Iterator[Text]:
+    """Random intercepts beside the participants' that a mixed model does without, since it finds no variance there."""
+    without: dict[str, list[Row]] = {}
+    for row in rows:
+        for name, variance in ((row["details"] or {}).get("variances") or {}).items():
+            if variance == 0 and name != "participant":
+                without.setdefault(name, []).append(row)
+    for name, concerned in without.items():
+        text = f"of each {name.replace(':', ' × ')}, in the mixed model for {_named(concerned)}: it finds no variance"
+        yield (Strong("A random intercept is left out, that "), f"{text} between them.")
 
 
 def _misshapen(row: Row) -> bool:
