@@ -21,7 +21,7 @@ from pipeline.statistics.result import Result
 from pipeline.study.measures import measure
 from pipeline.tables.table import Row
 
-_OF_RATIOS = "ratio of ratios"
+RATIO_OF_RATIOS = "ratio of ratios"
 
 
 def on_logarithms(request: Request) -> bool:
@@ -43,7 +43,9 @@ def _of_logarithms(result: Result) -> Result:
     if result.effect_size_name != "estimate":
         return replace(result, method=result.method + OF_LOGARITHMS)
     found = as_ratio(result)
-    return replace(found, effect_size_name=_OF_RATIOS) if ":" in result.effect and result.contrast is None else found
+    return (
+        replace(found, effect_size_name=RATIO_OF_RATIOS) if ":" in result.effect and result.contrast is None else found
+    )
 
 
 def follow_ups_of_logarithms(test: Callable[[FloatArray], Sequence[FollowUp]], values: FloatArray) -> list[FollowUp]:

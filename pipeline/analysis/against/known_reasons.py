@@ -113,7 +113,12 @@ _GROUPS = (
         "Student's t with one variance for both groups, taken where they are of the same size; ours is Welch's",
         ways.of_data(conventions.student),
     ),
-    KnownReason(("t_welch",), ("effect_size",), "without its sign", ways.without_sign),
+    KnownReason(
+        ("t_welch",),
+        ("effect_size",),
+        "another effect size: d_s, over the pooled SD, without its sign; ours is d_av, and d_s stands in the details",
+        ways.size_of("cohen_ds"),
+    ),
     KnownReason(
         ("games_howell",),
         ("effect_size",),

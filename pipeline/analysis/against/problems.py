@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
+import numpy as np
+
 from pipeline.analysis import complete_cases, families, groups, model_rows, within_tests
 from pipeline.analysis.comparisons import Answered
 from pipeline.analysis.complete_cases import Request
-from pipeline.statistics import mixed_anova, pairs
+from pipeline.analysis.ratios import on_logarithms
+from pipeline.statistics import OK, mixed_anova, pairs
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column
 from pipeline.statistics.pairs import Pair
@@ -100,8 +103,27 @@ def problems_of(answered: Answered) -> Iterator[Problem]:
     known = build(answered.request)
     for row in answered.rows:
         found = known.get((row["effect"], row["contrast"]))
-        if found is not None:
-            yield Problem(row, *found, entry)
+        if found is None:
+            continue
+        procedure, data = found
+        if not on_logarithms(answered.request):
+            yield Problem(row, procedure, data, entry)
+        elif row["status"] == OK and not _averages_before(row, entry):
+            yield Problem(row, procedure, _logarithms(data), entry)
+
+
+def _averages_before(row: Row, entry: Comparison) -> bool:
+    """Are a pair's values means over other factors? Of logarithms those are geometric, and no program is asked."""
+    return row["contrast"] is not None and (entry.test == "mixed_anova" or len(entry.within) > 1)
+
+
+def _logarithms(data: Data) -> Data:
+    """The same arrays of the logarithms of the values, which other programs take for plain values."""
+    if isinstance(data, Paired):
+        return Paired(np.log(data.first), np.log(data.second))
+    if isinstance(data, Groups):
+        return replace(data, groups=[np.log(group) for group in data.groups])
+    return data if isinstance(data, Family) else replace(data, values=np.log(data.values))
 
 
 def families_of(answered: Sequence[Answered]) -> Iterator[Problem]:

@@ -11,6 +11,8 @@ from scipy import stats
 from pipeline.analysis.against import conventions
 from pipeline.analysis.against.problems import Problem
 from pipeline.analysis.against.theirs import Figure
+from pipeline.analysis.ratios import RATIO_OF_RATIOS
+from pipeline.statistics import RATIO
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.bayes import log_bayes_factor
 from pipeline.statistics.mixed import mixed_model
@@ -28,9 +30,13 @@ def ours(row: Row, quantity: str) -> float | None:
     """A figure of a row: a column, or one of its details."""
     details = row["details"] or {}
     if quantity in ("ci_difference_low", "ci_difference_high"):
-        interval = details.get("ci_difference")
+        interval = details.get("ci_difference", details.get("log_ratio_ci"))
         return None if interval is None else float(interval[quantity.endswith("high")])
     value = row[quantity] if quantity in row else details.get(quantity)
+    if quantity == "effect_size" and "log_ratio" in details and row["effect_size_name"] in (RATIO, RATIO_OF_RATIOS):
+        # Other programs take the logarithms for plain values: what they have is not the ratio.
+        of_logarithms = (details[name] for name in ("cohen_dz", "cohen_dav", "log_ratio") if name in details)
+        value = next(of_logarithms)
     return None if value is None else float(value)
 
 
@@ -102,8 +108,18 @@ def weighted_by_group(problem: Problem, _theirs: Figures, quantity: str) -> floa
 def hedges_g(problem: Problem, _theirs: Figures, _quantity: str) -> float | None:
     """d_s with the approximate factor for small samples."""
     data: Any = problem.data
-    d, number = ours(problem.row, "effect_size"), sum(len(data.groups[place]) for place in data.pair)
+    d, number = ours(problem.row, "cohen_ds"), sum(len(data.groups[place]) for place in data.pair)
     return None if d is None else d * (1 - 3 / (4 * number - 9))
+
+
+def size_of(other: str) -> Way:
+    """Another figure of the same row of ours, without its sign."""
+
+    def way(problem: Problem, _theirs: Figures, _quantity: str) -> float | None:
+        value = ours(problem.row, other)
+        return None if value is None else abs(value)
+
+    return way
 
 
 def f_of_t(problem: Problem, _theirs: Figures, quantity: str) -> float | None:

@@ -15,7 +15,7 @@ import pytest
 
 from pipeline.statistics.multiplicity import METHODS, adjusted
 from pipeline.study.statistical_tests import ADJUSTMENTS
-from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.helpers import Steadyhand, run
 
 Row = dict[str, Any]
 Values = Mapping[str, Mapping[str, Sequence[float]]]
@@ -256,3 +256,17 @@ def test_a_rank_test_takes_no_transform(tmp_path: Path, steadyhand: Steadyhand) 
     ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: doubt, test: wilcoxon, transform: log"]))
     assert ran.code == 2
     assert "wilcoxon does not take transform; it is for rm_anova and t_paired" in ran.err
+
+
+def test_other_programs_are_given_the_logarithms(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What differs is named: no figure of a test of logarithms is set beside one of the plain values."""
+    tests = ("t_paired", "rm_anova", "mixed_model", "t_welch, between: group")
+    entries = [f"measure: time_s, test: {test}, transform: log" for test in tests]
+    folder = study(tmp_path / "study", THREE, entries, "factors: {group: between}\n", PEOPLE)
+    words = ("--cache", str(tmp_path / "cache"), "--against", "scipy,pingouin,statsmodels")
+    ran = run(capsys, monkeypatch, "check", folder, *words)
+    assert "scipy.stats.ttest_rel(x, y) agrees: t, df2, p, interval from, interval to" in ran.out
+    assert "scipy.stats.ttest_ind(x, y, equal_var=False) agrees: t, df2, p" in ran.out
+    assert "NO KNOWN REASON" not in ran.out

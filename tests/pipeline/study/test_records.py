@@ -31,7 +31,7 @@ def test_what_is_cited_stands_in_the_bibliography() -> None:
 
 
 def test_every_option_of_an_entry_belongs_to_a_test_that_knows_it() -> None:
-    always = {"measure", "test", "adjust", "family", "missing"}
+    always = {"measure", "test", "adjust", "family", "missing", "hypothesis", "direction"}
     assert {option for test in TESTS.values() for option in test.options} == set(Comparison.model_fields) - always
 
 
