@@ -36,7 +36,7 @@ def contradicted(material: Material) -> str:
     shown = ", ".join(named[:_REMARKS_MAX]) + (", …" if len(named) > _REMARKS_MAX else "")
     return (
         f"Which estimator is best is not said: {len(named)} of {counted(len(sessions), 'session')} {verb} what"
-        f" study.yaml states or their own readings ({shown}); data quality has the checks."
+        f" study.yaml states or their own readings ({shown}); see “Data quality and exclusions”."
     )
 
 
