@@ -37,7 +37,7 @@ def sensors(study: Study) -> dict[str, Sensor]:
     return {name: sensor(study, stream) for name, stream in study.sensor_streams.items()}
 
 
-_FUSING = ("window_gp", "fusion_kalman")  # the others take positions only, whatever sensors there are
+_POSITIONS_ONLY = ("raw", "one_euro", "holt", "position_kalman")  # whatever sensors there are
 
 
 def fusing(study: Study) -> dict[str, str]:
@@ -46,7 +46,7 @@ def fusing(study: Study) -> dict[str, str]:
     for name, settings in study.estimators.items():
         streams = [one for one, stream in study.sensor_streams.items() if isinstance(stream, AccelerationStream)]
         used = [one for one in streams if settings.use is None or one in settings.use]
-        if used and settings.type in _FUSING:
+        if used and settings.type not in _POSITIONS_ONLY:
             found[name] = used[0]
     return found
 
