@@ -131,8 +131,8 @@ RECIPES: dict[str, dict[str, Edit]] = {
             '    "count_signs": pairwise(lambda _, one, two: sign_of_means(one, two)),\n    "crossover": ',
             1,
         ).replace(
-            "from pipeline.statistics.paired import t_paired",
-            "from pipeline.statistics.paired import sign_of_means, t_paired",
+            "from pipeline.statistics.rank import wilcoxon",
+            "from pipeline.statistics.paired import sign_of_means\nfrom pipeline.statistics.rank import wilcoxon",
         ),
         "studies/README.md": after(
             "| test | what it is | effect size |\n|---|---|---|\n", "| `count_signs` | a count | |\n"

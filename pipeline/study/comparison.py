@@ -80,7 +80,8 @@ class Comparison(Frozen):
 
     @model_validator(mode="after")
     def _options_fit_together(self) -> Comparison:
-        if "seed" in self.model_fields_set and not (self.bootstrap or self.permutation):
+        # Not by whether it was written down: a preregistration writes down every key.
+        if self.seed != type(self).model_fields["seed"].default and not (self.bootstrap or self.permutation):
             raise ValueError(
                 "seed is for the chance of a bootstrap or permutation; add bootstrap: true, or leave it out"
             )

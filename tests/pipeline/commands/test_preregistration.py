@@ -440,7 +440,7 @@ def test_a_link_out_of_the_folder_is_refused(registered: Path, tmp_path: Path, s
     path.symlink_to(tmp_path / "elsewhere.yaml")
     ran = steadyhand("compare", registered)
     assert ran.code == 2
-    assert "leads out of the study folder" in ran.err
+    assert "is outside the study folder" in ran.err
 
 
 def test_an_unknown_key_is_an_error_of_the_file(registered: Path) -> None:
