@@ -21,6 +21,7 @@ from pipeline.engine.messages import session_messages
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.stages import COMPARE
+from pipeline.statistics import OF_LOGARITHMS
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
@@ -40,7 +41,9 @@ class Outcome:
     def title(self) -> str:
         """The row as study.yaml names what it is of."""
         row = self.row
-        return f"{row['measure']}, {row['test']}, {row['effect']}" + (f", {row['contrast']}" if row["contrast"] else "")
+        contrast = f", {row['contrast']}" if row["contrast"] else ""
+        logarithms = OF_LOGARITHMS if OF_LOGARITHMS in row["method"] else ""
+        return f"{row['measure']}, {row['test']}, {row['effect']}{contrast}{logarithms}"
 
 
 def against(

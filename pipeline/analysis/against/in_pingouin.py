@@ -11,8 +11,15 @@ from pipeline.analysis.against.long_tables import GROUP
 from pipeline.analysis.against.problems import P_ADJUSTED, Family, Groups, Paired, Within
 from pipeline.analysis.against.theirs import Call, Calls, Found, NotOffered, rounded
 from pipeline.study.comparison import Comparison
+from pipeline.study.statistical_tests import ADJUSTMENTS
 
-_ADJUSTMENTS = {"holm": "holm", "bonferroni": "bonf", "benjamini_hochberg": "fdr_bh"}
+_ADJUSTMENTS = {
+    "holm": "holm",
+    "bonferroni": "bonf",
+    "sidak": "sidak",
+    "benjamini_hochberg": "fdr_bh",
+    "benjamini_yekutieli": "fdr_by",
+}
 
 
 def version() -> str:
@@ -166,6 +173,8 @@ def _kruskal(data: Groups, _entry: Comparison) -> Found:
 def _multicomp(data: Family, _entry: Comparison) -> Found:
     import pingouin
 
+    if data.method not in _ADJUSTMENTS:
+        raise NotOffered(f"it has no {ADJUSTMENTS[data.method].label}")
     adjusted = pingouin.multicomp(np.array(data.p_values), method=_ADJUSTMENTS[data.method])[1]
     return {"p_adjusted": adjusted[data.place]}
 

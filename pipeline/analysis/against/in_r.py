@@ -40,15 +40,24 @@ PROCEDURES = (
     P_ADJUSTED,
 )
 """What the script knows."""
-_ADJUSTMENTS = {"holm": "holm", "bonferroni": "bonferroni", "benjamini_hochberg": "BH"}
+_ADJUSTMENTS = {
+    "holm": "holm",
+    "bonferroni": "bonferroni",
+    "hochberg": "hochberg",
+    "hommel": "hommel",
+    "benjamini_hochberg": "BH",
+    "benjamini_yekutieli": "BY",
+}
 _SETTINGS: Mapping[str, Any] = dict.fromkeys(("factors", "terms", "effect", "method"), "") | dict.fromkeys(
     ("place", "low", "high", "scale")
 )
 
 
 def knows(problem: Problem) -> bool:
-    """Does the script have a row for it? R's table of a mixed model tests terms, not two levels of several."""
+    """Does R have it? Its table of a mixed model tests terms, not two levels of several; p.adjust has no Šidák."""
     data = problem.data
+    if isinstance(data, Family):
+        return data.method in _ADJUSTMENTS
     if isinstance(data, Model) and data.levels is not None:
         column = data.columns[data.term]
         return isinstance(column, Factor) and len(column.levels) == 2

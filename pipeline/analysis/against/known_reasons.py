@@ -139,7 +139,10 @@ _GROUPS = (
 _OF_MODEL = ("mixed_model",)
 _FITTED = ("statistic", "df2", "p", "effect_size", "se", "log_likelihood")
 _SECOND_FIRST = "second level minus first; ours is first minus second"
-_ALONE = "without an intercept for each participant's condition: rows of one condition count as if independent"
+_ALONE = (
+    "with an intercept for each participant alone, so that rows of one condition count as if independent; ours has the"
+    " further ones that its method names"
+)
 _INFINITE = "as if the number of participants were infinite; ours has Satterthwaite's degrees of freedom"
 _MODELS = (
     KnownReason(_OF_MODEL, ("statistic", "effect_size"), _SECOND_FIRST, ways.of_other_sign),

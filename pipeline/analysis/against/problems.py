@@ -12,7 +12,7 @@ from pipeline.analysis import complete_cases, families, groups, model_rows, with
 from pipeline.analysis.comparisons import Answered
 from pipeline.analysis.complete_cases import Request
 from pipeline.analysis.ratios import on_logarithms
-from pipeline.statistics import OK, mixed_anova, pairs
+from pipeline.statistics import mixed_anova, pairs
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column
 from pipeline.statistics.pairs import Pair
@@ -103,27 +103,8 @@ def problems_of(answered: Answered) -> Iterator[Problem]:
     known = build(answered.request)
     for row in answered.rows:
         found = known.get((row["effect"], row["contrast"]))
-        if found is None:
-            continue
-        procedure, data = found
-        if not on_logarithms(answered.request):
-            yield Problem(row, procedure, data, entry)
-        elif row["status"] == OK and not _averages_before(row, entry):
-            yield Problem(row, procedure, _logarithms(data), entry)
-
-
-def _averages_before(row: Row, entry: Comparison) -> bool:
-    """Are a pair's values means over other factors? Of logarithms those are geometric, and no program is asked."""
-    return row["contrast"] is not None and (entry.test == "mixed_anova" or len(entry.within) > 1)
-
-
-def _logarithms(data: Data) -> Data:
-    """The same arrays of the logarithms of the values, which other programs take for plain values."""
-    if isinstance(data, Paired):
-        return Paired(np.log(data.first), np.log(data.second))
-    if isinstance(data, Groups):
-        return replace(data, groups=[np.log(group) for group in data.groups])
-    return data if isinstance(data, Family) else replace(data, values=np.log(data.values))
+        if found is not None:
+            yield Problem(row, *found, entry)
 
 
 def families_of(answered: Sequence[Answered]) -> Iterator[Problem]:
@@ -147,14 +128,20 @@ def _paired(found: Sequence[Pair]) -> _Known:
     return {(pair.effect, pair.contrast): ("t_paired", Paired(pair.first, pair.second)) for pair in found}
 
 
+def _tested(request: Request, values: FloatArray) -> FloatArray:
+    """The values, or their logarithms where the entry asks for these; where one has none, the row has a status."""
+    return np.log(values) if on_logarithms(request) and np.all(values > 0) else values
+
+
 def _rm_anova(request: Request) -> _Known:
     cases, within = complete_cases.by_factors_of(request), request.entry.within
-    known = _paired(pairs.follow_ups(cases.values, within, cases.levels))
-    for effect, name in _effects(cases.values.shape[1:], within):
-        known[name, None] = ("rm_anova", Within(cases.values, effect))
-    if cases.values.shape[1:] == (2,):  # the row of two conditions names their contrast
-        (pair,) = pairs.of_conditions(cases.values, cases.levels[0])
-        known["condition", pair.contrast] = ("rm_anova", Within(cases.values, (0,)))
+    values = _tested(request, cases.values)
+    known = _paired(pairs.follow_ups(values, within, cases.levels))
+    for effect, name in _effects(values.shape[1:], within):
+        known[name, None] = ("rm_anova", Within(values, effect))
+    if values.shape[1:] == (2,):  # the row of two conditions names their contrast
+        (pair,) = pairs.of_conditions(values, cases.levels[0])
+        known["condition", pair.contrast] = ("rm_anova", Within(values, (0,)))
     return known
 
 
@@ -172,15 +159,17 @@ def _friedman(request: Request) -> _Known:
 
 def _of_conditions(request: Request) -> _Known:
     cases = complete_cases.by_condition(request)
-    known = _paired(pairs.of_conditions(cases.values, cases.levels[0]))
+    known = _paired(pairs.of_conditions(_tested(request, cases.values), cases.levels[0]))
     return {place: (request.entry.test, data) for place, (_, data) in known.items()}
 
 
 def _of_groups(request: Request) -> _Known:
     cases = groups.by_group(request)
+    positive = all(np.all(group > 0) for group in cases.groups)
+    values = [_tested(request, group) if positive else group for group in cases.groups]
     return {
         (pair.effect, pair.contrast): (request.entry.test, Groups([pair.first, pair.second]))
-        for pair in pairs.of_groups(cases.groups, cases.names, cases.factor)
+        for pair in pairs.of_groups(values, cases.names, cases.factor)
     }
 
 
@@ -199,14 +188,15 @@ def _all_groups(request: Request) -> _Known:
 
 def _mixed_anova(request: Request) -> _Known:
     cases, within = groups.mixed(request), request.entry.within
-    known: _Known = {(cases.factor, None): ("mixed_anova", Within(cases.values, (), cases.codes, True))}
-    for effect, name in _effects(cases.values.shape[1:], within):
-        known[name, None] = ("mixed_anova", Within(cases.values, effect, cases.codes))
-        known[f"{cases.factor}:{name}", None] = ("mixed_anova", Within(cases.values, effect, cases.codes, True))
-    if not len(cases.values):
+    values = _tested(request, cases.values)
+    known: _Known = {(cases.factor, None): ("mixed_anova", Within(values, (), cases.codes, True))}
+    for effect, name in _effects(values.shape[1:], within):
+        known[name, None] = ("mixed_anova", Within(values, effect, cases.codes))
+        known[f"{cases.factor}:{name}", None] = ("mixed_anova", Within(values, effect, cases.codes, True))
+    if not len(values):
         return known
     between = (cases.factor, cases.names)
-    for follow_up in mixed_anova.follow_ups(cases.values, cases.codes, between, within, cases.levels):
+    for follow_up in mixed_anova.follow_ups(values, cases.codes, between, within, cases.levels):
         pair = follow_up.pair
         if not pair.paired:
             known[pair.effect, pair.contrast] = ("t_welch", Groups([pair.first, pair.second]))
@@ -222,7 +212,7 @@ def _mixed_model(request: Request) -> _Known:
     random = within_tests.random_intercepts(model)
     known: _Known = {}
     for term in model.terms:
-        data = Model(model.values, model.participants, model.columns, model.terms, random, term)
+        data = Model(_tested(request, model.values), model.participants, model.columns, model.terms, random, term)
         known[term, None] = ("mixed_model", data)
         column = model.columns.get(term)
         if isinstance(column, Factor):

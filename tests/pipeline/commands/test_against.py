@@ -52,6 +52,9 @@ def test_every_difference_of_the_libraries_has_a_verified_reason(against: Agains
     assert "groups of unequal size weigh by their size" in block(ran, "m, mixed_anova, condition, n = 15")
     assert "normal z for t" in block(ran, "m, mixed_model, condition, A - B, n = 15")
     assert "Student's t with one variance" in block(ran, "m, t_welch, device, a - b, n = 10")
+    logs = block(ran, "likert, t_paired, condition, A - B, of the logarithms, n = 15")
+    assert "scipy.stats.ttest_rel(x, y) agrees: t, df2, p, interval from, interval to" in logs
+    assert "pingouin.multicomp(p, method) could not: it has no Hommel" in logs
     assert "rows that no other program computes here: art_anova (1)" in ran.out
 
 
