@@ -11,11 +11,11 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from tests.conftest import CLONE
-from tests.mutants import accuracy, analysis, statistics
+from tests.mutants import accuracy, analysis, estimates, statistics
 from tests.mutants.copies import BROKEN, SURVIVED, Copy, copy_to, sources_in
 from tests.mutants.mutant import Mutant, place
 
-MUTANTS = (*accuracy.MUTANTS, *statistics.MUTANTS, *analysis.MUTANTS)
+MUTANTS = (*accuracy.MUTANTS, *statistics.MUTANTS, *estimates.MUTANTS, *analysis.MUTANTS)
 
 
 def main() -> int:

@@ -40,6 +40,11 @@ def test_against_the_formulas(p: list[float]) -> None:
     assert adjusted(p, "holm") == pytest.approx(holm, rel=1e-12)
     assert adjusted(p, "benjamini_hochberg") == pytest.approx(hochberg, rel=1e-12)
     assert adjusted(p, "bonferroni") == pytest.approx(np.minimum(1, m * np.array(p)), rel=1e-12)
+    with np.errstate(divide="ignore"):  # of p = 1
+        sidak, holm_sidak = -np.expm1(m * np.log1p(-np.array(p))), np.empty(m)
+        holm_sidak[order] = np.maximum.accumulate(-np.expm1((m - np.arange(m)) * np.log1p(-ranked)))
+    assert adjusted(p, "sidak") == pytest.approx(sidak, rel=1e-12)
+    assert adjusted(p, "holm_sidak") == pytest.approx(holm_sidak, rel=1e-12)
 
 
 @given(p=st.lists(st.none() | st.floats(0, 1), max_size=12), method=st.sampled_from(sorted(METHODS)))
