@@ -74,7 +74,9 @@ MUTANTS = (
         "pass",
         _CASES,
     ),
-    Mutant('and not name.endswith("/total")', "", _MEASURE),
+    Mutant(
+        'if re.fullmatch(pattern, name) and not name.endswith("/total")', "if re.fullmatch(pattern, name)", _MEASURE
+    ),
     Mutant('"reduction": 1 - second / first if', '"reduction": second / first - 1 if', _COMPARED),
     Mutant('{"mean_difference": first - second,', '{"mean_difference": second - first,', _COMPARED),
     Mutant('pairs[row["measure"], row["effect"]] > 1', 'pairs[row["measure"], row["effect"]] > 3', _COMPARED),

@@ -19,9 +19,9 @@ _LAWS = (test_learning_and_fitts,)
 
 MUTANTS = (
     # Multiplicity.
-    Mutant('"holm": "holm",', '"holm": "bonferroni",', _ADJUSTED),
-    Mutant('"holm": "holm",', '"holm": "simes-hochberg",', _ADJUSTED),
-    Mutant('"benjamini_hochberg": "fdr_bh"', '"benjamini_hochberg": "fdr_by"', _ADJUSTED),
+    Mutant('    "holm": "holm",', '    "holm": "bonferroni",', _ADJUSTED),
+    Mutant('    "holm": "holm",', '    "holm": "simes-hochberg",', _ADJUSTED),
+    Mutant('    "benjamini_hochberg": "fdr_bh"', '    "benjamini_hochberg": "fdr_by"', _ADJUSTED),
     Mutant('"hochberg": "simes-hochberg"', '"hochberg": "hommel"', _ADJUSTED),
     Mutant('"sidak": "sidak"', '"sidak": "bonferroni"', _ADJUSTED),
     Mutant('"holm_sidak": "holm-sidak"', '"holm_sidak": "sidak"', _ADJUSTED),

@@ -44,7 +44,7 @@ MUTANTS = (
     ),
     Mutant("if error_df >= d:", "if error_df > d:", _TESTS),
     Mutant("float(np.prod(levels) * np.sum(", "float(np.sum(", _TESTS),
-    Mutant("explained / (explained + error),", "explained / (explained + df2 * error),", _TESTS),
+    Mutant('squared": explained / (explained + error)', 'squared": explained / (explained + df2 * error)', _TESTS),
     Mutant("-df * rho * np.log(w), d * (d + 1) / 2 - 1", "-df * rho * np.log(w), d * (d + 1) / 2", _TESTS),
     Mutant("first + second * (stats.chi2.sf(statistic, freedom + 4) - first)", "first", _TESTS),
     Mutant("stats.f.sf(statistic, gg * df1, gg * df2)", "stats.f.sf(statistic, gg * df1, df2)", _TESTS),
@@ -183,7 +183,7 @@ MUTANTS = (
     Mutant("statistic = n * (k - 1) * agreement", "statistic = n * k * agreement", _TESTS),
     Mutant("stats.f.sf(f, k - 1, (k - 1) * (n - 1))", "stats.f.sf(f, k - 1, k * (n - 1))", _TESTS),
     Mutant("n * whole - (n - 1) * without", "n * whole - n * without", _TESTS),
-    Mutant("np.sqrt(np.sum(ranks**2) / 4)", "np.sqrt(np.sum(ranks**2) / 2)", _TESTS),
+    Mutant("/ 2) / np.sqrt(np.sum(ranks**2) / 4)", "/ 2) / np.sqrt(np.sum(ranks**2) / 2)", _TESTS),
     # Friedman's exact p.
     Mutant("np.sum(chances @ (squares >= observed))", "np.sum(chances @ (squares > observed))", _FRIEDMAN),
     Mutant("np.repeat(chances / len(orders), len(orders))", "np.repeat(chances, len(orders))", _FRIEDMAN),
@@ -210,7 +210,7 @@ MUTANTS = (
     Mutant('"levene": "mean", "brown_forsythe": "median"', '"levene": "median", "brown_forsythe": "mean"', _GROUPS),
     Mutant("explained = min(1.0, statistic / (n - 1))", "explained = min(1.0, statistic / n)", _GROUPS),
     Mutant("(statistic - k + 1) / (n - k)", "(statistic - k + 1) / (n - 1)", _GROUPS),
-    Mutant("float(ranks[:n].sum()) - n * (n + 1) / 2", "float(ranks[:n].sum()) - n * (n - 1) / 2", _GROUPS),
+    Mutant("u = float(ranks[:n].sum()) - n * (n + 1) / 2", "u = float(ranks[:n].sum()) - n * (n - 1) / 2", _GROUPS),
     Mutant("far = apart >= abs(", "far = apart > abs(", _GROUPS),
     Mutant("effect_size=2 * u / (n * m) - 1", "effect_size=u / (n * m)", _GROUPS),
     Mutant(
