@@ -55,7 +55,10 @@ def read_with_provenance(path: Path) -> ResultsFile:
         return ResultsFile(path, content, None, f"{error}; it is not used")
     if provenance.get("results_sha256", digest := file_digest(path)) != digest:
         return ResultsFile(
-            path, content, None, f"{beside}: belongs to other results than {path.name} there; it is not used"
+            path,
+            content,
+            None,
+            f"{beside}: describes another {path.name} than the one there (checksums differ); it is ignored",
         )
     return ResultsFile(path, content, provenance)
 

@@ -24,7 +24,7 @@ _FORMULAS = {"t_paired": "noncentral t", "rm_anova": "noncentral F"}
 _SERIES = {"power_closed_form": "closed form", "power_simulated": "simulated", "power_corrected": "Greenhouse-Geisser"}
 _MEANING = {
     "effect": "which effect of the design",
-    "effect_size": "its size: d, d_z, f, or the bound of an equivalence, as `effect` beside `rows` says",
+    "effect_size": "its size: d, d_z, f, or the bound of an equivalence, which of them the object `effect` says",
     "participants": "complete participants in all, without those who drop out",
     "in_first_group": "how many of them are in the first group; all where there are no groups",
     "power_closed_form": "chance that p is below alpha if the effect is as stated; null where there is no formula",

@@ -35,7 +35,7 @@ def summary(results: Mapping[str, Any]) -> Iterator[str]:
     figures = [row for row in results["printed"] if row["check"] is None]
     if figures:
         agreeing = sum(row["verdict"] == "agrees" for row in figures)
-        yield f"  printed figures reproduced to the digit: {agreeing}; not: {len(figures) - agreeing}"
+        yield f"  printed figures reproduced exactly: {agreeing}; not: {len(figures) - agreeing}"
     for row in figures:
         if row["verdict"] == "differs":
             yield f"    {row['what']}: printed {row['printed']}, computed {row['computed']}"
@@ -63,7 +63,7 @@ def _accuracy(results: Mapping[str, Any]) -> Iterator[str]:
     rated = {row["session"] for row in results["accuracy"]}
     red = {row["session"] for row in results["checks"] if row["status"] == "red"} & rated
     if red:
-        yield f"  {len(red)} of {counted(len(rated), 'session')} with a red check: which estimator is best is not said"
+        yield f"  {len(red)} of {counted(len(rated), 'session')} with a red check, so no estimator is called best"
     for row in results["accuracy_means"]:
         what = "RMSE {} mm" if known else "{} mm RMS from the smoothed readings"
         yield f"  {row['estimator']}: {what.format(number(row['rmse_mm']))} (mean of {counted(row['n'], 'session')})"

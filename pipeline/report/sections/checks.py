@@ -23,7 +23,9 @@ def blocks(material: Material) -> Iterator[Block]:
         return
     contradicted = sorted(_contradicted(rows), key=lambda row: -LIGHTS.index(row["status"]))
     found = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
-    text = f"{found} of logs and tables against themselves and study.yaml; docs/checks.md describes each." + _lags(rows)
+    text = f"{found} of logs and tables, against each other and study.yaml; docs/checks.md describes each." + _lags(
+        rows
+    )
     yield Paragraph((Strong("Checks: "), text))
     if contradicted:
         yield _table(contradicted)

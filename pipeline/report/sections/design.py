@@ -63,7 +63,7 @@ def _checked(material: Material) -> list[Block]:
         for row in rows
     )
     remarked = [row["what"] for row in rows if row["remark"]]
-    text = "nothing to remark on in what could be checked."
+    text = "no problem found in what could be checked."
     if remarked:
         text = f"{counted(len(remarked), 'remark')}, about {listing(list(dict.fromkeys(remarked)))}; see the table."
     note = (

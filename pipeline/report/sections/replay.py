@@ -38,7 +38,7 @@ _TITLES = (
 )
 _AT_SELECTION = ("At the selections, RMSE (mm)",)
 _NOTE = (
-    "Means over sessions; in brackets 95 % t intervals over sessions, cut off where values end. RMSE: root mean square"
+    "Means over sessions; in brackets 95 % t intervals over sessions, clipped to possible values. RMSE: root mean square"
     " distance to {standard}. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In 95 %"
     " interval: share of instants and axes within 1.96 stated SDs of {standard}."
 )

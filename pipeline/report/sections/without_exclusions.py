@@ -41,7 +41,8 @@ def without_exclusions(material: Material) -> list[Block]:
     over = sum(
         _significant(old, material.study.alpha) != _significant(new, material.study.alpha) for old, new in changed
     )
-    said = f"{over or 'none'} of them to the other side of the {100 * material.study.alpha:g} % level"
+    level = f"{100 * material.study.alpha:g} % level"
+    said = f"{over or 'none'} of them between significant and not at the {level}"
     text = f"{len(changed)} of {counted(len({**before, **after}), 'comparison')} change, {said}."
     titles = ("Measure", "Test", "Compared", "Data", "n", "Statistic", "p", "Effect size [95 %]")
     cells = [cell for old, new in changed for cell in (_cells(old, new, "with"), _cells(new, old, "without"))]

@@ -45,7 +45,7 @@ def test_fusion_that_is_worse_than_its_tracker_is_named_and_nothing_is_best(
     (row,) = (row for row in steadyhand.results()["checks"] if row["check"] == "fusion against tracker: fusion")
     assert row["status"] == "red"
     assert "its tracker alone" in row["message"]
-    assert "1 of 1 session with a red check: which estimator is best is not said" in ran.out
+    assert "1 of 1 session with a red check, so no estimator is called best" in ran.out
     page = text_of(steadyhand.out / "report.html")
     assert "Which estimator is best is not said: 1 of 1 session contradicts what study.yaml states" in page
     assert "Fusion is worse than its tracker alone: fusion in P01_a (RMSE " in page

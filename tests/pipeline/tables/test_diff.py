@@ -203,7 +203,7 @@ def test_provenance_of_other_results_explains_nothing(study: Path, diff: Diff) -
     edit(other, lambda content: content["study"].update(alpha=0.1))
     ran = diff(one, other)
     assert ran.code == 0
-    assert "belongs to other results than results.json there; it is not used" in ran.err
+    assert "describes another results.json than the one there (checksums differ); it is ignored" in ran.err
     assert "alpha 0.05 0.1" in lines(ran.out)
     for text, said in (("{", "not valid JSON"), ("[]", "should hold one JSON object")):
         (other / "provenance.json").write_text(text)
