@@ -59,8 +59,8 @@ def _lines(
     for row in fitted.parameters:
         if row.at_bound:
             yield (
-                f"# {row.where}.{row.key}: the fit stopped at its limit {_short(row.fitted.value)}, so that is no estimate;"
-                f" probably other settings of study.yaml do not match the data. {_short(row.stated)} was kept."
+                f"# {row.where}.{row.key}: the fit stopped at its limit {_short(row.fitted.value)}, so that is no"
+                f" estimate; probably other settings of study.yaml do not match the data. {_short(row.stated)} was kept."
             )
         elif not row.fitted.identified:
             yield (

@@ -38,9 +38,9 @@ _TITLES = (
 )
 _AT_SELECTION = ("At the selections, RMSE (mm)",)
 _NOTE = (
-    "Means over sessions; in brackets 95 % t intervals over sessions, clipped to possible values. RMSE: root mean square"
-    " distance to {standard}. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In 95 %"
-    " interval: share of instants and axes within 1.96 stated SDs of {standard}."
+    "Means over sessions; in brackets 95 % t intervals over sessions, clipped to possible values. RMSE: root mean"
+    " square distance to {standard}. Lag: positive = late. Jitter: SD while the hand is slower than 20 mm/s. In"
+    " 95 % interval: share of instants and axes within 1.96 stated SDs of {standard}."
 )
 _NOTE_SELECTION = (
     " At the selections: root of the mean over sessions of the mean squared distance to the target that the estimator"
