@@ -60,7 +60,8 @@ def _lines(
         if row.at_bound:
             yield (
                 f"# {row.where}.{row.key}: the fit stopped at its limit {_short(row.fitted.value)}, so that is no"
-                f" estimate; probably other settings of study.yaml do not match the data. {_short(row.stated)} was kept."
+                f" estimate; probably other settings of study.yaml do not match the data; {_short(row.stated)} was"
+                " kept."
             )
         elif not row.fitted.identified:
             yield (
