@@ -78,23 +78,27 @@ def run(work: Work) -> Outcome:
         rows = list(reductions(study.simulation, study.conditions, repeats))
         frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
     facts = _participant_facts(work, measures)
-    frames["preregistration"] = tables.frame("preregistration", _beside_plan(work, frames, facts["n"]))
+    frames["preregistration"] = tables.frame("preregistration", _beside_plan(work, frames))
     for name, table in frames.items():
         tables.write(name, table, work.out)
     results.write(work.out / "results.json", work.study_name, study, frames, facts)
     return Outcome()
 
 
-def _beside_plan(work: Work, frames: Mapping[str, pd.DataFrame], participants: int) -> list[Row]:
-    """What was done beside what was preregistered; nothing where nothing was."""
+def _beside_plan(work: Work, frames: Mapping[str, pd.DataFrame]) -> list[Row]:
+    """What was done beside what was preregistered; nothing where nothing was.
+
+    Who stands in participants.csv and has no value was planned and did not take part.
+    """
     frozen = read_preregistered(work.folder)
     if frozen is None:
         return []
     comparisons = list(tables.records("comparisons", frames["comparisons"]))
     details = [json.loads(row["details"]) if row["details"] else None for row in comparisons]
     rows = [{**row, "details": detail} for row, detail in zip(comparisons, details, strict=True)]
-    known = sorted(set(frames["measures"]["measure"]), key=measure_order)
-    return plan_and_done(frozen, work.study, Done(known, participants, rows))
+    measures = frames["measures"]
+    known = sorted(set(measures["measure"]), key=measure_order)
+    return plan_and_done(frozen, work.study, Done(known, measures["participant"].nunique(), rows))
 
 
 def _comparisons_of_all_data(study: Study, folder: Path, people: People) -> tuple[list[Row], list[Row]]:

@@ -53,8 +53,8 @@ def plan(asked: Asked, out: Path | None, schedule_file: Path | None) -> None:
         print(text, end="", flush=True)  # noqa: T201 - the bytes of the file, whatever the names hold
     else:
         _write(out, text)
-        told = [counted(design.participants, "participant"), counted(len(design.conditions), "condition")]
-        console.say(f"{out}: {', '.join(told)}")
+        met = design.conditions or (design.between.levels if design.between else ())
+        console.say(f"{out}: {counted(design.participants, 'participant')}, {counted(len(met), 'condition')}")
     if schedule_file is not None:
         _write(schedule_file, _as_csv(_blocks(design, planned, ids)))
         console.warn(f"{schedule_file}: every block")

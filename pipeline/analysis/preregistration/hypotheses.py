@@ -15,7 +15,7 @@ from pipeline.words import comparison_sentence, decisive_p
 
 @dataclass(frozen=True)
 class Done:
-    """What the study came to: its measures, how many took part, and the rows of `comparisons`, details as objects."""
+    """What the study came to: its measures, how many people have a value, and the rows of `comparisons`, in full."""
 
     measures: Sequence[str]
     participants: int

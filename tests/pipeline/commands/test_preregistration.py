@@ -331,6 +331,17 @@ def test_every_deviation_is_named(
     assert deviations(steadyhand, changed(registered, **replaced))[what] == said
 
 
+def test_who_is_on_the_list_and_did_not_come_is_missing(folder: Folder, plan: Plan, steadyhand: Steadyhand) -> None:
+    """participants.csv may hold the plan: 12 people, of whom 10 have values."""
+    people = "participant\n" + "".join(f"P{number:02d}\n" for number in range(1, 13))
+    planned = SETTINGS.replace("participants: 10", "participants: 12").replace(
+        "measures:", "participants: participants.csv\nmeasures:"
+    )
+    study = folder(planned, **{"measures.csv": MEASURES, "participants.csv": people})
+    assert plan(study, "--preregister").code == 0
+    assert deviations(steadyhand, study) == {("participants", None): ("12", "10", "deviation")}
+
+
 def test_the_first_page_lists_the_deviations(registered: Path, steadyhand: Steadyhand) -> None:
     new = "  - {measure: errors, test: t_paired}\n"
     study = changed(registered, errors=new, rest="exclusions: [{participant: P03, reason: late}]\npreregistration:\n")
