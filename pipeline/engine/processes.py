@@ -9,9 +9,13 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext, SpawnContext
 from typing import Any
 
 from pipeline.errors import WorkerLostError
+
+# Spawned, not forked: a fork would copy the locks of this process's threads in whatever state they are.
+SPAWN = multiprocessing.get_context("spawn")
 
 
 class InThisProcess(Executor):
@@ -32,11 +36,13 @@ class Processes(Executor):
 
     Python's own ProcessPoolExecutor is not used because it breaks as a whole when one of its processes dies, and
     does not say which call killed it. Here only the future of the call that was running raises WorkerLostError, and
-    another process replaces the dead one. All processes end when this process ends, for whatever reason.
+    another process replaces the dead one. All processes end when this process ends, for whatever reason. `context`
+    says how they start.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, context: ForkServerContext | SpawnContext = SPAWN) -> None:
         self.count = count
+        self._context = context
         self._threads = ThreadPoolExecutor(count)
         self._started: list[_Process] = []
         self._idle: list[_Process] = []
@@ -51,7 +57,7 @@ class Processes(Executor):
         try:
             process = self._idle.pop()  # the one used last, so that no more processes start than are needed at once
         except IndexError:
-            process = _Process()
+            process = _Process(self._context)
             self._started.append(process)
         if self._stopping:  # `shutdown` may have gone through the list before this one was in it
             process.stop()
@@ -107,7 +113,7 @@ def call_in_own_process(fn: Callable[..., Any], *args: Any) -> Any:
 
     Raises WorkerLostError where the process dies.
     """
-    process = _Process(may_start_others=True)
+    process = _Process(SPAWN, may_start_others=True)
     try:
         return process.call(fn, args, {})
     finally:
@@ -117,9 +123,7 @@ def call_in_own_process(fn: Callable[..., Any], *args: Any) -> Any:
 class _Process:
     """A process that computes the calls it receives through a pipe, and ends when the other end of the pipe closes."""
 
-    def __init__(self, may_start_others: bool = False) -> None:
-        # Spawned, not forked: a fork would copy the locks of this process's threads in whatever state they are.
-        context = multiprocessing.get_context("spawn")
+    def __init__(self, context: ForkServerContext | SpawnContext, may_start_others: bool = False) -> None:
         self._here, there = context.Pipe()
         self._process = context.Process(target=_serve, args=(there,), daemon=not may_start_others)
         self._process.start()

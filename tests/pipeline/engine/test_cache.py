@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import multiprocessing
 import os
 import random
 import resource
@@ -22,15 +21,13 @@ from pipeline.engine.cache import Cache
 from pipeline.engine.housekeeping import items_in, prune
 from pipeline.sessions import fuse
 from tests.conftest import STREAMS, session_messages, write_session
+from tests.pipeline.forked import FORKED
 from tests.pipeline.helpers import Ran, Steadyhand, run
 
 SETTINGS = (
     "conditions: [a, b]\nsessions: data/{participant}_{condition}.mcap\nestimators: {raw: {type: raw}}\n" + STREAMS
 )
 SESSIONS = ("P1_a", "P1_b")
-# Forked from one process that has imported everything, so that a run costs what it computes.
-APART = multiprocessing.get_context("forkserver")
-APART.set_forkserver_preload(["tests.pipeline.engine.test_cache", "pipeline.commands.run", "pipeline.analysis.compare"])
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +68,7 @@ def apart(
     study: Path, out: Path, cache: Path, *, jobs: int = 1, die_at: int | None = None, most_bytes: int | None = None
 ) -> BaseProcess:
     """A run in a process of its own, begun."""
-    process = APART.Process(target=_compare, args=(study, out, cache, jobs, die_at, most_bytes))
+    process = FORKED.Process(target=_compare, args=(study, out, cache, jobs, die_at, most_bytes))
     process.start()
     return process
 

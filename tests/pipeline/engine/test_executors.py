@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -32,6 +31,7 @@ from pipeline.study.settings import Study
 from pipeline.study.yaml_text import parse, read_yaml
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.dying import POISONED
+from tests.pipeline.forked import FORKED
 from tests.pipeline.helpers import run
 
 Folder = Callable[..., Path]
@@ -39,12 +39,22 @@ SETTINGS = (
     "conditions: [a, b]\nsessions: data/{participant}_{condition}.mcap\nestimators: {raw: {type: raw}}\n" + STREAMS
 )
 SESSIONS = [f"P{person}_{condition}" for person in (1, 2) for condition in "ab"]
+MANY = [f"P{person}_{condition}" for person in (1, 2, 3, 4) for condition in "ab"]  # figures are drawn side by side
 
 
 @pytest.fixture
 def study(folder: Folder) -> Path:
     root = folder(SETTINGS)
     for seed, session in enumerate(SESSIONS):
+        write_session(root / "data" / f"{session}.mcap", session_messages(2.5, seed=seed))
+    return root
+
+
+@pytest.fixture
+def many(folder: Folder) -> Path:
+    """So many sessions that other processes draw a report's figures; of events alone, so that these are few."""
+    root = folder("conditions: [a, b]\nsessions: data/{participant}_{condition}.mcap\nevents: {topic: /events}\n")
+    for seed, session in enumerate(MANY):
         write_session(root / "data" / f"{session}.mcap", session_messages(2.5, seed=seed))
     return root
 
@@ -68,7 +78,7 @@ def test_processes_give_the_same_entries_as_this_process(study: Path, tmp_path: 
 
 
 def test_a_session_that_kills_its_process_is_set_aside_alone(study: Path, tmp_path: Path) -> None:
-    with Processes(2) as executor:
+    with Processes(2, FORKED) as executor:
         resources = Resources(Cache(tmp_path / "cache"), executor, PlainLines())
         result = bring_up_to_date(study, fusing_with("whenever"), resources)
         ((session, reason),) = result.set_aside
@@ -80,7 +90,7 @@ def test_a_session_that_kills_its_process_is_set_aside_alone(study: Path, tmp_pa
 
 
 def test_a_process_that_was_killed_is_replaced(study: Path, tmp_path: Path) -> None:
-    with Processes(2) as executor:
+    with Processes(2, FORKED) as executor:
         resources = Resources(Cache(tmp_path / "cache"), executor, PlainLines())
         result = bring_up_to_date(study, fusing_with("once"), resources)
         assert (study / "died").exists()
@@ -94,7 +104,7 @@ def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(study: Pa
         for name in ("first", "held", "last")
     ]
     stage = replace(REPLAY, function="tests.pipeline.dying:of_one_variant")
-    with Processes(2) as executor:
+    with Processes(2, FORKED) as executor:
         resources = Resources(Cache(tmp_path / "cache"), executor, PlainLines(), fewest_groups=1)
         result = bring_up_to_date(study, COMPARE[:1], resources)
         found = run_variants(result, stage, settings, result.sessions, resources)
@@ -107,25 +117,23 @@ def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(study: Pa
     assert result.computed["replay"] == 1  # it is tried again
 
 
-def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(study: Path, tmp_path: Path) -> None:
+def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(many: Path, tmp_path: Path) -> None:
     """To the same bytes, report and all, its figures drawn by others; if that process dies, the user is told."""
-    for session in SESSIONS:  # enough for figures to be drawn by other processes
-        shutil.copy(study / "data" / f"{session}.mcap", study / "data" / f"Q{session}.mcap")
     with executor_of(1, "inline") as executor:
-        here = bring_up_to_date(study, STAGES, Resources(Cache(tmp_path / "here"), executor, PlainLines()))
-    with Processes(2) as executor:
+        here = bring_up_to_date(many, STAGES, Resources(Cache(tmp_path / "here"), executor, PlainLines()))
+    with Processes(2, FORKED) as executor:
         resources = Resources(Cache(tmp_path / "apart"), executor, PlainLines(), archive_sessions=1)
-        apart = bring_up_to_date(study, STAGES, resources)
+        apart = bring_up_to_date(many, STAGES, resources)
         assert contents(apart) == contents(here)
         dying = replace(COMPARE[3], function="tests.pipeline.dying:of_a_study")
         with pytest.raises(PipelineError, match=r'stage "measure" died \(signal 9\), possibly out of memory'):
-            bring_up_to_date(study, (*COMPARE[:3], dying), resources)
+            bring_up_to_date(many, (*COMPARE[:3], dying), resources)
 
 
 def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: Path, tmp_path: Path) -> None:
     """So that no more of them are there at once than the user allowed."""
     noting = replace(COMPARE[3], function="tests.pipeline.dying:note_helper")
-    with Processes(2) as executor:
+    with Processes(2, FORKED) as executor:
         of_run = executor.submit(os.getpid).result()
         apart = bring_up_to_date(
             study,
@@ -146,14 +154,12 @@ def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: P
 @pytest.mark.parametrize("options", [("--jobs", "1"), ("--jobs", "2", "--executor", "inline")])
 def test_one_job_or_inline_starts_no_process(
     options: tuple[str, ...],
-    study: Path,
+    many: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Not for the figures of a report either."""
-    for session in SESSIONS:
-        shutil.copy(study / "data" / f"{session}.mcap", study / "data" / f"Q{session}.mcap")
 
     def refuse(_process: object) -> None:
         raise AssertionError("a process was started")
@@ -161,16 +167,19 @@ def test_one_job_or_inline_starts_no_process(
     monkeypatch.setattr(BaseProcess, "start", refuse)
     monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
     places = ("--out", tmp_path / "out", "--cache", tmp_path / "cache")
-    ran = run(capsys, monkeypatch, "report", study, *places, *options)
+    ran = run(capsys, monkeypatch, "report", many, *places, *options)
     assert (ran.code, "assess 8" in ran.out) == (0, True)
     assert (tmp_path / "out" / "report.pdf").is_file()
 
 
 @contextmanager
 def dask(count: int) -> Iterator[Executor]:
-    """A real scheduler with worker processes on loopback."""
+    """A real scheduler with worker processes on loopback, forked as the others here."""
     pytest.importorskip("distributed")
-    with executor_of(count, "dask") as executor:
+    import dask
+
+    forked = dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"})
+    with forked, executor_of(count, "dask") as executor:
         yield executor
 
 
