@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 # Workers of the tests share the processors; threads of a numeric library on top of them wait for each other.
@@ -40,6 +41,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("slow") is None:
             item.add_marker("fast")
+
+
+def pytest_collection_finish() -> None:
+    """What is imported by now stays, so it need not be gone through for garbage again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture
@@ -119,3 +126,17 @@ def real(name: str) -> Path:
 def steadyhand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Steadyhand:
     """The command, with its own cache and output folder."""
     return Steadyhand(capsys, monkeypatch, tmp_path)
+
+
+EMPTY_FIGURE = '<svg xmlns="http://www.w3.org/2000/svg" width="100" height="50" viewBox="0 0 100 50"></svg>'
+
+
+@pytest.fixture
+def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a test of a report that looks at no figure: each is drawn, but matplotlib does not lay it out and write it.
+
+    That is half of what a report costs. Files of figures are there, each with an empty picture.
+    """
+    from pipeline.report.figures import style
+
+    monkeypatch.setattr(style, "save", lambda _figure, path: path.write_text(EMPTY_FIGURE, encoding="utf-8"))

@@ -17,6 +17,8 @@ from pipeline.statistics.multiplicity import METHODS, adjusted
 from pipeline.study.statistical_tests import ADJUSTMENTS
 from tests.pipeline.helpers import Steadyhand, run
 
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
 Row = dict[str, Any]
 Values = Mapping[str, Mapping[str, Sequence[float]]]
 """Of each measure, by condition: a value for each participant."""

@@ -120,6 +120,7 @@ def test_an_order_that_contradicts_the_dates_of_the_logs_names_who() -> None:
     assert row["status"] == "green"  # logs of the same minute, as simulated ones are, have no order
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_milliseconds_in_a_table_are_said_on_the_console_and_the_first_page(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:

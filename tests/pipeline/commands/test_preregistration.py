@@ -27,6 +27,8 @@ from pipeline.study.preregistration import (
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from tests.pipeline.helpers import Ran, Steadyhand, run
 
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
 Folder = Callable[..., Path]
 Plan = Callable[..., Ran]
 MEASURES = "participant,condition,measure,value\n" + "".join(

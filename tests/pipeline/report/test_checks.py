@@ -44,6 +44,7 @@ def study_of(folder: Folder, fault: str | None) -> Path:
     return made
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_contradiction_stands_on_the_first_page_and_the_exit_code_is_as_before(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
@@ -60,6 +61,7 @@ def test_a_contradiction_stands_on_the_first_page_and_the_exit_code_is_as_before
     assert "they are in g" in (steadyhand.out / "tables" / "checks.csv").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_without_a_fault_the_report_says_the_lag_and_no_caution(folder: Folder, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", study_of(folder, None)).code == 0
     rows = steadyhand.results()["checks"]

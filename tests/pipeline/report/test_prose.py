@@ -283,6 +283,7 @@ def test_the_glossary_explains_what_is_used_and_nothing_else() -> None:
     assert explained(["A title", "Participants"]) == []
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_report_has_words_to_paste_that_lead_to_their_rows(folder: Folder, steadyhand: Steadyhand) -> None:
     tests = ["test: rm_anova", "test: wilcoxon, adjust: holm", "test: mixed_model", "test: bayes_t"]
     study = study_of(folder, "rm2_n12_time", "main", ["kinect", "fusion"], tests)

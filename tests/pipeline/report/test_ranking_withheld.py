@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from pipeline.sessions.logs.log import Log
 from tests.conftest import write_session
@@ -14,6 +15,8 @@ from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.report.test_checks import SETTINGS, text_of
 from tests.pipeline.sessions.checks.hand import Hand, messages, session
 from tests.pipeline.sessions.checks.spoilt import IMU
+
+pytestmark = pytest.mark.usefixtures("blank_figures")
 
 Folder = Callable[..., Path]
 ESTIMATORS = "estimators: {raw: {type: raw}, fusion: {type: fusion_kalman}}"

@@ -89,6 +89,7 @@ def test_an_estimators_own_settings_give_what_compare_gives(study: Path, steadyh
     assert rows_of(replayed["accuracy"], variant="fusion[window=3]")[0]["rmse_mm"] != same[0]["rmse_mm"]
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_variant_gives_what_study_yaml_with_its_settings_gives(study: Path, steadyhand: Steadyhand) -> None:
     steadyhand("replay", study, "--set", "fusion.window=3")
     replayed = rows_of(steadyhand.results()["accuracy"], variant="fusion[window=3]")

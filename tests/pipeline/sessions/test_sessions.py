@@ -63,6 +63,7 @@ def test_measures_by_their_definitions(study: Path, steadyhand: Steadyhand) -> N
         assert found["completion_time_s", condition] == pytest.approx(3.4 - 0.5)
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", study).code == 0
     trials = (steadyhand.out / "tables" / "trials.csv").read_text().splitlines()
