@@ -9,6 +9,7 @@ Line ends count as one character, for version control may turn one kind into the
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +71,9 @@ def frozen_text(registered: Registered) -> tuple[str, str]:
     """preregistered.yaml of these settings, the same for the same settings, and its digest."""
     content: dict[str, Any] = registered.model_dump(mode="json", exclude_none=True)
     content["comparisons"] = [_stated(entry) for entry in registered.comparisons]
-    body = _HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
+    # YAML takes these for ends of lines, and PyYAML would not read them back; escaped, it does.
+    readable = not any(character in json.dumps(content, ensure_ascii=False) for character in "\x85\u2028\u2029")
+    body = _HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=readable, width=110)
     digest = _digest(body)
     return f"{body}{_DIGEST_KEY}: {digest}\n", digest
 

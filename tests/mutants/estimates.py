@@ -19,11 +19,11 @@ _LAWS = (test_learning_and_fitts,)
 
 MUTANTS = (
     # Multiplicity.
-    Mutant('    "holm": "holm",', '    "holm": "bonferroni",', _ADJUSTED),
-    Mutant('    "holm": "holm",', '    "holm": "simes-hochberg",', _ADJUSTED),
-    Mutant('    "benjamini_hochberg": "fdr_bh"', '    "benjamini_hochberg": "fdr_by"', _ADJUSTED),
+    Mutant('METHODS = {\n    "holm": "holm",', 'METHODS = {\n    "holm": "bonferroni",', _ADJUSTED),
+    Mutant('METHODS = {\n    "holm": "holm",', 'METHODS = {\n    "holm": "simes-hochberg",', _ADJUSTED),
+    Mutant('"fdr_by",\n    "hochberg"', '"fdr_bh",\n    "hochberg"', _ADJUSTED),
     Mutant('"hochberg": "simes-hochberg"', '"hochberg": "hommel"', _ADJUSTED),
-    Mutant('"sidak": "sidak"', '"sidak": "bonferroni"', _ADJUSTED),
+    Mutant('"sidak": "sidak",\n    "holm_sidak"', '"sidak": "bonferroni",\n    "holm_sidak"', _ADJUSTED),
     Mutant('"holm_sidak": "holm-sidak"', '"holm_sidak": "sidak"', _ADJUSTED),
     Mutant(
         "index for index, p in enumerate(p_values) if p is not None",

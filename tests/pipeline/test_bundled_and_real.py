@@ -42,7 +42,7 @@ def test_feng2016_reproduces_what_the_paper_prints(steadyhand: Steadyhand) -> No
     for printed in (".0071", ".0052", ".0137", ".0898", ".0508", ".0249", ".1611", ".0195"):
         assert f">{printed}<" in page or f"p = {printed}" in page
     assert "Reconstructed data" in page
-    for title in ("Contradictions within the publication", "What a reader of it should know"):
+    for title in ("Contradictions within the publication", "What a reader of the publication should know"):
         assert title in page
 
 

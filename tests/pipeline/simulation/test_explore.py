@@ -114,7 +114,7 @@ def test_the_report_says_what_pays_and_where_it_comes_from(study: Path, command:
 def test_one_estimator_and_one_tracker_leave_nothing_to_weigh(study: Path, command: Command, tmp_path: Path) -> None:
     ran = command(study, *SMALL, "--latency", "0.1", "--estimators", "raw")
     assert ran.code == 0, ran.err
-    assert "there is nothing to weigh" in ran.out
+    assert "there is nothing to compare" in ran.out
     page = (tmp_path / "out" / "explore.html").read_text(encoding="utf-8")
     assert "How many participants" not in page
 
