@@ -32,6 +32,7 @@ from pipeline.words import MINUS, counted, measure_label, number, short_label, u
 
 _CLOUD = 0.3  # height of a density, where conditions are 1 apart
 _BOX = 0.07  # half the width of the line at the median
+_BESIDE = 0.1  # from a condition's place to that of its mean
 
 
 def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
@@ -51,14 +52,24 @@ def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
     legend_text = (
         " Small marks are participants"
         + (", joined by lines" if len(wide.columns) > 1 and not between else "")
-        + "; shapes show their density, thick bars the middle half of them, large marks the means with 95 % intervals."
+        + "; shapes show their density, pale bars the middle half of them, large marks the means with 95 % intervals."
     )
+    if draws_within(wide):
+        legend_text += (
+            f" Thick arms: within-participant 95 % intervals, Cousineau-Morey, of the {len(complete)} complete"
+            " participants; they leave out how far people differ, as paired tests do."
+        )
     return Words(head + legend_text, alt)
 
 
 def met_one_each(wide: pd.DataFrame) -> bool:
     """Does every participant have a value in only one of several conditions? Then nobody counts as incomplete."""
     return len(wide.columns) > 1 and int(wide.notna().sum(axis=1).max()) <= 1
+
+
+def draws_within(wide: pd.DataFrame) -> bool:
+    """Are there participants who met every condition, so that intervals within participants exist?"""
+    return len(wide.columns) > 1 and len(wide.dropna()) > 1
 
 
 def _complete_of(complete: pd.DataFrame) -> str:
@@ -82,7 +93,8 @@ def paired(wide: pd.DataFrame, measure: str) -> Figure:
     """Rainclouds of a measure, one per condition, and beside them the differences from the first condition.
 
     `wide` has one row per participant and one column per condition, as `participant_means` gives it. A raincloud shows
-    the participants, joined by lines if complete, their density and quartiles, and the mean with its 95 % t interval.
+    the participants, joined by lines if complete, their density and quartiles, and the mean with its 95 % t interval
+    and, of conditions that the same people met, the Cousineau-Morey interval within participants.
     """
     complete = wide.dropna()
     compared = len(wide.columns) > 1 and len(complete) > 1
@@ -151,8 +163,14 @@ def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
     if len(at) > 1 and len(complete):
         faint: dict[str, Any] = {"alpha": 0.45, "linewidth": 0.7, "zorder": 1, "rasterized": complete.size > MARKS_MAX}
         axes.plot(at, complete.T, color=GREY, **faint)
+    from pipeline.statistics.estimation import within_intervals
+
+    within = within_intervals(complete)
     for index, condition in enumerate(wide.columns):
         side = -1 if index == 0 and len(at) > 1 else 1  # the lines from the first condition lead to the right
+        ends = within[index]
+        if ends is not None:  # in two tiers, as Baguley (2012) has them: inside the interval of the mean itself
+            axes.vlines(index + side * _BESIDE, *ends, color=colour(index), linewidth=3.5 if small else 5, zorder=4)
         _raincloud(axes, index, side, finite(wide[condition]), (colour(index), marker(index)))
     length = max(8, (24 if small else 40) // len(at))
     axes.set_xticks(at, [as_label(condition, length) for condition in wide.columns])
@@ -183,7 +201,7 @@ def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple
         place = at + side * 0.2
         axes.vlines(place, low, high, color=shade, linewidth=5, alpha=0.35, zorder=2)
         axes.hlines(middle, place - _BOX, place + _BOX, color=shade, linewidth=1.2, zorder=3)
-    draw_mean(axes, at + side * 0.1, values, look)
+    draw_mean(axes, at + side * _BESIDE, values, look)
 
 
 def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArray] | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from scipy import stats
 
@@ -48,6 +49,31 @@ def test_means_and_intervals_are_those_of_the_t_distribution() -> None:
     assert told.replace("-", "−") in said.caption
     assert told.replace("-", "−") in said.alt
     assert "5 complete participants" in said.caption
+
+
+def test_intervals_within_participants_are_drawn_where_people_met_every_condition() -> None:
+    """Of two conditions they are as wide as the paired t's of the difference, over √2."""
+    difference = TIMES["kinect"] - TIMES["fusion"]
+    half = stats.t.ppf(0.975, 4) * stats.sem(difference) / np.sqrt(2)
+    drawn = [
+        line
+        for one in figures.paired(TIMES, MEASURE).axes[0].collections
+        if isinstance(one, LineCollection)
+        for line in one.get_segments()
+        if len(line) == 2 and line[0][0] == line[1][0]
+    ]
+    for name in TIMES:
+        ends = [TIMES[name].mean() - half, TIMES[name].mean() + half]
+        assert any(line[:, 1] == pytest.approx(ends) for line in drawn), name
+    assert "within-participant 95 % intervals, Cousineau-Morey" in figures.paired.words(TIMES, MEASURE).caption
+
+
+def test_people_who_met_one_condition_each_have_no_interval_within() -> None:
+    apart = TIMES.copy()
+    apart.loc[["P1", "P2"], "fusion"] = np.nan
+    apart.loc[["P3", "P4", "P5"], "kinect"] = np.nan
+    assert "Cousineau" not in figures.paired.words(apart, MEASURE).caption
+    assert "Cousineau" not in figures.paired.words(TIMES[["kinect"]], MEASURE).caption
 
 
 def test_a_caption_follows_the_data_and_not_a_wish() -> None:
