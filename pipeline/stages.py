@@ -46,6 +46,7 @@ STAGES: tuple[Stage, ...] = (
             "trials",
             "questionnaires",
             "measures",
+            "task",
         ),
         files=("participants", "trials", "questionnaires", "measures"),
         label="measuring",

@@ -84,6 +84,7 @@ def run(work: Work) -> Outcome:
     tables.write("reliability", tables.frame("reliability", agreement), work.out)
     tables.write("trials", trials, work.out)
     tables.write("selections", selections, work.out)
+    tables.write("movements", movements, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
 

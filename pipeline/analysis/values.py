@@ -12,7 +12,8 @@ import pandas as pd
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError
 from pipeline.sessions import movements
-from pipeline.sessions.trials import selections_by_trial, with_movements
+from pipeline.sessions.target_widths import widths_mm
+from pipeline.sessions.trials import coordinates, selections_by_trial, with_movements
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -62,19 +63,29 @@ def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def all_movements(work: Work) -> pd.DataFrame:
-    """The movements of all sessions, or of trials.csv in the order of their starts, with participant and condition."""
-    people = pd.DataFrame([session.ids for session in work.sessions], columns=[*CELL, "session"])
-    logged = tables.read("movements", work.entries["assess"]).merge(people.astype("string"), on="session")
+    """The movements of all sessions, or of trials.csv in the order of their starts."""
     path = table_path(work, "trials")
     if path is None:
-        return logged
+        return tables.read("movements", work.entries["assess"])
     table = study_tables.read_trials(path, work.study.conditions).sort_values("start_s", kind="stable")
     table["left_s"] = table["selection_s"]
     for axis in "xyz":
         table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
-    cells = [with_movements(rows) for _, rows in table.groupby([*CELL, "session"], sort=True)]
+    cells = [_with_widths(work.study, with_movements(rows)) for _, rows in table.groupby([*CELL, "session"], sort=True)]
     from_trials = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
-    return pd.concat([tables.as_table("movements", from_trials), from_trials[CELL].astype("string")], axis=1)
+    return tables.as_table("movements", from_trials)
+
+
+def _with_widths(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials of one session of trials.csv with the place of each in the session and the width of its target.
+
+    Trials whose starts do not tell their order, as where each has a clock of its own, go by their numbers.
+    """
+    starts = trials["start_s"]
+    told = starts.notna().all() and starts.is_unique
+    order = trials["start_s" if told else "trial"].rank(method="first").astype("Int64")
+    known = widths_mm(study.task, coordinates(trials, "target"))
+    return trials.assign(order=order, width_mm=trials["target_width_mm"].fillna(pd.Series(known, index=trials.index)))
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
@@ -110,12 +121,11 @@ def selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
 
 def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """Throughput (bits/s), one row per sequence of a session, and measures of the hand's path, one row per trial."""
+    figures = ("amplitude_mm", "moved_mm", "along_mm", "duration_s", "width_mm")
     rows = [
         (*cell, throughput)
         for cell, trials in moved.groupby([*CELL, "session"], dropna=False, sort=True)
-        for throughput in movements.throughputs(
-            *(trials[name].to_numpy(np.float64) for name in ("amplitude_mm", "moved_mm", "along_mm", "duration_s"))
-        )
+        for throughput in movements.throughputs(*(trials[name].to_numpy(np.float64) for name in figures))
     ]
     sequences = pd.DataFrame(rows, columns=[*CELL, "session", "throughput"])
     yield _values(sequences, "throughput_bits_s", "throughput", "the trials")

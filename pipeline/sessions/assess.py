@@ -18,6 +18,7 @@ from pipeline.sessions.estimators import sensors
 from pipeline.sessions.fusion_checks import fusion_check_rows
 from pipeline.sessions.phone import described
 from pipeline.sessions.recording import SETTLED_S, Recording, Shown
+from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
@@ -279,7 +280,10 @@ def _movements(work: Work, loaded: Recording, events: Sequence[Row]) -> pd.DataF
         before = targets[index - 1] if index else np.full(3, np.nan)
         rows.append({} if path is None else _of_path(work.study, path, before, targets[index]))
     of_paths = pd.DataFrame(rows, index=trials.index)
-    return tables.as_table("movements", pd.concat([trials.assign(session=work.session.id), of_paths], axis=1))
+    trials = trials.assign(
+        **work.session.ids, order=np.arange(1, len(trials) + 1), width_mm=widths_mm(work.study.task, targets)
+    )
+    return tables.as_table("movements", pd.concat([trials, of_paths], axis=1))
 
 
 def _hand(study: Study, loaded: Recording) -> Samples | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.statistics import fitts
 from pipeline.statistics.arrays import FloatArray
 
 CUTOFF_HZ = 5.0
@@ -72,23 +73,37 @@ def previous(values: FloatArray) -> FloatArray:
 
 
 def throughputs(
-    amplitude_mm: FloatArray, moved_mm: FloatArray, along_mm: FloatArray, duration_s: FloatArray
+    amplitude_mm: FloatArray,
+    moved_mm: FloatArray,
+    along_mm: FloatArray,
+    duration_s: FloatArray,
+    width_mm: FloatArray | None = None,
 ) -> FloatArray:
-    """Throughput in bit/s of each sequence: movements (n,) of one nominal amplitude, at least five.
+    """Throughput in bit/s of each sequence: movements (n,) of one nominal amplitude and width, at least five.
 
-    W_e = 4.133 SD of the deviations along the axis, A_e the mean distance covered along it, ID_e = log₂(A_e/W_e + 1),
-    and throughput ID_e over the mean movement time (ISO 9241-411; Soukoreff and MacKenzie 2004, equations 2 to 5). A
-    sequence without spread, distance or time has no throughput.
+    The effective index of difficulty over the mean movement time (ISO 9241-411; Soukoreff and MacKenzie 2004,
+    equations 2 to 5). A sequence without spread, distance or time has no throughput.
     """
-    figures = np.column_stack([amplitude_mm, moved_mm, along_mm, duration_s])
-    known = figures[np.isfinite(figures).all(axis=1)]
+    known = np.isfinite(np.column_stack([amplitude_mm, moved_mm, along_mm, duration_s])).all(axis=1)
+    moved, along, duration = moved_mm[known], along_mm[known], duration_s[known]
+    width = np.full(len(known), np.nan) if width_mm is None else width_mm
+    blocks = [
+        fitts.effective(moved[rows], along[rows], duration[rows], [""] * len(rows))
+        for rows in sequences(amplitude_mm[known], width[known])
+    ]
+    return np.concatenate([np.empty(0), *(block.difficulty / block.time_s for block in blocks)])
+
+
+def sequences(amplitude_mm: FloatArray, width_mm: FloatArray) -> list[npt.NDArray[np.intp]]:
+    """The rows of each sequence of movements (n,): one width of the target, and amplitudes within 10 % of one.
+
+    Widths that are not known, NaN, count as one.
+    """
     found = []
-    for rows in _of_one_amplitude(known[:, 0]):
-        _, moved, along, duration = known[rows].T
-        width, amplitude, time = 4.133 * float(np.std(along, ddof=1)), float(moved.mean()), float(duration.mean())
-        if width > _ROUND_OFF * amplitude > 0 and time > 0:
-            found.append(np.log2(amplitude / width + 1) / time)
-    return np.array(found, dtype=np.float64)
+    for width in np.unique(width_mm):
+        own = np.flatnonzero(np.isnan(width_mm) if np.isnan(width) else width_mm == width)
+        found += [own[rows] for rows in _of_one_amplitude(amplitude_mm[own])]
+    return found
 
 
 def _of_one_amplitude(amplitude_mm: FloatArray) -> list[npt.NDArray[np.intp]]:

@@ -27,7 +27,7 @@ TRIAL_REQUIRED = (
     "selected_x_mm",
     "selected_y_mm",
 )
-TRIAL_OPTIONAL = ("session", "target_z_mm", "selected_z_mm", "start_s", "selection_s")
+TRIAL_OPTIONAL = ("session", "target_z_mm", "selected_z_mm", "start_s", "selection_s", "target_width_mm")
 RATING_REQUIRED = ("participant", "condition", "questionnaire", "scale", "rating")
 MEASURE_REQUIRED = ("participant", "condition", "measure", "value")
 REPEAT_REQUIRED = ("repeat", "condition", "measure", "value")
@@ -170,6 +170,10 @@ def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
     _check_unique(path, table, ["participant", "condition", "session", "trial"])
     for column in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]):
         table[column] = _numbers(path, table, column)
+    flat = table.index[table["target_width_mm"] <= 0]
+    if len(flat):
+        width = table.at[flat[0], "target_width_mm"]
+        raise PipelineError(f'{path}, row {flat[0]}: "target_width_mm" should be above 0, found {width:g}')
     return table
 
 
