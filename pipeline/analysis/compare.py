@@ -12,7 +12,9 @@ import pandas as pd
 from pipeline.analysis.audit.beside_computed import compare_printed
 from pipeline.analysis.comparisons import People, all_requests, compared, people_of
 from pipeline.analysis.design_check import findings
+from pipeline.analysis.fitts_law import fitts_law
 from pipeline.analysis.measure import ALL_DATA
+from pipeline.analysis.practice import learning_rows
 from pipeline.analysis.preregistration.hypotheses import Done
 from pipeline.analysis.preregistration.plan_and_done import plan_and_done
 from pipeline.analysis.simulated_reductions import reductions
@@ -55,6 +57,11 @@ def run(work: Work) -> Outcome:
     requests = [request for entry in all_requests(study, measures, observations, people) for request in entry]
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
     frames["design_check"] = tables.frame("design_check", design_rows)
+    movements = tables.read("movements", measured)
+    frames["learning"] = tables.frame("learning", learning_rows(movements, study.conditions))
+    fitts = fitts_law(movements, study.conditions)
+    frames["fitts"] = tables.frame("fitts", fitts.lines)
+    frames["fitts_points"] = tables.frame("fitts_points", fitts.points)
     gathered = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
     gathered["checks"] = pd.concat([tables.read("checks", work.entries[name]) for name in TABLES["checks"].stages[:-1]])
     left_out += _without_accuracy(work, gathered["quality"], gathered["accuracy"])

@@ -25,6 +25,7 @@ SEPARATED = (
     "undefined: in one condition all answers are the same, or no event was counted, so its odds or rate has no log"
 )
 ONE_ITEM = "undefined: a scale of one item has no internal consistency"
+TOO_FEW_TRIALS = "undefined: nobody has three trials with a time in one session of the condition"
 NO_TOTAL_VARIES = "undefined: the sum of the items is the same for everybody"
 NO_RESIDUAL = "undefined: no value varies within its cell, so the model has no residual"
 NOT_CONVERGED = "undefined: the fit of the model did not converge"
@@ -52,6 +53,7 @@ STATUSES = (
     ONE_LEVEL,
     SEPARATED,
     ONE_ITEM,
+    TOO_FEW_TRIALS,
     NO_TOTAL_VARIES,
     NO_RESIDUAL,
     NOT_CONVERGED,

@@ -26,47 +26,54 @@ def learning(
     One row per trial (N,): its value, such as a time, which must be above 0; its number in the condition from 1 on;
     its participant; its condition. First one row per condition, its slopes against zero (contrast: the condition),
     then one of every two (contrast `a - b`), of the participants who have a slope in both. A slope needs two
-    orders. Effect size: d_z of the slopes, or of their differences; the mean slope and what it makes of a value
-    when trials double are in the details.
+    orders. Effect size: d_z of the slopes, or of their differences; the mean slope, what it makes of a
+    value when trials double, and the value that the curve of a condition begins with, are in the details.
     """
-    slopes = _slopes(values, orders, participants, conditions, len(levels))
-    if isinstance(slopes, str):
+    curves = _curves(values, orders, participants, conditions, len(levels))
+    if isinstance(curves, str):
         names = [*levels, *(f"{first} - {second}" for first, second in combinations(levels, 2))]
         people = len(set(participants))
-        return [Result(EFFECT, "t", _METHOD, "Cohen's d_z", people, contrast=name, status=slopes) for name in names]
+        return [Result(EFFECT, "t", _METHOD, "Cohen's d_z", people, contrast=name, status=curves) for name in names]
+    slopes, starts = curves
     rows = []
-    for slope, name in zip(slopes.T, levels, strict=True):
+    for slope, start, name in zip(slopes.T, starts.T, levels, strict=True):
         known = slope[np.isfinite(slope)]
-        rows.append(_row(known, np.zeros(len(known)), name, len(slope)))
+        begin = float(np.exp(np.mean(start[np.isfinite(slope)]))) if len(known) else None
+        rows.append(_row(known, np.zeros(len(known)), name, len(slope), begin))
     for (i, first), (j, second) in combinations(enumerate(levels), 2):
         both = np.isfinite(slopes[:, i]) & np.isfinite(slopes[:, j])
         rows.append(_row(slopes[both, i], slopes[both, j], f"{first} - {second}", len(slopes)))
     return rows
 
 
-def _slopes(
+def _curves(
     values: FloatArray, orders: FloatArray, participants: Sequence[str], conditions: IntArray, k: int
-) -> FloatArray | str:
-    """Of each participant in each condition (n, k), NaN where there are not two orders; or why there are none."""
+) -> tuple[FloatArray, FloatArray] | str:
+    """Slope, and log value at the first trial, of each participant in each condition (n, k); or why there are none.
+
+    Both are NaN where there are not two orders.
+    """
     if not ((values > 0).all() and (orders > 0).all()):
         return NOT_POSITIVE
     people = list(dict.fromkeys(participants))
     person = np.array([people.index(name) for name in participants], dtype=np.int64)
-    slopes = np.full((len(people), k), np.nan)
+    slopes, starts = np.full((2, len(people), k), np.nan)
     for at in {(int(p), int(c)) for p, c in zip(person, conditions, strict=True)}:
         rows = (person == at[0]) & (conditions == at[1])
         x, y = np.log(orders[rows]), np.log(values[rows])
         if np.ptp(x) > 0:
             slopes[at] = np.sum((x - x.mean()) * (y - y.mean())) / np.sum((x - x.mean()) ** 2)
-    return slopes
+            starts[at] = y.mean() - slopes[at] * x.mean()
+    return slopes, starts
 
 
-def _row(first: FloatArray, second: FloatArray, contrast: str, people: int) -> Result:
+def _row(first: FloatArray, second: FloatArray, contrast: str, people: int, begin: float | None = None) -> Result:
     tested = t_paired(first, second, EFFECT)
     details: dict[str, Any] = {
         "slope": None,
         "ratio_when_trials_double": None,
         "ci_slope": None,
+        "value_at_first_trial": begin,
         "n_without_slope": people - len(first),
     }
     if len(first):

@@ -26,6 +26,7 @@ from pipeline.tables.columns import (
     number,
     text,
 )
+from pipeline.tables.pointing_tables import FITTS, FITTS_POINTS, LEARNING
 from pipeline.tables.recording_tables import (
     ACCURACY,
     ACCURACY_MEANS,
@@ -261,6 +262,9 @@ STUDY_TABLES = (
         in_results=True,
         as_csv=True,
     ),
+    LEARNING,
+    FITTS,
+    FITTS_POINTS,
     Table(
         "measures",
         "One row per participant, condition and measure, and level of further factors.",

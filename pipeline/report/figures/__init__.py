@@ -10,10 +10,12 @@ from pipeline.report.figures.box_plots import workload
 from pipeline.report.figures.drawing import Drawing, Words
 from pipeline.report.figures.error_and_lag import errors, lag_and_error
 from pipeline.report.figures.excerpts import estimates, streams
+from pipeline.report.figures.fitts_law import fitts
 from pipeline.report.figures.hand_paths import path, paths
 from pipeline.report.figures.layout import task_layout
 from pipeline.report.figures.lead_curves import lead
 from pipeline.report.figures.power import Labels, power
+from pipeline.report.figures.practice import practice
 from pipeline.report.figures.rainclouds import paired, scales
 from pipeline.report.figures.selections import selection_errors
 from pipeline.report.figures.sensor_noise import noise
@@ -31,6 +33,7 @@ __all__ = [
     "draw",
     "errors",
     "estimates",
+    "fitts",
     "lag_and_error",
     "lead",
     "noise",
@@ -38,6 +41,7 @@ __all__ = [
     "path",
     "paths",
     "power",
+    "practice",
     "save",
     "scales",
     "selection_errors",

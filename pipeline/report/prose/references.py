@@ -85,13 +85,20 @@ class Reference:
         return " ".join(filter(None, (head, *sentences, doi)))
 
 
-def used(study: Study, rows: Sequence[Row], measures: Iterable[str], versions: Mapping[str, str]) -> list[Reference]:
+def used(
+    study: Study,
+    rows: Sequence[Row],
+    measures: Iterable[str],
+    versions: Mapping[str, str],
+    shown: Iterable[tuple[str, str]] = (),
+) -> list[Reference]:
     """What the study rests on: its source, the paper, tests, questionnaires, estimators, packages; each once.
 
-    `rows` are its comparisons, `versions` those of the packages that made the report.
+    `rows` are its comparisons, `versions` those of the packages that made the report, `shown` what else the report
+    shows: a reference's key and what it is used for.
     """
     found: dict[str, list[str]] = {}
-    for key, used_for in (*_of_methods(rows), *_of_measures(measures), *_of_estimators(study)):
+    for key, used_for in (*_of_methods(rows), *_of_measures(measures), *shown, *_of_estimators(study)):
         if used_for not in found.setdefault(key, []):
             found[key].append(used_for)
     known = entries()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import groupby
 
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.report.figures.rainclouds import draws_within
 from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
 from pipeline.report.prose.sentences import StudyFacts, means_sentence, sentence, states_means, study_facts
+from pipeline.report.sections import practice
 from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import used_versions
@@ -35,7 +37,18 @@ def section(material: Material) -> Section:
 
 def references(material: Material) -> list[Reference]:
     """What the study's report rests on."""
-    return used(material.study, material.rows("comparisons"), material.measured(), used_versions())
+    rows, measures = material.rows("comparisons"), material.measured()
+    return used(material.study, rows, measures, used_versions(), _shown(material, measures))
+
+
+def _shown(material: Material, measures: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """What sections and figures rest on that belongs to no test."""
+    if practice.section_rows(material):
+        yield "newell1981", "power law of practice"
+    if material.rows("fitts"):
+        yield "soukoreff2004", "Fitts' law"
+    if any(draws_within(material.participant_means(name)) for name in measures):
+        yield "morey2008", "intervals within participants"
 
 
 def bibtex(material: Material) -> str:

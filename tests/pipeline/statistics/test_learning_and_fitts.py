@@ -54,6 +54,8 @@ def test_a_power_law_has_its_own_exponent_in_any_unit(slopes: list[float], unit:
     codes = np.zeros(len(orders), dtype=np.int64)
     (found,) = learning(values, orders, [str(person) for person in people], codes, ["a"])
     assert found.details["slope"] == pytest.approx(np.mean(slopes), abs=1e-9)
+    first = np.exp(np.mean(np.log(unit * (2 + np.arange(len(slopes))))))
+    assert found.details["value_at_first_trial"] == pytest.approx(first, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,9 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
         "simulated_reductions",
         "reliability",
         "preregistration",
+        "learning",
+        "fitts",
+        "fitts_points",
     )
     assert in_results_of("replay") == ["accuracy", "replay_means", "replay_exclusions"]
     assert written_by("replay") == ["accuracy", "replay_trials", "replay_means", "replay_exclusions"]
@@ -73,8 +76,8 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
     assert CHECKED == ("descriptives", "comparisons", "accuracy", "replay_agreement")
 
 
-def test_the_csv_files_are_what_the_report_says_and_the_trials_behind_it() -> None:
-    assert set(AS_CSV) == {*IN_STUDY_RESULTS, "selections", "trials", "measures", "calibration"}
+def test_the_csv_files_are_what_the_report_says_and_the_trials_and_movements_behind_it() -> None:
+    assert set(AS_CSV) == {*IN_STUDY_RESULTS, "selections", "movements", "trials", "measures", "calibration"}
 
 
 def test_each_stage_writes_the_tables_that_name_it(folder: Folder, steadyhand: Steadyhand) -> None:
