@@ -57,7 +57,8 @@ def fitts_law(movements: pd.DataFrame, conditions: Sequence[str]) -> Fitts:
 
 def _in_blocks(movements: pd.DataFrame) -> pd.DataFrame:
     """The movements that are known in full, with their block's number and its nominal distance."""
-    known = movements[np.isfinite(movements[_FIGURES]).all(axis=1) & (movements["duration_s"] > 0)]
+    finite = np.isfinite(movements[_FIGURES].to_numpy(np.float64)).all(axis=1)
+    known = movements[finite & (movements["duration_s"] > 0).to_numpy()]
     amplitude, width = (known[name].to_numpy(np.float64) for name in ("amplitude_mm", "width_mm"))
     block, nominal_mm = np.full(len(known), -1), np.full(len(known), np.nan)
     for number, rows in enumerate(sequences(amplitude, width)):

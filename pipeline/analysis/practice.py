@@ -81,12 +81,12 @@ def _differ(trials: pd.DataFrame) -> bool:
 
 
 def _tested(trials: pd.DataFrame, conditions: Sequence[str]) -> list[Result]:
-    codes = trials["condition"].map({name: code for code, name in enumerate(conditions)})
+    codes = [conditions.index(name) for name in trials["condition"]]
     return learning(
         trials["duration_s"].to_numpy(np.float64),
         trials["order"].to_numpy(np.float64),
         list(trials["participant"]),
-        codes.to_numpy(np.int64),
+        np.array(codes, dtype=np.int64),
         conditions,
     )
 

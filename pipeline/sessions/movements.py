@@ -86,7 +86,7 @@ def throughputs(
     """
     known = np.isfinite(np.column_stack([amplitude_mm, moved_mm, along_mm, duration_s])).all(axis=1)
     moved, along, duration = moved_mm[known], along_mm[known], duration_s[known]
-    width = np.full(len(known), np.nan) if width_mm is None else width_mm
+    width = np.full(len(amplitude_mm), np.nan) if width_mm is None else width_mm
     blocks = [
         fitts.effective(moved[rows], along[rows], duration[rows], [""] * len(rows))
         for rows in sequences(amplitude_mm[known], width[known])

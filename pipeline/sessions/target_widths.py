@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.simulation import Ring, Task
@@ -34,7 +35,8 @@ def widths_mm(task: Task | None, target_mm: FloatArray) -> FloatArray:
     return widths
 
 
-def _on(ring: Ring, places: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _on(ring: Ring, places: FloatArray) -> npt.NDArray[np.bool_]:
     """Which places (n, 2) lie on the circle of a ring."""
     from_centre = np.linalg.norm(places - np.array(ring.centre_mm), axis=1)
-    return np.abs(from_centre - ring.diameter_mm / 2) <= _APART_MM
+    on: npt.NDArray[np.bool_] = np.abs(from_centre - ring.diameter_mm / 2) <= _APART_MM
+    return on

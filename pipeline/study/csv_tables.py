@@ -170,10 +170,9 @@ def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
     _check_unique(path, table, ["participant", "condition", "session", "trial"])
     for column in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]):
         table[column] = _numbers(path, table, column)
-    flat = table.index[table["target_width_mm"] <= 0]
-    if len(flat):
-        width = table.at[flat[0], "target_width_mm"]
-        raise PipelineError(f'{path}, row {flat[0]}: "target_width_mm" should be above 0, found {width:g}')
+    for line, width in table["target_width_mm"].items():
+        if width <= 0:
+            raise PipelineError(f'{path}, row {line}: "target_width_mm" should be above 0, found {width:g}')
     return table
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import (
@@ -82,7 +83,7 @@ def practice(trials: pd.DataFrame, rows: pd.DataFrame, conditions: Sequence[str]
     axes.set_xlabel("Number of the trial in its condition")
     axes.set_ylabel("Time per trial (s)")
     axes.set_ylim(bottom=0)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     grouped(axes)
     legend(figure, [axes], min(len(conditions), 6))
     return figure
@@ -106,10 +107,10 @@ def points(trials: pd.DataFrame, width: int) -> tuple[np.ndarray[Any, Any], ...]
     people = trials["participant"].nunique()
     placed = trials.assign(point=(trials["order"] - 1) // width, log=np.log(trials["duration_s"]))
     rows = []
-    for point, own in placed.groupby("point"):
+    for own in (own for _, own in placed.groupby("point")):
         values = own.groupby("participant")["log"].mean().to_numpy(np.float64)
         if len(values) >= _SHARE_MIN * people:
             mean, half = mean_and_interval(values)
-            rows.append((int(point) * width + (width + 1) / 2, mean, mean - half, mean + half))
+            rows.append((float(own["point"].iloc[0]) * width + (width + 1) / 2, mean, mean - half, mean + half))
     at, *logs = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return at, *map(np.exp, logs)

@@ -46,8 +46,8 @@ def _sentence(rows: Sequence[Row]) -> str:
 
 
 def _table(rows: Sequence[Row]) -> Table:
-    titles = ("Condition", "Difficulty", "n", "Points", "Intercept (s)", "95 % interval", "Slope (s/bit)")
-    titles += ("95 % interval", "R²", "Throughput (bit/s)")
+    of_line = ("Intercept (s)", "95 % interval", "Slope (s/bit)", "95 % interval", "R²")
+    titles = ("Condition", "Difficulty", "n", "Points", *of_line, "Throughput (bit/s)")
     cells = tuple(
         (
             row["condition"],
