@@ -11,7 +11,7 @@ from pipeline.report.document.model import Block, Notice, Paragraph, Section, St
 from pipeline.report.figures.fitts_law import line_in_words
 from pipeline.report.sections.material import Material
 from pipeline.tables.table import Row
-from pipeline.words import interval, listing, number, share
+from pipeline.words import NOTHING, interval, listing, number, share
 
 
 def section(material: Material) -> Section | None:
@@ -46,7 +46,7 @@ def _sentence(rows: Sequence[Row]) -> str:
 
 
 def _table(rows: Sequence[Row]) -> Table:
-    of_line = ("Intercept (s)", "95 % interval", "Slope (s/bit)", "95 % interval", "R²")
+    of_line = ("Intercept (s) [95 % interval]", "Slope (s/bit) [95 % interval]", "R²")
     titles = ("Condition", "Difficulty", "n", "Points", *of_line, "Throughput (bit/s)")
     cells = tuple(
         (
@@ -54,10 +54,8 @@ def _table(rows: Sequence[Row]) -> Table:
             row["difficulty"],
             f"{row['n']}",
             f"{row['blocks']}",
-            number(row["intercept_s"]),
-            interval(row["intercept_ci_low_s"], row["intercept_ci_high_s"]),
-            number(row["slope_s_bit"]),
-            interval(row["slope_ci_low_s_bit"], row["slope_ci_high_s_bit"]),
+            _with_interval(row["intercept_s"], row["intercept_ci_low_s"], row["intercept_ci_high_s"]),
+            _with_interval(row["slope_s_bit"], row["slope_ci_low_s_bit"], row["slope_ci_high_s_bit"]),
             share(row["r_squared"]),
             number(row["throughput_bits_s"]),
         )
@@ -68,6 +66,10 @@ def _table(rows: Sequence[Row]) -> Table:
         " throughput is the mean over participants of difficulty over movement time, and no inverse of the slope."
     )
     return Table("table-fitts", caption, columns(titles, 2), cells)
+
+
+def _with_interval(value: float | None, low: float | None, high: float | None) -> str:
+    return NOTHING if value is None else f"{number(value)} {interval(low, high)}"
 
 
 def _cautions(rows: Sequence[Row]) -> list[Block]:

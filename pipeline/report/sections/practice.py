@@ -110,26 +110,14 @@ def _compared(pair: Row) -> str:
 
 
 def _table(rows: Sequence[Row], conditions: Sequence[str]) -> Table:
-    titles = (
-        "Trials",
-        "Condition or pair",
-        "n",
-        "Left out",
-        "When trials double",
-        "Slope",
-        "95 % interval",
-        "Test",
-        "Holm-adjusted p",
-    )
+    titles = ("Trials", "Condition or pair", "n", "When trials double", "Slope [95 % interval]", "Test", "p (Holm)")
     cells = tuple(
         (
             row["trials"].capitalize(),
             row["contrast"] if row["contrast"] in conditions else _compared(row),
-            f"{row['n']}",
-            f"{row['left_out']}",
+            f"{row['n']}" if row["left_out"] == 0 else f"{row['n']} ({row['left_out']} left out)",
             _change(row),
-            share(row["slope"]),
-            share_interval(row["ci_low"], row["ci_high"], 3),
+            f"{share(row['slope'])} {share_interval(row['ci_low'], row['ci_high'], 3)}",
             statistic({**row, "df1": None}) if row["status"] == OK else row["status"],
             p_value(row["p_adjusted"]),
         )
