@@ -47,11 +47,10 @@ def _sentence(rows: Sequence[Row]) -> str:
 
 def _table(rows: Sequence[Row]) -> Table:
     of_line = ("Intercept (s) [95 % interval]", "Slope (s/bit) [95 % interval]", "R²")
-    titles = ("Condition", "Difficulty", "n", "Points", *of_line, "Throughput (bit/s)")
+    titles = ("Condition, difficulty", "n", "Points", *of_line, "Throughput (bit/s)")
     cells = tuple(
         (
-            row["condition"],
-            row["difficulty"],
+            f"{row['condition']}, {row['difficulty']}",
             f"{row['n']}",
             f"{row['blocks']}",
             _with_interval(row["intercept_s"], row["intercept_ci_low_s"], row["intercept_ci_high_s"]),
@@ -65,7 +64,7 @@ def _table(rows: Sequence[Row]) -> Table:
         "Fitts' law by condition. The line goes through the means over participants of each distance and width;"
         " throughput is the mean over participants of difficulty over movement time, and no inverse of the slope."
     )
-    return Table("table-fitts", caption, columns(titles, 2), cells)
+    return Table("table-fitts", caption, columns(titles, 1), cells)
 
 
 def _with_interval(value: float | None, low: float | None, high: float | None) -> str:
