@@ -59,7 +59,7 @@ MUTANTS = (
     Mutant("middle = time[span // 2 : span // 2 + len(spread)]", "middle = time[: len(spread)]", _ACCURACY),
     # How people moved.
     Mutant("_PROMINENCE_MIN = 0.1  #", "_PROMINENCE_MIN = 0.05  #", _MOVEMENTS),
-    Mutant("4.133 * float(np.std(along, ddof=1))", "4.133 * float(np.std(along))", _MOVEMENTS),
-    Mutant("np.log2(amplitude / width + 1) / time", "np.log2(amplitude / width) / time", _MOVEMENTS),
+    Mutant("float(np.std(deviations, ddof=1))", "float(np.std(deviations))", _MOVEMENTS),
+    Mutant("= np.log2(amplitude / width + 1)", "= np.log2(amplitude / width)", _MOVEMENTS),
     Mutant("return max(0, len(peaks) - 1)", "return len(peaks)", _MOVEMENTS),
 )
