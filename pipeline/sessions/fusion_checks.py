@@ -57,22 +57,35 @@ def used(loaded: Recording) -> Iterator[Finding]:
 def against_tracker(
     study: Study, loaded: Recording, reference: tuple[str, Samples] | None, rmse_mm: Mapping[str, float]
 ) -> Iterator[Finding]:
-    """Each fusing estimator's error against that of its tracker as it arrives. Needs a recorded reference."""
+    """Each fusing estimator's error against that of its tracker as it arrives. Needs a recorded reference.
+
+    Where another one helps with the same readings, these do not contradict study.yaml: no more than amber.
+    """
     alone_mm = _tracker_alone_mm(study, loaded, reference)
     if alone_mm is None:
         return
-    for name in fusing(study):
-        if name not in rmse_mm:
-            continue
+    rated = [name for name in fusing(study) if name in rmse_mm]
+    helping = [name for name in rated if rmse_mm[name] <= alone_mm]
+    for name in rated:
         status = graded(rmse_mm[name], _WORSE[0] * alone_mm, _WORSE[1] * alone_mm)
         message = ""
         if status != "green":
-            message = (
-                f"{name} is {rmse_mm[name]:.3g} mm off and its tracker alone {alone_mm:.3g}: noise, latency, gravity or"
-                f" orientation are not as stated, or the settings of {name} do not suit the movement; put the other "
-                "checks right, then try steadyhand fit"
-            )
+            status = "amber" if helping else status
+            how = f"{name} is {rmse_mm[name]:.3g} mm off and its tracker alone {alone_mm:.3g}"
+            message = f"{how}: {_cause(name, helping)}"
         yield Finding(of(WORSE, name), status, f"{rmse_mm[name]:.3g} mm", f"{alone_mm:.3g} mm", message)
+
+
+def _cause(name: str, helping: Sequence[str]) -> str:
+    if helping:
+        return (
+            f"its settings do not suit the movement, for {helping[0]} does better than the tracker with the same"
+            f" readings; change the settings of {name}, or show people {helping[0]}"
+        )
+    return (
+        f"noise, latency, gravity or orientation are not as stated, or the settings of {name} do not suit the movement;"
+        " put the other checks right, then try steadyhand fit"
+    )
 
 
 def _tracker_alone_mm(study: Study, loaded: Recording, reference: tuple[str, Samples] | None) -> float | None:

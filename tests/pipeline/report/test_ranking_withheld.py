@@ -55,6 +55,22 @@ def test_fusion_that_is_worse_than_its_tracker_is_named_and_nothing_is_best(
     assert "comes closest" not in page
 
 
+def test_an_estimator_with_settings_that_do_not_suit_is_no_contradiction(
+    folder: Folder, steadyhand: Steadyhand
+) -> None:
+    """Where another does better than the tracker with the same readings, these are as study.yaml states them."""
+    log, _ = session(Hand(seconds=30.0))
+    unsuited = f"{ESTIMATORS[:-1]}, still: {{type: window_gp, window: 60, inverse_scale_s2: 0.05}}}}"
+    ran = steadyhand("report", study_with(folder, log, (ESTIMATORS, unsuited)))
+    assert ran.code == 0, ran.err
+    rows = {row["check"]: row for row in steadyhand.results()["checks"]}
+    assert rows["fusion against tracker: fusion"]["status"] == "green"
+    row = rows["fusion against tracker: still"]
+    assert row["status"] == "amber"
+    assert "fusion does better than the tracker with the same readings" in row["message"]
+    assert "fusion comes closest to the reference" in text_of(steadyhand.out / "report.html")
+
+
 def test_without_a_contradiction_the_best_is_named(folder: Folder, steadyhand: Steadyhand) -> None:
     log, _ = session(Hand(seconds=30.0))
     ran = steadyhand("report", study_with(folder, log))
