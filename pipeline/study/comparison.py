@@ -80,8 +80,7 @@ class Comparison(Frozen):
 
     @model_validator(mode="after")
     def _options_fit_together(self) -> Comparison:
-        # Not by whether it was written down: a preregistration writes down every key.
-        if self.seed != type(self).model_fields["seed"].default and not (self.bootstrap or self.permutation):
+        if "seed" in self.model_fields_set and not self.draws_at_random:
             raise ValueError(
                 "seed is for the chance of a bootstrap or permutation; add bootstrap: true, or leave it out"
             )
@@ -104,6 +103,11 @@ class Comparison(Frozen):
     def title(self) -> str:
         """The measures as an error names them."""
         return ", ".join(self.measures)
+
+    @property
+    def draws_at_random(self) -> bool:
+        """Does it compute anything by chance, so that its seed means something?"""
+        return self.bootstrap or self.permutation
 
     @property
     def is_within(self) -> bool:

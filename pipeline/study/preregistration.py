@@ -79,8 +79,9 @@ def frozen_text(registered: Registered) -> tuple[str, str]:
 
 
 def _stated(entry: Comparison) -> dict[str, Any]:
-    """All that an entry says, defaults too, for a later version may have others; not what its test does not take."""
-    return entry.model_dump(mode="json", exclude=OPTIONS - set(entry.options), exclude_none=True)
+    """All that an entry says, defaults too, for a later version may have others; not what means nothing in it."""
+    meaningless = OPTIONS - set(entry.options) | (set() if entry.draws_at_random else {"seed"})
+    return entry.model_dump(mode="json", exclude=meaningless, exclude_none=True)
 
 
 def _digest(text: str) -> str:
