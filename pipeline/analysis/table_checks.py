@@ -7,12 +7,11 @@ that a slow task or a coarse scale is no alarm.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
 
 import numpy as np
 import pandas as pd
 
-from pipeline.sessions.checks.finding import Finding, of
+from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
 from pipeline.tables.table import Row
@@ -35,6 +34,7 @@ _OTHERS_MIN = 3
 _RATED_FROM, _RATED_TO = 0.0, 100.0  # of the NASA-TLX, however it was asked
 _UNITS_APART = 50.0
 _FARTHEST_MM = 20_000.0
+_SAME_NS = 60e9  # logs of one minute were not recorded one after the other
 _NAMED_MAX = 3
 
 
@@ -52,7 +52,7 @@ def check_rows(values: pd.DataFrame, selections: pd.DataFrame | None) -> list[Ro
         findings += rated_range(str(name), str(source), value)
     if selections is not None:
         findings += targets(selections)
-    return [{"session": None, **asdict(one), "message": one.message or None} for one in findings]
+    return rows_of(findings)
 
 
 def unit_of_time(name: str, source: str, value: FloatArray) -> Iterator[Finding]:
@@ -166,12 +166,9 @@ def order_rows(orders: pd.DataFrame, starts_ns: pd.DataFrame) -> list[Row]:
                 f"{source} state another order of the conditions than the dates of the logs for {len(wrong)} of {n} "
                 f"participants ({who}): a label was exchanged or a session repeated; correct the table or the file name"
             )
-        status = "amber" if wrong else "green"
-        findings.append(Finding(of(ORDER, str(source)), status, f"{len(wrong)} of {n}", "none", message))  # type: ignore[arg-type]
-    return [{"session": None, **asdict(one), "message": one.message or None} for one in findings]
-
-
-_SAME_NS = 60e9  # logs of one minute were not recorded one after the other
+        status: Status = "amber" if wrong else "green"
+        findings.append(Finding(of(ORDER, str(source)), status, f"{len(wrong)} of {n}", "none", message))
+    return rows_of(findings)
 
 
 def _contradicts(mine: pd.DataFrame) -> bool:

@@ -7,8 +7,9 @@ from typing import Any
 
 from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.commands import console
+from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
 from pipeline.report.prose.answer import HEADER, answer, not_answered, notes
-from pipeline.words import SMOOTHED, comparison_sentence, counted, held_against, measure_label, number
+from pipeline.words import comparison_sentence, counted, measure_label, number
 
 _CHECKS_MAX = 5  # printed; the report has them all
 
@@ -57,13 +58,12 @@ def _checks(results: Mapping[str, Any]) -> Iterator[str]:
 
 def _accuracy(results: Mapping[str, Any]) -> Iterator[str]:
     """Each estimator's mean error, and why none is the best where that cannot be said."""
-    known = SMOOTHED not in held_against(row["reference"] for row in results["accuracy"])
+    known = not without_reference(results)
     if not known:
         yield "  No reference was recorded: absolute error and lag cannot be known, nor which estimator is best."
-    rated = {row["session"] for row in results["accuracy"]}
-    red = {row["session"] for row in results["checks"] if row["status"] == "red"} & rated
+    red, rated = sessions_in_doubt(results)
     if red:
-        yield f"  {len(red)} of {counted(len(rated), 'session')} with a red check, so no estimator is called best"
+        yield f"  {len(red)} of {counted(rated, 'session')} with a red check, so no estimator is called best"
     for row in results["accuracy_means"]:
         what = "RMSE {} mm" if known else "{} mm RMS from the smoothed readings"
         yield f"  {row['estimator']}: {what.format(number(row['rmse_mm']))} (mean of {counted(row['n'], 'session')})"

@@ -17,7 +17,7 @@ from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors
 from pipeline.sessions.fusion_checks import fusion_check_rows
 from pipeline.sessions.phone import described
-from pipeline.sessions.recording import SETTLED_S, Recording, Shown
+from pipeline.sessions.recording import Recording, Shown, where_judged
 from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
 from pipeline.statistics.arrays import FloatArray
@@ -105,19 +105,13 @@ def accuracy_row(
 def _on_grid(
     study: Study, loaded: Recording, named: tuple[str, Samples] | None, shown: Shown
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """Time (n,) in s, mean, stated SD and reference (n, d) in mm, where accuracy is judged; None if nowhere.
-
-    That is from 1 s after the first frame's arrival on, wherever the reference is known.
-    """
-    tracker = study.tracker
-    if named is None or tracker is None or len(loaded.samples[tracker]) == 0:
-        return None
+    """Time (n,) in s, mean, stated SD and reference (n, d) in mm, where accuracy is judged; None if nowhere."""
     time = loaded.to_s(shown.time_ns)
-    truth = accuracy.interpolate(named[1], time)
-    on_grid = (time >= loaded.samples[tracker].arrival[0] + SETTLED_S) & np.isfinite(truth).all(axis=1)
-    if not on_grid.any():
+    judged = where_judged(study, loaded, named, time)
+    if judged is None:
         return None
-    return time[on_grid], shown.mean[on_grid], shown.sd[on_grid], truth[on_grid]
+    on_grid, truth = judged
+    return time[on_grid], shown.mean[on_grid], shown.sd[on_grid], truth
 
 
 def calibration_rows(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 
 import numpy as np
 
 from fusion_core import Raw, Samples, accuracy
-from pipeline.sessions.checks.finding import Finding, Status, graded, of
+from pipeline.sessions.checks.finding import Finding, Status, graded, of, rows_of
 from pipeline.sessions.estimators import fusing, sensors
-from pipeline.sessions.recording import SETTLED_S, Recording
+from pipeline.sessions.recording import Recording, where_judged
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 from pipeline.words import SMOOTHED
@@ -29,8 +28,7 @@ def fusion_check_rows(
 ) -> list[Row]:
     """Rows of the table `checks`; `rows` are the session's of `accuracy`."""
     rmse_mm = {str(row["estimator"]): float(row["rmse_mm"]) for row in rows}
-    findings = [*used(loaded), *against_tracker(study, loaded, reference, rmse_mm)]
-    return [{"session": session, **asdict(one), "message": one.message or None} for one in findings]
+    return rows_of([*used(loaded), *against_tracker(study, loaded, reference, rmse_mm)], session)
 
 
 def used(loaded: Recording) -> Iterator[Finding]:
@@ -91,11 +89,13 @@ def _cause(name: str, helping: Sequence[str]) -> str:
 def _tracker_alone_mm(study: Study, loaded: Recording, reference: tuple[str, Samples] | None) -> float | None:
     """RMSE in mm of the tracker's last frame, held, on the grid of accuracy."""
     tracker = study.tracker
-    if reference is None or reference[0] == SMOOTHED or tracker is None or not len(loaded.samples[tracker]):
+    if reference is None or reference[0] == SMOOTHED or tracker is None:
         return None
-    samples = loaded.samples[tracker]
-    time = loaded.times[loaded.times >= samples.arrival[0] + SETTLED_S]
-    held = Raw({tracker: sensors(study)[tracker]}).replay({tracker: samples}, time).mean
-    truth = accuracy.interpolate(reference[1], time)
-    known = np.isfinite(truth).all(axis=1) & np.isfinite(held).all(axis=1)
+    judged = where_judged(study, loaded, reference, loaded.times)
+    if judged is None:
+        return None
+    on_grid, truth = judged
+    samples = {tracker: loaded.samples[tracker]}
+    held = Raw({tracker: sensors(study)[tracker]}).replay(samples, loaded.times[on_grid]).mean
+    known = np.isfinite(held).all(axis=1)
     return accuracy.rmse(held[known], truth[known]) if known.any() else None

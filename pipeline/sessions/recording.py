@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
+from fusion_core.accuracy import interpolate
 from fusion_core.phone.calibration import Body
 from fusion_core.phone.orientation import nearest, rotate
 from pipeline.sessions.estimators import build_estimator, sensor, sensors
@@ -86,6 +87,21 @@ class Shown:
     time_ns: np.ndarray[Any, np.dtype[np.int64]]
     mean: FloatArray
     sd: FloatArray
+
+
+def where_judged(
+    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, time: FloatArray
+) -> tuple[np.ndarray[Any, np.dtype[np.bool_]], FloatArray] | None:
+    """At which times (n,) in s accuracy is judged, and the reference there (k, d) in mm; None if at none.
+
+    That is from 1 s after the first frame's arrival on, wherever the reference is known.
+    """
+    tracker = study.tracker
+    if reference is None or tracker is None or len(loaded.samples[tracker]) == 0:
+        return None
+    truth = interpolate(reference[1], time)
+    judged = (time >= loaded.samples[tracker].arrival[0] + SETTLED_S) & np.isfinite(truth).all(axis=1)
+    return (judged, truth[judged]) if judged.any() else None
 
 
 def load(study: Study, entry: Path) -> Recording:

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 from pipeline.analysis.kinds_of_values import SHAPE
 from pipeline.report.document.model import Strong, Text
+from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
 from pipeline.report.sections import checks, preregistration
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words import (
-    SMOOTHED,
     counted,
     finds_no_variance_between_people,
     held_against,
@@ -27,22 +27,15 @@ NOT_KNOWN = "Absolute error and lag cannot be known: no reference was recorded."
 
 def contradicted(material: Material) -> str:
     """Why no estimator is called the best although there is a reference: sessions with a red check; else nothing."""
-    sessions = list(dict.fromkeys(row["session"] for row in material.rows("accuracy")))
-    red = {row["session"] for row in material.rows("checks") if row["status"] == "red"}
-    named = [session for session in sessions if session in red]
+    named, rated = sessions_in_doubt(material.results)
     if not named:
         return ""
     verb = "contradicts" if len(named) == 1 else "contradict"
     shown = ", ".join(named[:_REMARKS_MAX]) + (", …" if len(named) > _REMARKS_MAX else "")
     return (
-        f"Which estimator is best is not said: {len(named)} of {counted(len(sessions), 'session')} {verb} what"
+        f"Which estimator is best is not said: {len(named)} of {counted(rated, 'session')} {verb} what"
         f" study.yaml states or their own readings ({shown}); see “Data quality and exclusions”."
     )
-
-
-def without_reference(material: Material) -> bool:
-    """Are estimates held against smoothed readings, because nothing recorded where the hand was?"""
-    return any(row["reference"] == SMOOTHED for row in material.rows("accuracy"))
 
 
 def cautions(material: Material) -> list[Text]:
@@ -61,7 +54,7 @@ def cautions(material: Material) -> list[Text]:
 
 
 def _of_reference(material: Material) -> Iterator[Text]:
-    if without_reference(material):
+    if without_reference(material.results):
         text = (
             " Figures of accuracy are distances from the smoothed readings of the study's own sensors: what these have"
             " wrong together, such as a latency, does not show, and no estimator can be called the best."
@@ -183,7 +176,8 @@ def _of_gaps(material: Material) -> Iterator[Text]:
     contradictions = sum(row["verdict"] == "contradiction" for row in material.rows("printed"))
     if contradictions:
         verb = "contradicts" if contradictions == 1 else "contradict"
-        yield (f"{counted(contradictions, 'printed figure')} {verb} others in it; see “Printed and computed”.",)
+        figures = f"{counted(contradictions, 'printed figure')} {verb} others of the same publication"
+        yield (f"{figures}; see “Printed and computed”.",)
     kinds = Counter(row["what"] for row in material.rows("exclusions"))
     if kinds:
         told = listing([f"{what} ({count})" for what, count in kinds.items()])

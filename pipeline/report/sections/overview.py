@@ -20,9 +20,10 @@ from pipeline.report.document.model import (
     columns,
 )
 from pipeline.report.figures.rainclouds import met_one_each
+from pipeline.report.prose.accuracy_claims import without_reference
 from pipeline.report.prose.answer import HEADER, answer, notes, shown
 from pipeline.report.sections import preregistration, traces
-from pipeline.report.sections.cautions import NOT_KNOWN, cautions, contradicted, without_reference
+from pipeline.report.sections.cautions import NOT_KNOWN, cautions, contradicted
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
 from pipeline.study.statistical_tests import TESTS
@@ -145,7 +146,7 @@ def _closest(material: Material) -> Text:
 
     Without a reference nobody knows which is closest to the hand.
     """
-    if without_reference(material):
+    if without_reference(material.results):
         return (Strong(NOT_KNOWN), f" {_distances(material)}")
     unsure = contradicted(material)
     if unsure and material.rows("accuracy_means"):
@@ -277,7 +278,7 @@ def _key_figure(row: Row) -> KeyFigure:
 def _means(material: Material) -> dict[str, tuple[float, int]]:
     """Mean RMSE over sessions and their number, by estimator, best first where that is known."""
     ranked = material.rows("accuracy_means")
-    if not (without_reference(material) or contradicted(material)):
+    if not (without_reference(material.results) or contradicted(material)):
         ranked = sorted(ranked, key=lambda row: row["rmse_mm"])
     return {row["estimator"]: (row["rmse_mm"], row["n"]) for row in ranked}
 
@@ -285,7 +286,7 @@ def _means(material: Material) -> dict[str, tuple[float, int]]:
 def _distances(material: Material) -> str:
     """How far each estimator is from what it is held against, in the study's order: none is called the best."""
     told = listing([f"{name} {number(mean, 1)} mm" for name, (mean, _) in _means(material).items()])
-    if without_reference(material):
+    if without_reference(material.results):
         return f"Root mean square distance from the smoothed readings, which is not an error: {told}."
     return f"Root mean square error, means over all sessions, those included: {told}."
 
@@ -293,7 +294,7 @@ def _distances(material: Material) -> str:
 def _of_errors(material: Material, n: int) -> tuple[str, str]:
     """Caption and alternative text of the figure of errors on the first page."""
     marks = f"small marks are sessions (n = {n}), large marks their means"
-    if without_reference(material):
+    if without_reference(material.results):
         return (
             f"Distance from the smoothed readings (left) and lag behind them (right) of each estimator, {marks}.",
             f"Dot plot of distance and lag from the smoothed readings by estimator over {counted(n, 'session')}.",
@@ -305,7 +306,7 @@ def _of_errors(material: Material, n: int) -> tuple[str, str]:
 
 
 def _accuracy_keys(material: Material) -> list[KeyFigure]:
-    if without_reference(material) or contradicted(material):
+    if without_reference(material.results) or contradicted(material):
         return []
     return [
         KeyFigure(f"{number(mean, 1)} mm", f"{name}: position error", f"mean RMSE of {counted(n, 'session')}")
@@ -328,7 +329,7 @@ def _evidence(material: Material) -> list[Text]:
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
     means = _means(material)
-    if means and (without_reference(material) or contradicted(material)):
+    if means and (without_reference(material.results) or contradicted(material)):
         if answers:  # else the answer at the top of the page has the same distances
             unsure = contradicted(material)
             answers.append((Strong("Accuracy: "), *([f"{unsure} "] if unsure else []), _distances(material)))

@@ -7,7 +7,7 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Section
 from pipeline.report.figures.plane import Plane
-from pipeline.report.sections.cautions import without_reference
+from pipeline.report.prose.accuracy_claims import without_reference
 from pipeline.report.sections.material import Material, first_of
 
 _SESSIONS_MAX = 48  # drawn; a page of more would be slow to open
@@ -70,6 +70,6 @@ def _displayed(material: Material, place: int) -> str | None:
 def _fused(material: Material) -> str | None:
     """The estimator with the least error; the last one where errors are not known."""
     rows = [row for row in material.rows("accuracy_means") if row["rmse_mm"] is not None]
-    if rows and not without_reference(material):
+    if rows and not without_reference(material.results):
         return str(min(rows, key=lambda row: row["rmse_mm"])["estimator"])
     return list(material.study.estimators)[-1]

@@ -6,10 +6,9 @@ Each check is a pure function of `Recorded` and yields findings; docs/checks.md 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict
 
 from pipeline.sessions.checks import agreement, counts, events, force, noise, orientation, publishers, repeats, stamps
-from pipeline.sessions.checks.finding import Finding, Status
+from pipeline.sessions.checks.finding import Finding, Status, rows_of
 from pipeline.sessions.checks.recorded import Recorded
 from pipeline.tables.table import Row
 
@@ -56,9 +55,7 @@ def checked(recorded: Recorded) -> tuple[Finding, ...]:
 
 def check_rows(session: str, recorded: Recorded) -> list[Row]:
     """Rows of the table `checks`."""
-    return [
-        {"session": session, **asdict(finding), "message": finding.message or None} for finding in checked(recorded)
-    ]
+    return rows_of(checked(recorded), session)
 
 
 __all__ = ["CHECKS", "Check", "Finding", "Recorded", "Status", "check_rows", "checked"]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from typing import Literal
+
+from pipeline.tables.table import Row
 
 Status = Literal["green", "amber", "red"]
 
@@ -17,6 +20,11 @@ class Finding:
     found: str
     expected: str
     message: str = ""
+
+
+def rows_of(findings: Iterable[Finding], session: str | None = None) -> list[Row]:
+    """Rows of the table `checks`, of a session or of the study's own tables."""
+    return [{"session": session, **asdict(finding), "message": finding.message or None} for finding in findings]
 
 
 def of(check: str, stream: str) -> str:
