@@ -9,7 +9,7 @@ the targets as they were shown, effective difficulty from where people selected.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -126,7 +126,6 @@ def _line(people: pd.DataFrame, points: Sequence[Row], condition: str, basis: st
     )
     found = fitted(Blocks(amplitude, width, bits, time_s, np.array([point["movements"] for point in points])))
     throughput = (people[f"{basis}_bits"] / people["time_s"]).groupby(people["participant"]).mean().mean()
-    found = replace(found, throughput_bits_s=float(throughput))
     slope_low, slope_high = found.ci_slope or (None, None)
     intercept_low, intercept_high = found.ci_intercept or (None, None)
     return {
@@ -141,7 +140,7 @@ def _line(people: pd.DataFrame, points: Sequence[Row], condition: str, basis: st
         "slope_ci_low_s_bit": slope_low,
         "slope_ci_high_s_bit": slope_high,
         "r_squared": found.r_squared,
-        "throughput_bits_s": found.throughput_bits_s,
+        "throughput_bits_s": float(throughput),
         "status": found.status,
         "remark": _remark(found.blocks, found.slope_s_bit, found.intercept_s, found.r_squared),
     }

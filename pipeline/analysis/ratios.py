@@ -16,7 +16,7 @@ from pipeline.analysis.complete_cases import Request
 from pipeline.statistics import NO_LOGARITHMS, OF_LOGARITHMS, OK, RATIO
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.logarithms import as_ratio, exponential, logarithms
-from pipeline.statistics.pairs import FollowUp
+from pipeline.statistics.pairs import FollowUp, names_in
 from pipeline.statistics.result import Result
 from pipeline.study.measures import measure
 from pipeline.tables.table import Row
@@ -96,5 +96,5 @@ def with_ratio_of(row: Row, log_interval: Sequence[float | None], first: str | N
 
 def _first_of(contrast: str) -> str | None:
     """The first name of `A - B` or `A - B | easy`; None where names that hold " - " can be read in two ways."""
-    compared = contrast.rsplit(" | ", 1)[0]
-    return compared.partition(" - ")[0] if compared.count(" - ") == 1 else None
+    names = names_in(contrast.rsplit(" | ", 1)[0])
+    return None if names is None else names[0]

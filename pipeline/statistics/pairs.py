@@ -31,6 +31,12 @@ def of_conditions(values: FloatArray, conditions: Sequence[str]) -> list[Pair]:
     ]
 
 
+def names_in(contrast: str) -> tuple[str, str] | None:
+    """The two names of a contrast `A - B`; None where names that hold " - " can be read in two ways."""
+    first, _, second = contrast.partition(" - ")
+    return (first, second) if contrast.count(" - ") == 1 else None
+
+
 @dataclass(frozen=True)
 class FollowUp:
     """A pair and its test."""

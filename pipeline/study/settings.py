@@ -189,8 +189,8 @@ class Study(Frozen):
         """The pairs of conditions to answer for, in their order in `conditions`: by default the baseline with each."""
         if not self.question:
             return tuple((self.conditions[0], other) for other in self.conditions[1:])
-        first, second = zip(*(sorted(pair, key=self.conditions.index) for pair in self.question), strict=True)
-        return tuple(dict.fromkeys(zip(first, second, strict=True)))
+        pairs = (sorted(pair, key=self.conditions.index) for pair in self.question)
+        return tuple(dict.fromkeys((first, second) for first, second in pairs))
 
     def exclusion_of(self, session: Session) -> Exclusion | None:
         """The first decision by which a session is left out as a whole."""

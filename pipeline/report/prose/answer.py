@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipeline.statistics import OK, RATIO
+from pipeline.statistics.pairs import names_in
 from pipeline.study.measures import headlines, measure
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words import (
@@ -120,17 +121,10 @@ def _asked_about(
         if row["effect"] in EFFECTS_OF_CONDITION:
             pair = only if row["contrast"] is None else pairs.get(row["contrast"])
         else:
-            pair = _groups(row) if TESTS[row["test"]].design == "between" else None
+            of_groups = TESTS[row["test"]].design == "between" and row["contrast"] is not None
+            pair = names_in(row["contrast"]) if of_groups else None
         if pair is not None:
             yield row, pair
-
-
-def _groups(row: Row) -> tuple[str, str] | None:
-    """The two groups that a row compares; None where it is of more, or their names can be split in two ways."""
-    if row["contrast"] is None or row["contrast"].count(" - ") != 1:
-        return None
-    first, _, second = row["contrast"].partition(" - ")
-    return first, second
 
 
 def _rank(rows: Sequence[tuple[Row, tuple[str, str]]]) -> Any:

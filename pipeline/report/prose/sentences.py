@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from pipeline.statistics import RATIO
+from pipeline.statistics.pairs import names_in
 from pipeline.study.statistical_tests import TESTS, Values
 from pipeline.tables.table import Row
 from pipeline.words import (
@@ -213,10 +214,10 @@ def _pair(row: Row, conditions: Sequence[str]) -> _Pair | None:
     if of_condition or ":" in row["effect"]:
         found = [pair for pair in combinations(conditions, 2) if " - ".join(pair) == compared]
         return _Pair(*found[0], "with", where) if len(found) == 1 else None
-    first, dash, second = compared.partition(" - ")
-    if not dash or " - " in second or row["effect"] == "carry-over":
+    names = names_in(compared)
+    if names is None or row["effect"] == "carry-over":
         return None
-    return _Pair(first, second, "in period" if row["effect"] == "period" else "at", where)
+    return _Pair(*names, "in period" if row["effect"] == "period" else "at", where)
 
 
 def _means(row: Row, facts: StudyFacts) -> Iterator[str]:
