@@ -65,12 +65,19 @@ def answer(results: Mapping[str, Any]) -> list[Line]:
     """The lines of all measures but questionnaires, the well-known first, then those of questionnaires.
 
     `results` is the content of results.json. Pairs are those of `question` in study.yaml, or else the baseline with
-    each other condition; of groups of participants, all pairs. A measure that several entries test has lines for each.
+    each other condition; of groups of participants, all pairs. A measure that several entries test has lines for each,
+    which name the test.
     """
     study = results["study"]
-    means = {(row["measure"], row["condition"]): row["mean"] for row in results["descriptives"]}
+    described = {(row["measure"], row["condition"]): row for row in results["descriptives"]}
     rows = list(_asked_about(results["comparisons"], study["conditions"], study["question"]))
-    return [_line(row, pair, means, study["alpha"]) for row, pair in sorted(rows, key=_rank(rows))]
+    tests: dict[str, set[str]] = {}
+    for row, _ in rows:
+        tests.setdefault(row["measure"], set()).add(test_label(row))
+    return [
+        _line(row, pair, described, study["alpha"], names_test=len(tests[row["measure"]]) > 1)
+        for row, pair in sorted(rows, key=_rank(rows))
+    ]
 
 
 def not_answered(results: Mapping[str, Any]) -> list[Row]:
@@ -136,11 +143,13 @@ def _rank(rows: Sequence[tuple[Row, tuple[str, str]]]) -> Any:
     return lambda found: order.index(found[0]["measure"])
 
 
-def _line(row: Row, pair: tuple[str, str], means: Mapping[tuple[str, str], float | None], alpha: float) -> Line:
+def _line(
+    row: Row, pair: tuple[str, str], described: Mapping[tuple[str, str], Row], alpha: float, names_test: bool
+) -> Line:
     first, second = pair
-    name = measure_label(row["measure"])
+    name = measure_label(row["measure"]) + (f", {test_label(row)}" if names_test else "")
     compared = f"{second} {MINUS} {first}"
-    both = _means(row["measure"], means.get((row["measure"], first)), means.get((row["measure"], second)))
+    both = _means(row, described.get((row["measure"], first)), described.get((row["measure"], second)))
     if row["status"] != OK:
         return Line(name, compared, both, f"{test_label(row)}: {row['status']}", NOTHING, NOTHING, None)
     p = decisive_p(row)
@@ -157,11 +166,15 @@ def _of_second_minus_first(row: Row) -> Row:
     return {**row, "effect_size": -row["effect_size"], "ci_low": low, "ci_high": high}
 
 
-def _means(name: str, first: float | None, second: float | None) -> str:
-    """`43.2 → 31.4 s`; of squared errors the roots, in millimetres or pixels: `104 → 79 px (root)`."""
-    unit = measure(name).unit
-    if first is None or second is None:
+def _means(row: Row, one: Row | None, other: Row | None) -> str:
+    """`43.2 → 31.4 s`; of squared errors the roots, in millimetres or pixels: `104 → 79 px (root)`.
+
+    Nothing where they are of other people than the test, or a model estimates the difference from rows of unequal
+    number: they could contradict the difference beside them.
+    """
+    if one is None or other is None or not one["n"] == other["n"] == row["n"] or row["effect_size_name"] == "estimate":
         return NOTHING
+    first, second, unit = one["mean"], other["mean"], measure(row["measure"]).unit
     if unit.endswith("²") and first >= 0 and second >= 0:
         return f"{number(math.sqrt(first))} → {number(math.sqrt(second))} {unit[:-1]} (root)"
     return f"{number(first)} → {number(second)} {unit}".strip()

@@ -88,7 +88,7 @@ def _pairs(material: Material) -> list[Block]:
     table = Table(
         "table-answer",
         "The answer: by how much each pair differs, in the unit of the measure.",
-        columns(HEADER, 4),
+        columns(HEADER, 5),
         tuple(line.cells for line in kept),
         f"{notes(material.results)}{more}",
     )

@@ -78,6 +78,7 @@ def test_two_conditions_of_an_analysis_have_the_interval_of_the_paired_t(
     two = {"time_s": {name: THREE["time_s"][name] for name in "ab"}}
     folder = study(tmp_path / "s", two, ["measure: time_s, test: rm_anova", "measure: time_s, test: t_paired"])
     by_anova, by_t = lines_of(steadyhand, folder)
+    assert (by_anova.measure, by_t.measure) == ("Time (s), rm ANOVA", "Time (s), paired t")
     assert by_anova.difference == by_t.difference
     assert by_anova.p == by_t.p
     assert "[" in by_t.difference
@@ -99,6 +100,14 @@ def test_squared_errors_are_shown_by_their_roots(steadyhand: Steadyhand, tmp_pat
     values = {"selection_mse_mm2": {"a": [90.0, 110, 100, 100], "b": [60.0, 70, 62, 64]}}
     (line,) = lines_of(steadyhand, study(tmp_path / "s", values, ["measure: selection_mse_mm2, test: t_paired"]))
     assert line.means == "10.00 → 8.00 mm (root)"
+
+
+def test_means_of_other_people_than_those_tested_are_not_shown(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    """They could contradict the difference: here they rise by 1.25, while everybody who met both is faster by 1."""
+    values = {"time_s": {"a": [10.0, 11, 12, 4], "b": [9.0, 10.1, 10.9]}}
+    (line,) = lines_of(steadyhand, study(tmp_path / "s", values, ["measure: time_s, test: t_paired"]))
+    assert line.difference.startswith("−1.00 s")
+    assert line.means == "–"
 
 
 def test_equivalence_and_evidence_are_no_difference(steadyhand: Steadyhand, tmp_path: Path) -> None:
