@@ -54,9 +54,11 @@ def test_what_another_factor_adds_changes_no_contrast(data: list[tuple[int, ...]
     two = one + np.array([0, constant])
     at = [list("abc"), list("xy")]
     for before, after in zip(art_contrasts(one, FACTORS, at), art_contrasts(two, FACTORS, at), strict=True):
+        if before.result.effect != "condition":
+            continue  # the simple effects are ranked together with the other factor's, which did change
         # Where nothing varied, the reason is another once the other factor does.
         assert (before.result.status == "ok") == (after.result.status == "ok")
-        if before.result.effect == "condition" and before.result.statistic is not None:
+        if before.result.statistic is not None:
             assert after.result.statistic == pytest.approx(before.result.statistic, rel=1e-9)
 
 
