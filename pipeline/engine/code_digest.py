@@ -121,11 +121,14 @@ def _imports(root: Path, source: bytes) -> tuple[str, ...]:
 
 def versions(libraries: Iterable[str]) -> dict[str, str]:
     """The installed version of each library; the standard library's modules have none and are left out."""
-    installed = {}
-    for library in sorted(set(libraries) - sys.stdlib_module_names):
-        try:
-            name = _DISTRIBUTIONS.get(library, library)
-            installed[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return installed
+    found = {name: _version(name) for name in sorted(set(libraries) - sys.stdlib_module_names)}
+    return {_DISTRIBUTIONS.get(name, name): version for name, version in found.items() if version is not None}
+
+
+@cache
+def _version(library: str) -> str | None:
+    """It is looked up in the folders of installed packages, a millisecond each time; while a program runs it stays."""
+    try:
+        return metadata.version(_DISTRIBUTIONS.get(library, library))
+    except metadata.PackageNotFoundError:
+        return None

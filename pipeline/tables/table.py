@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,15 @@ def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
     """Rows as a table. Raises KeyError for a column that the table does not have, which is a programming error."""
     listed = list(rows)
     columns = _known_columns(name, listed)
+    if not listed:
+        return _empty(name).copy(deep=False)
     return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
+
+
+@cache
+def _empty(name: str) -> pd.DataFrame:
+    """A comparison has some twenty tables, most of them without rows; converting each column of these took longest."""
+    return as_table(name, pd.DataFrame(columns=TABLES[name].names))
 
 
 def of_rows(name: str, rows: Iterable[Row]) -> pa.Table:
@@ -100,7 +109,9 @@ def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
 
 def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
     """Write `<name>.parquet`; a small table uncompressed, since unpacking would take most of the time to read it."""
-    if isinstance(data, pd.DataFrame):
+    if len(data) == 0:
+        data = TABLES[name].schema.empty_table()
+    elif isinstance(data, pd.DataFrame):
         data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name].schema, preserve_index=False)
     columns = TABLES[name].columns
     floats = [column.name for column in columns if column.kind == FLOAT]

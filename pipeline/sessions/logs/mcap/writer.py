@@ -85,7 +85,9 @@ def write(path: Path, facts: Mapping[str, str], messages: Iterable[Message]) -> 
             if message.topic not in channels:
                 encoding = "json" if message.content == "events" else "cdr"
                 channels[message.topic] = writer.register_channel(message.topic, encoding, schemas[message.content])
-            writer.add_message(channels[message.topic], message.arrival_ns, encoded(message), message.stamp_ns, sequence)
+            writer.add_message(
+                channels[message.topic], message.arrival_ns, encoded(message), message.stamp_ns, sequence
+            )
         writer.finish()  # type: ignore[no-untyped-call]
     partial.replace(path)
 
@@ -93,7 +95,9 @@ def write(path: Path, facts: Mapping[str, str], messages: Iterable[Message]) -> 
 # CDR aligns doubles to eight bytes counted from after its own header, little-endian and plain (OMG DDS-XTypes 7.4).
 _CDR_HEADER = b"\x00\x01\x00\x00"
 _POSITION = struct.Struct("<4siII8s4x3d")  # header, stamp, frame_id "tracker", point
-_PHONE = struct.Struct("<4siII6s6x37d")  # ..., frame_id "phone", orientation, angular velocity, acceleration; covariances
+_PHONE = struct.Struct(
+    "<4siII6s6x37d"
+)  # ..., frame_id "phone", orientation, angular velocity, acceleration; covariances
 
 
 def encoded(message: Message) -> bytes:
