@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
+from pipeline.report.document.typography import typeset
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,11 @@ class Ran:
     code: int
     out: str
     err: str
+
+
+def as_printed(text: str) -> str:
+    """Words as a page's text has them: a subscript has no underscore before it."""
+    return " ".join("".join(run.text for run in typeset(text)).split())
 
 
 def exit_code(monkeypatch: pytest.MonkeyPatch, *words: str | Path) -> int:

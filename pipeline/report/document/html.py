@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup, escape
 
 from pipeline.report.document.model import CrossReference, Document, Link, Strong, numbered
+from pipeline.report.document.typography import Run, Style, typeset, typeset_heading
 
 _DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would reverse the text and numbers that follow
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
@@ -57,6 +60,18 @@ def _hashed(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
+_TAGS: dict[Style, str] = {"italic": "var", "subscript": "sub"}
+
+
+def _marked(runs: Iterable[Run]) -> Markup:
+    """Words with the symbols of statistics marked; whatever else they hold is escaped."""
+    marked = Markup()
+    for run in runs:
+        tag = _TAGS.get(run.style)
+        marked += Markup("<{0}>{1}</{0}>").format(tag, run.text) if tag else escape(run.text)
+    return marked
+
+
 @cache
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
@@ -70,4 +85,6 @@ def _environment() -> jinja2.Environment:
     environment.tests["link"] = lambda part: isinstance(part, Link)
     environment.tests["cross_reference"] = lambda part: isinstance(part, CrossReference)
     environment.filters["kind"] = lambda block: type(block).__name__
+    environment.filters["typeset"] = lambda text: _marked(typeset(text))
+    environment.filters["typeset_heading"] = lambda text: _marked(typeset_heading(text))
     return environment

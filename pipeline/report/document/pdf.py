@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +20,7 @@ from pipeline.report.document.model import (
     Text,
     numbered,
 )
+from pipeline.report.document.typography import Run, typeset, typeset_heading
 from pipeline.report.glyphs import font_folder, showable
 
 _HERE = Path(__file__).parent
@@ -78,7 +79,7 @@ def _content(document: Document) -> dict[str, Any]:
 def _text(text: Text) -> list[dict[str, Any]]:
     return [
         {
-            "text": part if isinstance(part, str) else part.text,
+            "text": _runs(typeset(part if isinstance(part, str) else part.text)),
             "strong": isinstance(part, Strong),
             "anchor": part.anchor if isinstance(part, CrossReference) else "",
         }
@@ -98,15 +99,23 @@ def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[
                 "texts": [_text(text) for text in block.texts],
             }
         case KeyFigures():
-            return {"kind": "key-figures", "figures": [vars(figure) for figure in block.figures]}
+            return {
+                "kind": "key-figures",
+                "figures": [
+                    {key: _runs(typeset(text)) for key, text in vars(figure).items()} for figure in block.figures
+                ],
+            }
         case Table():
             return {
                 "kind": "table",
                 "name": names[block.id],
-                "caption": block.caption,
-                "columns": [vars(column) for column in block.columns],
-                "rows": [list(row) for row in block.rows],
-                "note": block.note,
+                "caption": _runs(typeset(block.caption)),
+                "columns": [
+                    {"title": _runs(typeset_heading(column.title)), "numeric": column.numeric}
+                    for column in block.columns
+                ],
+                "rows": [[_runs(typeset(cell)) for cell in row] for row in block.rows],
+                "note": _runs(typeset(block.note)) if block.note else [],
                 "anchors": list(block.anchors),
                 "shares": _shares(block),
             }
@@ -115,9 +124,14 @@ def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[
                 "kind": "figure",
                 "name": names[block.id],
                 "file": block.file,
-                "caption": block.caption,
+                "caption": _runs(typeset(block.caption)),
                 "alt": block.alt,
             }
+
+
+def _runs(runs: Iterable[Run]) -> list[list[str]]:
+    """Words and how they are set, as plain data."""
+    return [[run.text, run.style] for run in runs]
 
 
 def _shares(table: Table) -> list[float]:

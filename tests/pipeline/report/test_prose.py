@@ -21,7 +21,7 @@ from pipeline.report.prose.sentences import StudyFacts, sentence, study_facts
 from pipeline.report.sections.comparisons import anchor
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
-from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.helpers import Steadyhand, as_printed
 from tests.pipeline.hostile import HOSTILE
 from tests.pipeline.reference import TASKS, compared, expected, study_of, the
 from tests.pipeline.report.test_report import checked
@@ -292,7 +292,7 @@ def test_a_report_has_words_to_paste_that_lead_to_their_rows(folder: Folder, ste
     text = " ".join("".join(checked(page).text).split())
     rows = steadyhand.results()["comparisons"]
     for at, said in enumerate(sentences(steadyhand, rows)):
-        assert said in text
+        assert as_printed(said) in text
         assert f'<a href="#{anchor(at)}">[row]</a>' in page
         assert f'<tr id="{anchor(at)}">' in page
     assert "There were 12 participants and 2 conditions, compared within participants: kinect and fusion" in text

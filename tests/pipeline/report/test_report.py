@@ -37,7 +37,7 @@ from pipeline.report.document.model import (
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words import interval, number, p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
-from tests.pipeline.helpers import Steadyhand, exit_code
+from tests.pipeline.helpers import Steadyhand, as_printed, exit_code
 from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study
 from tests.pipeline.made_once import made_once
 from tests.pipeline.reference import study_of
@@ -427,9 +427,9 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         assert TESTS[row["test"]].label in text
         ranks = row["statistic_name"] == "W+"
         assert (f"W₊ = {row['statistic']:g}" if ranks else f"{abs(row['statistic']):.2f}") in text
-        assert row["method"] in text
+        assert as_printed(row["method"]) in text
     for row in steadyhand.results()["design_check"]:
-        assert row["found"] in text
+        assert as_printed(row["found"]) in text
 
 
 @pytest.mark.usefixtures("blank_figures")

@@ -1,0 +1,52 @@
+"""What is set in italics and as a subscript, and that nothing else is changed."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.report.document.typography import typeset, typeset_heading
+
+
+def marked(text: str) -> str:
+    """Italics between asterisks, subscripts in brackets after an underscore, and a tilde where no line may break."""
+    form = {"": "{}", "italic": "*{}*", "subscript": "_[{}]"}
+    return "".join(form[run.style].format(run.text) for run in typeset(text)).replace("\u00a0", "~")
+
+
+# As the Publication Manual of the American Psychological Association prints them (7th edition, 6.44 and 7.4).
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [
+        ("t(11) = 2.52, p = .0286, n = 12", "*t*(11)~=~2.52, *p*~=~.0286, *n*~=~12"),
+        ("F(1.32, 14.6) = 35.06, p < .0001", "*F*(1.32, 14.6)~=~35.06, *p*~<~.0001"),
+        ("kinect: M = 42.54, SD = 8.79", "kinect: *M*~=~42.54, *SD*~=~8.79"),
+        ("d_z = −0.73 [−1.35, −0.07]", "*d*_[z]~=~−0.73 [−1.35, −0.07]"),
+        ("r_rb = .82, η²G = .10, η²p = .34", "*r*_[rb]~=~.82, *η*²_[G]~=~.10, *η*²_[p]~=~.34"),
+        ("W₊ = 59, Greenhouse-Geisser ε = .662", "*W*₊~=~59, Greenhouse-Geisser ε~=~.662"),
+        ("lower by 6.10 s, 26.7 %", "lower by 6.10~s, 26.7~%"),
+    ],
+)
+def test_statistics_are_set_as_papers_print_them(text: str, printed: str) -> None:
+    assert marked(text) == printed
+
+
+@pytest.mark.parametrize(
+    "text", ["task_p = x", "P05 and P07", "group n, then p", "plan_n", "the F key", "map = 3x", "d_zone", "SD card"]
+)
+def test_letters_that_are_no_statistics_are_left_alone(text: str) -> None:
+    assert marked(text) == text
+
+
+def test_a_symbol_alone_is_one_where_it_heads_a_column() -> None:
+    assert [run.style for run in typeset_heading("p")] == ["italic"]
+    assert marked("p") == "p"
+
+
+@given(st.text() | st.from_regex(r"([FtpndrMW](_z|_rb|₊|\(1\)| \(2, 3\))? [=<] −?\.5[ ,%s]*)+", fullmatch=True))
+def test_only_underscores_and_spaces_change(text: str) -> None:
+    def bare(words: str) -> str:
+        return words.replace("_", "").replace("\u00a0", " ")
+
+    assert bare("".join(run.text for run in typeset(text))) == bare(text)
