@@ -31,7 +31,7 @@ from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import GATHERED, TABLES
 from pipeline.tables.table import Row
-from pipeline.words import listing
+from pipeline.words.phrases import listing
 
 
 def run(work: Work) -> Outcome:

@@ -25,7 +25,9 @@ from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import counted, listing, p_phrase, statistic
+from pipeline.words.evidence import statistic
+from pipeline.words.numbers import p_phrase
+from pipeline.words.phrases import counted, listing
 
 Order = tuple[str, ...]
 _NAMED = 5  # participants in a remark, before "… more"

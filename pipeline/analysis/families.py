@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.study.comparison import Comparison
 from pipeline.tables.table import Row
-from pipeline.words import unadjusted_p
+from pipeline.words.comparison import unadjusted_p
 
 MEASURES, PAIRS = "measures", "pairs"
 """What an unnamed family consists of."""

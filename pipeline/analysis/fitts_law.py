@@ -18,7 +18,7 @@ from pipeline.sessions.movements import SEQUENCE_MIN, sequences
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.fitts import Blocks, effective, fitted, index_of_difficulty
 from pipeline.tables.table import Row
-from pipeline.words import MINUS
+from pipeline.words.numbers import MINUS
 
 NOMINAL, EFFECTIVE = "nominal", "effective"
 BLOCKS_MIN = 3

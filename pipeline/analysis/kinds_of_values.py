@@ -12,7 +12,8 @@ from pipeline.study.measures import measure
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import listing, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import listing
 
 SHAPE = "shape of values"
 _WHOLE = 1e-9  # how far a count of yes may be from a whole number, for round-off

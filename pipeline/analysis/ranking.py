@@ -7,7 +7,7 @@ import pandas as pd
 
 from pipeline.statistics.descriptive import summarize
 from pipeline.tables.table import Row
-from pipeline.words import SMOOTHED
+from pipeline.words.accuracy_reference import SMOOTHED
 
 _POSSIBLE = {
     "rmse_mm": (0.0, np.inf),

@@ -18,7 +18,8 @@ from pipeline.study.scoring import RULES, ScoringRule
 from pipeline.study.scoring_settings import OWN_RULES
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
-from pipeline.words import listing, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import listing
 
 _CELL = ["participant", "condition", "session"]
 _WEIGHT = "weight"

@@ -15,7 +15,7 @@ from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
 from pipeline.tables.table import Row
-from pipeline.words import listing
+from pipeline.words.phrases import listing
 
 UNIT, MISSING_CODE, SCALE, TARGETS, ORDER = (
     "unit of time",

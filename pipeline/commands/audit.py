@@ -13,7 +13,7 @@ from pipeline.analysis.audit.audit import audit as findings_in
 from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED, VERDICTS, Finding
 from pipeline.commands import console
 from pipeline.study.printed import load_publication
-from pipeline.words import counted, listing
+from pipeline.words.phrases import counted, listing
 
 CONTRADICTED = 3  # the exit code, as of numbers that moved
 _FILE_WIDTH = 140  # in characters, where the output is not a terminal

@@ -16,7 +16,7 @@ from pipeline.errors import PipelineError
 from pipeline.study.folder import SETTINGS_FILE
 from pipeline.tables import differences, results
 from pipeline.tables.differences import ABSENT, Change, Differences, Identified
-from pipeline.words import counted
+from pipeline.words.phrases import counted
 
 _RESULTS = "results.json"
 _CELL_LENGTH = 80

@@ -15,7 +15,8 @@ from pipeline.sessions.inspection import Inspection, Topic, inspected
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.stream_quality import quality_row
 from pipeline.tables import table as tables
-from pipeline.words import counted, listing, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted, listing
 
 _GUESSED = "gravity_mm_s2 is a guess: the log has no orientation; give gravity as it points in the tracker's frame"
 

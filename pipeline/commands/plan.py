@@ -15,7 +15,7 @@ from pipeline.errors import PipelineError
 from pipeline.statistics.counterbalancing import Order, balance, williams_design
 from pipeline.study.fields import identifier
 from pipeline.study.folder import load_study
-from pipeline.words import counted, listing
+from pipeline.words.phrases import counted, listing
 
 _NAMED_AS = "name them as study.yaml does, as in: steadyhand plan kinect fusion --participants 12"
 _RESERVED = ("participant", "sequence", "condition", "period", "block", "targets")

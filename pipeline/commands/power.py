@@ -17,7 +17,7 @@ from pipeline.errors import PipelineError
 from pipeline.statistics.power import Design, closed_form, difference_of_dz, difference_of_f
 from pipeline.statistics.power_simulation import simulate
 from pipeline.statistics.sample_size import sample_size
-from pipeline.words import number, share
+from pipeline.words.numbers import fraction, number
 
 
 def power(expected: Expected, search: Search, out: Path | None) -> None:
@@ -80,7 +80,7 @@ def _not_enough(design: Design, search: Search) -> str:
     if reached is None:
         reached = simulate(design, search.most, search.simulations, search.seed).own.power
     return (
-        f"power: {search.most} participants reach a power of {share(reached)} only, not {search.power:g}; raise"
+        f"power: {search.most} participants reach a power of {fraction(reached)} only, not {search.power:g}; raise"
         " --max-n, or plan for a larger effect or a less noisy measure"
     )
 
@@ -102,7 +102,7 @@ def _effect(expected: Expected, design: Design) -> list[str]:
         lines.append(f"d = {number(design.difference)}: the mean difference over the SD within a condition")
     if design.test == "rm_anova" or lines:
         lines.append(
-            f"r = {share(design.correlation, 2)}: correlation of a participant's values in two conditions{assumed}"
+            f"r = {fraction(design.correlation, 2)}: correlation of a participant's values in two conditions{assumed}"
         )
     if design.test == "rm_anova":
         return [*lines, f"f = {number(design.f)}: the SD of the conditions' means over the SD within a condition"]

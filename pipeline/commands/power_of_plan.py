@@ -13,7 +13,7 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics import planned_effects
 from pipeline.statistics.planned_effects import PlannedEffect, contrasts, participants_for
 from pipeline.statistics.power_designs import Equivalence
-from pipeline.words import number, share
+from pipeline.words.numbers import fraction, number
 
 _PAIRS = ("t_paired", "wilcoxon")
 _FACTORS = ("rm_anova", "mixed_anova")
@@ -123,7 +123,7 @@ def _correlation(expected: Expected, groups_of_values: int) -> tuple[float, str]
     r = ASSUMED_CORRELATION if expected.correlation is None else expected.correlation
     require_between("--correlation", r, -1 / (groups_of_values - 1), 1)
     assumed = "" if expected.correlation is not None else " (assumed; --correlation states it)"
-    return r, f"r = {share(r, 2)}: correlation of a participant's values in two conditions{assumed}"
+    return r, f"r = {fraction(r, 2)}: correlation of a participant's values in two conditions{assumed}"
 
 
 def _standardised(expected: Expected) -> float | None:
@@ -276,6 +276,6 @@ def _require_enough(plan: Plan, search: Search) -> None:
             reached = closed if closed is not None else shares.power if shares else 0.0
             raise PipelineError(
                 f"power: {search.most} participants{' in each group' if plan.groups > 1 else ''} reach a power of"
-                f" {share(reached)} only for {effect.name}, not {search.power:g}; raise --max-n, or plan for a larger"
-                " effect or a less noisy measure"
+                f" {fraction(reached)} only for {effect.name}, not {search.power:g}; raise --max-n, or plan for a"
+                " larger effect or a less noisy measure"
             )

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from pipeline.commands.power_output import FILES, Record, draw_curves, record, simulated, write_files
 from pipeline.statistics.planned_effects import PlannedEffect, effect_for, participants_for, power_of
 from pipeline.statistics.sample_size import Needed, spread
-from pipeline.words import counted, number, share
+from pipeline.words.numbers import fraction, number
+from pipeline.words.phrases import counted
 
 if TYPE_CHECKING:
     from pipeline.commands.power_of_plan import Plan
@@ -73,7 +74,7 @@ def _participants(plan: Plan, search: Search) -> Answer:
         found = participants_for(effect, plan.size or 0.0, search.power, search.most)
         sizes = effect.group_sizes(found.judged_by or search.most)
         closed, _ = power_of(effect, plan.size or 0.0, sizes[0]) if effect.closed_form else (None, None)
-        rows.append([effect.name, *_sizes(plan, sizes), share(closed)])
+        rows.append([effect.name, *_sizes(plan, sizes), fraction(closed)])
         if found.simulated is not None:
             lines.append(
                 f"Simulation ({search.simulations} studies per row, seed {search.seed}): {_bounds(found.simulated)}"
@@ -127,10 +128,10 @@ def _power(plan: Plan, search: Search) -> Answer:
     rows = []
     for effect in plan.effects:
         closed, shares = power_of(effect, size, n)
-        row = [effect.name, *([share(closed)] if effect.closed_form else [])]
+        row = [effect.name, *([fraction(closed)] if effect.closed_form else [])]
         if shares is not None:
             low, high = shares.interval()
-            row.append(f"{share(shares.power)} [{share(low)}, {share(high)}]")
+            row.append(f"{fraction(shares.power)} [{fraction(low)}, {fraction(high)}]")
         rows.append(row)
     header = ["Effect", *(["power"] if plan.effects[0].closed_form else [])]
     header += [f"simulated [95 % interval], {search.simulations} studies"] if plan.effects[0].shares else []

@@ -12,7 +12,7 @@ from pipeline.statistics.counterbalancing import williams_design
 from pipeline.statistics.power import Design
 from pipeline.statistics.power_simulation import Share
 from pipeline.statistics.sample_size import Needed, SampleSize
-from pipeline.words import number, share
+from pipeline.words.numbers import fraction, number
 
 FILES = ("power.svg", "power.csv", "power.json")
 _NAMES = {
@@ -86,9 +86,9 @@ def table(rows: Sequence[Record]) -> tuple[list[str], list[list[str]]]:
     for column in _present(rows):
         header += [_SERIES[column], *(["95 % interval"] if f"{column}_low" in rows[0] else [])]
         for line, row in zip(lines, rows, strict=True):
-            line.append(share(row[column]))
+            line.append(fraction(row[column]))
             if f"{column}_low" in row:
-                line.append(f"[{share(row[f'{column}_low'])}, {share(row[f'{column}_high'])}]")
+                line.append(f"[{fraction(row[f'{column}_low'])}, {fraction(row[f'{column}_high'])}]")
     return header, lines
 
 

@@ -16,7 +16,7 @@ from pipeline.study.folder import PREREGISTERED, SETTINGS_FILE, TABLE_FIELDS, lo
 from pipeline.study.preregistration import frozen_text, registered_of
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words import number
+from pipeline.words.numbers import number
 
 PAGE = "preregistration.md"
 _POWER, _STUDIES, _SEED, _CORRELATION = 0.8, 10_000, 1, 0.5

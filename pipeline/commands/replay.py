@@ -32,7 +32,8 @@ from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import in_results_of, written_by
 from pipeline.tables.table import Row
-from pipeline.words import SMOOTHED, held_against, interval, number, seconds
+from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
+from pipeline.words.numbers import interval, milliseconds, number
 
 _PAGE, _PRINT, _RESULTS = "replay.html", "replay.pdf", "results.json"
 _TABLES, _IN_RESULTS = written_by("replay"), in_results_of("replay")
@@ -190,7 +191,7 @@ def _write(gathered: _Gathered, folder: Path) -> None:
         for name in files:
             copy(Path(filled) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
-    _say(list(tables.records("replay_means", written["replay_means"])), held_against(accuracy["reference"]))
+    _say(list(tables.records("replay_means", written["replay_means"])), reference_phrase(accuracy["reference"]))
     console.say(f"Report: {console.short_path(folder / _PAGE)}  {console.short_path(folder / _PRINT)}")
 
 
@@ -215,7 +216,7 @@ def _say(rows: Sequence[Row], standard: str) -> None:
             str(row["n"]),
             number(row["rmse_mm"]),
             interval(row["rmse_low_mm"], row["rmse_high_mm"]),
-            seconds(row["lag_s"]),
+            milliseconds(row["lag_s"]),
             number(row["jitter_mm"]),
         )
         for row in first

@@ -9,7 +9,10 @@ from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.commands import console
 from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
 from pipeline.report.prose.answer import HEADER, answer, not_answered, notes
-from pipeline.words import comparison_sentence, counted, measure_label, number
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted
+from pipeline.words.sentences import brief_sentence
 
 _CHECKS_MAX = 5  # printed; the report has them all
 
@@ -30,7 +33,7 @@ def say_results(results: Mapping[str, Any]) -> None:
 def summary(results: Mapping[str, Any]) -> Iterator[str]:
     """Tests of all conditions or of other factors, and each estimator's mean error."""
     for row in not_answered(results):
-        yield f"  {measure_label(row['measure'])}: {comparison_sentence(row)}"
+        yield f"  {measure_label(row['measure'])}: {brief_sentence(row)}"
     yield from _checks(results)
     yield from _accuracy(results)
     figures = [row for row in results["printed"] if row["check"] is None]

@@ -10,7 +10,7 @@ from typing import Literal
 
 from pipeline.study.settings import QualityLimits, Study
 from pipeline.tables.table import Row
-from pipeline.words import number, percent
+from pipeline.words.numbers import number, percent
 
 Light = Literal["not judged", "green", "amber", "red"]
 

@@ -12,7 +12,7 @@ from pipeline.sessions.estimators import fusing, sensors
 from pipeline.sessions.recording import Recording, where_judged
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
-from pipeline.words import SMOOTHED
+from pipeline.words.accuracy_reference import SMOOTHED
 
 USED, WORSE = "accelerations used", "fusion against tracker"
 _LEFT_OUT = 0.01  # of the accelerations

@@ -32,7 +32,7 @@ from pipeline.study.streams import (
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Columns
-from pipeline.words import SMOOTHED
+from pipeline.words.accuracy_reference import SMOOTHED
 
 SETTLED_S = 1.0
 """Estimates in this time after the first frame's arrival are neither scored nor shown in figures."""

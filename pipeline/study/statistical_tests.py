@@ -21,7 +21,7 @@ class StatisticalTest:
     """A test of study.yaml.
 
     `label` is used in tables, `long_name` in sentences, `methods_text` in the methods paragraph. `options` are the keys
-    of an entry that only some tests take. `symbol_tells` is true if the letter of the statistic says which test it was.
+    of an entry that only some tests take. `symbol_names_test` is true where the statistic's symbol is name enough: W₊.
     The p of a test whose `question` is not "difference" says nothing about a difference. `values` are what it takes:
     measurements, answers that are 0 or 1, or counts. `followed_up_by` names the tests of the pairs after it.
     """
@@ -35,7 +35,7 @@ class StatisticalTest:
     assumes_sphericity: bool = False
     ranks_aligned: bool = False
     complete_cases: bool = True
-    symbol_tells: bool = False
+    symbol_names_test: bool = False
     question: Question = "difference"
     design: Design = "within"
     values: Values = "measurements"
@@ -60,7 +60,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             options=("within", "follow_up", "transform"),
             assumes_normality=True,
             assumes_sphericity=True,
-            symbol_tells=True,
+            symbol_names_test=True,
         ),
         StatisticalTest(
             "t_paired",
@@ -76,7 +76,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Wilcoxon signed-rank test",
             "Wilcoxon signed-rank tests (two-sided; rank-biserial correlation)",
             options=("zeros", "bootstrap", "permutation", "seed"),
-            symbol_tells=True,
+            symbol_names_test=True,
             cite=("wilcoxon1945",),
             cited_for="signed-rank test",
         ),
@@ -85,7 +85,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Friedman",
             "Friedman test",
             "Friedman's test (Kendall's W)",
-            symbol_tells=True,
+            symbol_names_test=True,
             cite=("friedman1937",),
         ),
         StatisticalTest(
@@ -194,7 +194,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Mann-Whitney test",
             "Mann-Whitney tests between groups (two-sided; rank-biserial correlation, Hodges-Lehmann shift)",
             options=("between",),
-            symbol_tells=True,
+            symbol_names_test=True,
             design="between",
             cite=("mann1947",),
         ),
@@ -214,7 +214,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Kruskal-Wallis test",
             "the Kruskal-Wallis test between groups (rank ε²)",
             options=("between", "follow_up"),
-            symbol_tells=True,
+            symbol_names_test=True,
             design="between",
             followed_up_by="Mann-Whitney tests",
             cite=("kruskal1952",),

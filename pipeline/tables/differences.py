@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.tables.catalogue import IN_STUDY_RESULTS, TABLES, in_results_of
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING
+from pipeline.words.numbers import NO_VALUE
 
 Figures = Mapping[str, Any]
 
@@ -67,8 +67,8 @@ class Change:
         return (
             cell(self.before),
             cell(self.now),
-            NOTHING if by is None else f"{by:+.4g}",
-            NOTHING if relative is None else f"{100 * relative:+.3g} %",
+            NO_VALUE if by is None else f"{by:+.4g}",
+            NO_VALUE if relative is None else f"{100 * relative:+.3g} %",
         )
 
 

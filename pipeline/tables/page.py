@@ -9,7 +9,7 @@ from pipeline.tables.catalogue import TABLES
 from pipeline.tables.columns import COUNT, FLOAT, TEXT, Table
 from pipeline.tables.command_tables import EXPLORE_TABLES, REPLAY_TABLES
 from pipeline.tables.session_tables import SESSION_TABLES
-from pipeline.words import listing
+from pipeline.words.phrases import listing
 
 PAGE = Path(__file__).parents[2] / "docs" / "tables.md"
 

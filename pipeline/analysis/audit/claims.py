@@ -12,7 +12,7 @@ from pipeline.analysis.audit.recomputed import p_left_open
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.study.printed import Family, Measure, PrintedTest, Publication
 from pipeline.study.rounded import Rounded
-from pipeline.words import counted
+from pipeline.words.phrases import counted
 
 Labelled = tuple[Measure, PrintedTest]
 _ROUND_OFF = 1e-9  # relative: of an adjustment's own arithmetic

@@ -10,7 +10,8 @@ from pipeline.analysis.preregistration.verdicts import DEVIATION, NOT_PLANNED, p
 from pipeline.study.comparison import Comparison
 from pipeline.study.preregistration import Registered
 from pipeline.tables.table import Row
-from pipeline.words import comparison_sentence, decisive_p
+from pipeline.words.comparison import decisive_p
+from pipeline.words.sentences import brief_sentence
 
 
 @dataclass(frozen=True)
@@ -78,4 +79,4 @@ def _found(entry: Comparison, stated: str, measure: str, done: Done, alpha: floa
     fits = (difference < 0) == (entry.direction == "less") and difference != 0
     significant = p is not None and p < alpha
     verdict = "not supported" if not significant else "supported" if fits else "opposite"
-    return point("hypothesis", stated, comparison_sentence(row), verdict, measure)
+    return point("hypothesis", stated, brief_sentence(row), verdict, measure)

@@ -14,7 +14,8 @@ from pipeline.study.comparison import Comparison
 from pipeline.study.preregistration import Registered
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import adjustment, counted, listing
+from pipeline.words.names import adjustment_label
+from pipeline.words.phrases import counted, listing
 
 _NAMED_MAX = 4
 _APART = ("measure", "test", "adjust", "family", "hypothesis", "direction")
@@ -132,4 +133,4 @@ def _family_text(family: _Family) -> str:
     if adjust == "none":
         return "not adjusted"
     over = listing(list(members)) if len(members) <= _NAMED_MAX else counted(len(members), "test")
-    return f"{adjustment(adjust)} over {over}"
+    return f"{adjustment_label(adjust)} over {over}"

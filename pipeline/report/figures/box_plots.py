@@ -22,7 +22,8 @@ from pipeline.report.figures.style import (
     styled,
 )
 from pipeline.report.figures.wording import complete_counts
-from pipeline.words import counted, listing, short_label
+from pipeline.words.names import short_label
+from pipeline.words.phrases import counted, listing
 
 
 def _workload_words(wide: Mapping[str, pd.DataFrame]) -> Words:

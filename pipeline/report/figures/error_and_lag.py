@@ -22,13 +22,15 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
-from pipeline.words import SMOOTHED, counted, held_against, listing, number, seconds
+from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
+from pipeline.words.numbers import milliseconds, number
+from pipeline.words.phrases import counted, listing
 
 
 def _errors_words(accuracy: pd.DataFrame) -> Words:
     """Which estimators have the smallest and the largest error, and which the smallest lag, where that is known."""
     n = counted(accuracy["session"].nunique(), "session")
-    standard = held_against(accuracy["reference"])
+    standard = reference_phrase(accuracy["reference"])
     if SMOOTHED in standard:
         return Words(
             f"Distance from {standard} (left) and lag behind them (right) of each estimator over {n}: small marks are"
@@ -44,7 +46,7 @@ def _errors_words(accuracy: pd.DataFrame) -> Words:
         summary += f"; largest: {rmse.index[-1]}, {number(rmse.iloc[-1])} mm." if len(rmse) > 1 else "."
     if len(lag):
         nearest = int(np.argmin(np.abs(lag.to_numpy(np.float64))))
-        summary += f" Smallest lag: {lag.index[nearest]}, {seconds(float(lag.iloc[nearest]))} ms."
+        summary += f" Smallest lag: {lag.index[nearest]}, {milliseconds(float(lag.iloc[nearest]))} ms."
     return Words(
         f"Error (left) and lag (right) of each estimator over {n}: small marks are sessions, large ones their mean with"
         f" its 95 % interval. {summary}",
@@ -56,7 +58,7 @@ def _errors_words(accuracy: pd.DataFrame) -> Words:
 @styled
 def errors(accuracy: pd.DataFrame) -> Figure:
     """RMSE and lag of every estimator: one mark per session, and the mean over sessions with its 95 % t interval."""
-    names, standard = list(dict.fromkeys(accuracy["estimator"])), held_against(accuracy["reference"])
+    names, standard = list(dict.fromkeys(accuracy["estimator"])), reference_phrase(accuracy["reference"])
     figure, axes = panels(1, 2, 1.1 + 0.36 * len(names), sharey=True)
     many = len(accuracy) > MARKS_MAX
     for index, estimator in enumerate(names):
@@ -83,7 +85,7 @@ def errors(accuracy: pd.DataFrame) -> Figure:
 
 def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
     """Which estimators no other beats in both error and lag, where that is known."""
-    n, standard = counted(accuracy["session"].nunique(), "session"), held_against(accuracy["reference"])
+    n, standard = counted(accuracy["session"].nunique(), "session"), reference_phrase(accuracy["reference"])
     if SMOOTHED in standard:
         return Words(
             f"Lag behind {standard} against the distance from them: means over {n} with 95 % intervals; small marks are"
@@ -109,7 +111,7 @@ def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
 def lag_and_error(accuracy: pd.DataFrame) -> Figure:
     """Lag against RMSE, one mark per estimator: means over sessions with 95 % t intervals; small marks are sessions."""
     figure, (axes,) = panels(height=3.4)
-    standard = held_against(accuracy["reference"])
+    standard = reference_phrase(accuracy["reference"])
     for index, (estimator, rows) in enumerate(accuracy.groupby("estimator", sort=False)):
         known = rows[rows["lag_s"].notna() & rows["rmse_mm"].notna()]
         if known.empty:

@@ -25,7 +25,8 @@ from pipeline.report.figures.style import (
 )
 from pipeline.report.figures.wording import listed
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import counted, number, percent
+from pipeline.words.numbers import number, percent
+from pipeline.words.phrases import counted
 
 _TIME = "Time since the session's start (s)"
 _SHADES = 6  # the seventh colour is the reference's

@@ -19,7 +19,7 @@ from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.glyphs import showable
 from pipeline.simulation.what_pays import MEASURES, MOST, Tracker
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import NOTHING, number
+from pipeline.words.numbers import NO_VALUE, number
 
 _COLOURS = colormaps["cividis"]  # read alike by the colour-blind (Nuñez, Anderton and Renslow 2018)
 _EMPTY, _OWN = "#e3e6e8", "#D55E00"
@@ -35,7 +35,7 @@ class Surface:
     label: str
     decimals: int = 1
     logarithmic: bool = False
-    empty: str = NOTHING
+    empty: str = NO_VALUE
 
 
 ERROR = Surface("selection_rmse_mm", "Selection error, RMSE (mm)", logarithmic=True)

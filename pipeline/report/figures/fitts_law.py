@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import as_label, colour, grouped, legend, marker, panels, styled
 from pipeline.report.figures.wording import listed
-from pipeline.words import MINUS, number, share
+from pipeline.words.numbers import MINUS, fraction, number
 
 _TITLES = {"nominal": "Nominal, targets as shown", "effective": "Effective, as people selected"}
 
@@ -20,7 +20,7 @@ _TITLES = {"nominal": "Nominal, targets as shown", "effective": "Effective, as p
 def _fitts_words(points: pd.DataFrame, lines: pd.DataFrame, conditions: Sequence[str]) -> Words:
     """Each line, by condition and kind of difficulty."""
     parts = [
-        f"{condition}, {basis}: {line_in_words(row.intercept_s, row.slope_s_bit)}, R² = {share(row.r_squared)}"
+        f"{condition}, {basis}: {line_in_words(row.intercept_s, row.slope_s_bit)}, R² = {fraction(row.r_squared)}"
         for basis in _bases(points)
         for condition in conditions
         for row in _line_of(lines, condition, basis)

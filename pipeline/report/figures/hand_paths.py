@@ -27,7 +27,8 @@ from pipeline.report.figures.style import (
 )
 from pipeline.report.figures.wording import listed
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import counted, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted
 
 _VERTICES = 1500  # of a path; a line of more looks the same
 

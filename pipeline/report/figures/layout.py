@@ -13,7 +13,8 @@ from matplotlib.patches import Circle, Rectangle
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.plane import square
 from pipeline.report.figures.style import COLOURS, GREY, legend, panels, styled
-from pipeline.words import counted, listing, percent
+from pipeline.words.numbers import percent
+from pipeline.words.phrases import counted, listing
 
 _CANVAS_MARGIN = 0.06
 _TARGETS_NAMED = 30  # more numbers would lie on each other

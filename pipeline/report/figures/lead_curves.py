@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import GREY, as_label, colour, legend, marker, panels, styled
 from pipeline.report.figures.wording import listed
-from pipeline.words import seconds
+from pipeline.words.numbers import milliseconds
 
 
 def _lead_words(lead_curves: pd.DataFrame) -> Words:
@@ -19,7 +19,7 @@ def _lead_words(lead_curves: pd.DataFrame) -> Words:
     parts = []
     for name, rows in lead_curves.groupby("estimator", sort=False):
         peak = peak_s(rows)
-        parts.append(f"{name} has no peak within half a second" if peak is None else f"{name} {seconds(peak)} ms")
+        parts.append(f"{name} has no peak within half a second" if peak is None else f"{name} {milliseconds(peak)} ms")
     peaks = f"Peaks: {listed(parts)}."
     where = lead_curves["session"].iloc[0]
     return Words(
@@ -43,7 +43,7 @@ def lead(lead_curves: pd.DataFrame) -> Figure:
         if not highest > 0:
             continue
         peak = peak_s(rows)
-        label = as_label(estimator) if peak is None else f"{as_label(estimator)}: peak at {seconds(peak)} ms"
+        label = as_label(estimator) if peak is None else f"{as_label(estimator)}: peak at {milliseconds(peak)} ms"
         axes.plot(1000 * shift, correlation / highest, color=colour(index), label=label)
         if peak is not None:
             mark: dict[str, Any] = {"markersize": 7, "markeredgecolor": "white", "color": colour(index)}

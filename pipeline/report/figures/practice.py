@@ -23,7 +23,7 @@ from pipeline.report.figures.style import (
     styled,
 )
 from pipeline.report.figures.wording import listed
-from pipeline.words import MINUS, number, percent
+from pipeline.words.numbers import MINUS, number, percent
 
 _POINTS_MAX = 16  # of a condition; more intervals side by side cannot be told apart
 _SHARE_MIN = 0.5  # of the participants: a point of the few who had the most trials is no point of the same people

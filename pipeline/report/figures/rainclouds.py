@@ -28,7 +28,9 @@ from pipeline.report.figures.style import (
 )
 from pipeline.report.figures.wording import complete_counts, listed, mean_with_interval, spaced
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import MINUS, counted, measure_label, number, short_label, unit_of
+from pipeline.words.names import measure_label, short_label, unit_of
+from pipeline.words.numbers import MINUS, number
+from pipeline.words.phrases import counted
 
 _CLOUD = 0.3  # height of a density, where conditions are 1 apart
 _BOX = 0.07  # half the width of the line at the median

@@ -7,9 +7,9 @@ import matplotlib.ticker
 import pandas as pd
 from matplotlib.axes import Axes
 
-from pipeline.words import SMOOTHED, held_against
+from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
 
-RECORDED = held_against(())
+RECORDED = reference_phrase(())
 
 _WIDE = 100.0  # ratio of the axis' ends above which only powers of ten have room for their numbers
 

@@ -28,7 +28,8 @@ from pipeline.report.figures.style import (
 )
 from pipeline.report.figures.wording import listed
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import counted, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted
 
 _PANEL = 3.4  # inches: the highest
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import as_label, colour, finite, panels, styled
 from pipeline.report.figures.wording import listed
-from pipeline.words import MINUS, number, percent
+from pipeline.words.numbers import MINUS, number, percent
 
 
 def _noise_words(residuals: pd.DataFrame, units: pd.Series) -> Words:

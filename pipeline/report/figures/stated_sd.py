@@ -12,7 +12,8 @@ from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import BLACK, GREY, as_label, colour, legend, lowest, marker, multiples, styled
 from pipeline.report.figures.wording import listed
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import counted, percent
+from pipeline.words.numbers import percent
+from pipeline.words.phrases import counted
 
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.5}
 _BAND: dict[str, Any] = {"color": GREY, "linewidth": 0, "alpha": 0.35}

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import showable
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import MINUS, THIN
+from pipeline.words.numbers import MINUS, THIN_SPACE
 
 Drawn = ParamSpec("Drawn")
 Place = Literal["outside upper left", "outside lower left", "outside right center"]
@@ -84,7 +84,7 @@ def as_label(text: object, length: int = _NAME_LENGTH) -> str:
     """A name as a label: characters that the font lacks are replaced, and a long name is cut to leave room for data."""
     shown = showable(str(text))
     if shown.startswith("_"):  # matplotlib leaves such names out of legends
-        shown = THIN + shown
+        shown = THIN_SPACE + shown
     return shown if len(shown) <= length else f"{shown[: length - 1]}…"
 
 
@@ -185,7 +185,7 @@ def arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 def grouped(axes: Axes) -> None:
     """Group the thousands on the value axis, and write a true minus sign."""
     axes.yaxis.set_major_formatter(
-        mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", THIN).replace("-", MINUS))
+        mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", THIN_SPACE).replace("-", MINUS))
     )
 
 

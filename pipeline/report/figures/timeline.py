@@ -14,7 +14,8 @@ from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import BLACK, COLOURS, GREY, MARKS_MAX, as_label, legend, panels, styled
 from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
-from pipeline.words import counted, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted
 
 _GAP_TIMES = 5  # a silence is marked if it is so many times the usual interval
 _ROW = 0.17  # inches

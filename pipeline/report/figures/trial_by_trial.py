@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import as_label, as_pixels, colour, legend, lowest, marker, multiples, styled
 from pipeline.report.figures.wording import listed
-from pipeline.words import counted, number
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted
 
 
 def _trials_words(table: pd.DataFrame, conditions: Sequence[str]) -> Words:

@@ -14,7 +14,7 @@ from pipeline.report.figures import label_places
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.rmse_axis import along_rmse, lag_label
 from pipeline.report.figures.style import BLACK, GREY, arms, as_label, colour, legend, marker, panels, styled
-from pipeline.words import counted
+from pipeline.words.phrases import counted
 
 _LABEL_APART = 10  # points (1/72 inch), like the next two; closer marks share a label
 _LABEL_GAP = 4  # beside a label

@@ -9,7 +9,7 @@ import pandas as pd
 
 from pipeline.report.figures.style import mean_and_interval
 from pipeline.statistics.arrays import FloatArray
-from pipeline.words import interval, number
+from pipeline.words.numbers import interval, number
 
 _LISTED_MAX = 8  # a sentence with more parts is hard to read
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pipeline.words import SMOOTHED
+from pipeline.words.accuracy_reference import SMOOTHED
 
 
 def without_reference(results: Mapping[str, Any]) -> bool:

@@ -15,22 +15,11 @@ from pipeline.statistics import OK, RATIO
 from pipeline.statistics.pairs import names_in
 from pipeline.study.measures import headlines, measure
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words import (
-    EFFECTS_OF_CONDITION,
-    MINUS,
-    NOTHING,
-    Row,
-    decisive_p,
-    direction,
-    effect_size,
-    interval,
-    measure_label,
-    number,
-    p_value,
-    percent,
-    reduction_of,
-    test_label,
-)
+from pipeline.words.change import direction, meaningful_reduction
+from pipeline.words.comparison import EFFECTS_OF_CONDITION, Row, decisive_p, test_label
+from pipeline.words.effect_sizes import effect_size
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_value, percent
 
 LINES_MAX = 12
 """As many lines fit on the first page, with all else that belongs there."""
@@ -151,9 +140,9 @@ def _line(
     compared = f"{second} {MINUS} {first}"
     both = _means(row, described.get((row["measure"], first)), described.get((row["measure"], second)))
     if row["status"] != OK:
-        return Line(name, compared, both, f"{test_label(row)}: {row['status']}", NOTHING, NOTHING, None)
+        return Line(name, compared, both, f"{test_label(row)}: {row['status']}", NO_VALUE, NO_VALUE, None)
     p = decisive_p(row)
-    size = NOTHING if row["effect_size_name"] in (RATIO, "estimate") else effect_size(_of_second_minus_first(row))
+    size = NO_VALUE if row["effect_size_name"] in (RATIO, "estimate") else effect_size(_of_second_minus_first(row))
     significant = None if p is None else p < alpha
     return Line(name, compared, both, _difference(row, bool(significant)), size, p_value(p), significant)
 
@@ -173,7 +162,7 @@ def _means(row: Row, one: Row | None, other: Row | None) -> str:
     number: they could contradict the difference beside them.
     """
     if one is None or other is None or not one["n"] == other["n"] == row["n"] or row["effect_size_name"] == "estimate":
-        return NOTHING
+        return NO_VALUE
     first, second, unit = one["mean"], other["mean"], measure(row["measure"]).unit
     if unit.endswith("²") and first >= 0 and second >= 0:
         return f"{number(math.sqrt(first))} → {number(math.sqrt(second))} {unit[:-1]} (root)"
@@ -188,15 +177,15 @@ def _difference(row: Row, significant: bool) -> str:
     details, unit = row["details"] or {}, measure(row["measure"]).unit
     if details.get("ratio_to_first") is not None:
         bounds = interval(*details["ratio_to_first_ci"])
-        return f"× {number(details['ratio_to_first'])} {'' if bounds == NOTHING else bounds}".strip()
+        return f"× {number(details['ratio_to_first'])} {'' if bounds == NO_VALUE else bounds}".strip()
     if row["mean_difference"] is None:
         if row["effect_size_name"] != "estimate" or row["effect_size"] is None:
-            return NOTHING
+            return NO_VALUE
         return _signed(row["effect_size"], (row["ci_low"], row["ci_high"]), unit)
     amount = _signed(row["mean_difference"], details.get("ci_difference") or (None, None), unit)
     if row["mean_difference"] == 0:
         return amount
-    reduction = reduction_of(row)
+    reduction = meaningful_reduction(row)
     share = "" if reduction is None else f"{percent(abs(reduction))} "
     side = direction(row) if significant else direction(row).partition(" ")[0]
     return f"{amount}, {share}{side}"

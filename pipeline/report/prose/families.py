@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from pipeline.analysis.families import MEASURES, PAIRS
 from pipeline.tables.table import Row
-from pipeline.words import adjustment, counted, listing
+from pipeline.words.names import adjustment_label
+from pipeline.words.phrases import counted, listing
 
 
 def families(rows: Sequence[Row]) -> str:
@@ -18,7 +19,7 @@ def families(rows: Sequence[Row]) -> str:
             kinds[row["adjust"], details["family"], details["family_size"]] = None
     if not kinds:
         return "p values are not adjusted"
-    parts = [f"by {adjustment(method)} over {_members(family, size)}" for method, family, size in kinds]
+    parts = [f"by {adjustment_label(method)} over {_members(family, size)}" for method, family, size in kinds]
     return f"p values are adjusted {listing(parts)}"
 
 

@@ -13,7 +13,10 @@ from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
-from pipeline.words import SMOOTHED, adjustment, counted, listing, number, subject, unit_of
+from pipeline.words.accuracy_reference import SMOOTHED
+from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted, listing
 
 _ORIGINS = {
     "simulated": "The data were simulated by a model, not measured with people.",
@@ -80,8 +83,8 @@ def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
             scales.setdefault(questionnaire, []).append(scale.replace("_", " "))
         else:
             unit = unit_of(measure)
-            others.append(f"{subject(measure)}{f' in {unit}' if unit else ''}")
-    named = [f"{subject(f'{name}/ratings')} ({', '.join(parts)})" for name, parts in scales.items()]
+            others.append(f"{measure_as_subject(measure)}{f' in {unit}' if unit else ''}")
+    named = [f"{measure_as_subject(f'{name}/ratings')} ({', '.join(parts)})" for name, parts in scales.items()]
     if others or named:
         yield f"Measures: {'; '.join([*others, *named])}. Each participant's mean in a condition counted as one value."
 
@@ -146,7 +149,7 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
 
 def _named(pattern: str) -> str:
     """The measures that an entry's name or pattern stands for."""
-    return subject(pattern).replace(" *", " scales") if "*" in pattern else subject(pattern)
+    return measure_as_subject(pattern).replace(" *", " scales") if "*" in pattern else measure_as_subject(pattern)
 
 
 def _level(alpha: float) -> str:
@@ -162,7 +165,7 @@ def test_in_words(entry: Comparison, rows: Sequence[Row]) -> str:
     if entry.transform == "log":
         parts.append("of the natural logarithms of the participants' means, read as ratios of geometric means")
     if entry.exposure is not None:
-        parts.append(f"rates per {unit_of(entry.exposure) or 'unit'} of {subject(entry.exposure).lower()}")
+        parts.append(f"rates per {unit_of(entry.exposure) or 'unit'} of {measure_as_subject(entry.exposure).lower()}")
     if "fixed" in options:
         parts.append(f"fixed terms {listing(list(entry.fixed))}")
     if entry.random is not None:
@@ -176,7 +179,7 @@ def test_in_words(entry: Comparison, rows: Sequence[Row]) -> str:
         parts += dict.fromkeys(row["method"] for row in rows if zeros in row["method"])
     parts += _estimates(entry, rows)
     if entry.adjust != "none":
-        parts.append(f"p {adjustment(entry.adjust)}-adjusted")
+        parts.append(f"p {adjustment_label(entry.adjust)}-adjusted")
     return ", ".join(parts)
 
 
@@ -198,7 +201,8 @@ def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
     followed = "follow_up" in TESTS[entry.test].options and any(row["adjust"] == entry.follow_up for row in pairs)
     if not followed or entry.follow_up == "none":
         return ""
-    return f", followed up pair by pair with {adjustment(entry.follow_up)}-adjusted {TESTS[entry.test].followed_up_by}"
+    adjusted = f"{adjustment_label(entry.follow_up)}-adjusted"
+    return f", followed up pair by pair with {adjusted} {TESTS[entry.test].followed_up_by}"
 
 
 def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:

@@ -15,7 +15,8 @@ from pipeline.report.prose.methods import test_in_words
 from pipeline.study.comparison import Comparison
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words import adjustment, listing, measure_label
+from pipeline.words.names import adjustment_label, measure_label
+from pipeline.words.phrases import listing
 
 NOT_STATED = "not stated"
 
@@ -171,7 +172,7 @@ def _tests(study: Study) -> Iterator[str]:
     for entry in study.comparisons:
         text = f"{_of(entry)}: {test_in_words(entry, [])}"
         if "follow_up" in entry.options and entry.follow_up != "none":
-            text += f"; pairs follow, {adjustment(entry.follow_up)}-adjusted, where there are more than two"
+            text += f"; pairs follow, {adjustment_label(entry.follow_up)}-adjusted, where there are more than two"
         if "zeros" in entry.options:
             text += f"; zeros: {entry.zeros}"
         if entry.between is not None:
@@ -187,7 +188,9 @@ def _inference(study: Study) -> Iterator[str]:
     for place, entry in enumerate(study.comparisons):
         if entry.adjust != "none":
             key = entry.family or f" {place}"
-            families.setdefault(f"{key}\n{adjustment(entry.adjust)}", []).extend(f"`{one}`" for one in entry.measures)
+            families.setdefault(f"{key}\n{adjustment_label(entry.adjust)}", []).extend(
+                f"`{one}`" for one in entry.measures
+            )
     for key, measures in families.items():
         name, _, method = key.partition("\n")
         named = "" if name.startswith(" ") else f" “{name}”"

@@ -12,7 +12,7 @@ from pipeline.study.measures import measure
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from pipeline.tables.table import Row
-from pipeline.words import of_logarithms
+from pipeline.words.comparison import uses_logarithms
 
 PAPER = "feng2017"
 _OF_EFFECT_SIZE = {
@@ -131,7 +131,7 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield _OF_EFFECT_SIZE[row["effect_size_name"]], row["effect_size_name"]
         if row["p_adjusted"] is not None:
             yield ADJUSTMENTS[row["adjust"]].cite, "adjusted p values"
-        if of_logarithms(row):
+        if uses_logarithms(row):
             yield "bland1996", "ratios of geometric means"
         if "bootstrap_seed" in details:
             yield "efron1987", "bootstrap intervals"

@@ -14,7 +14,9 @@ from pipeline.sessions.estimators import fusing
 from pipeline.sessions.fusion_checks import USED
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, SMOOTHED, counted, held_against, number, percent, seconds
+from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
+from pipeline.words.numbers import NO_VALUE, milliseconds, number, percent
+from pipeline.words.phrases import counted
 
 _ROWS_MAX = 40
 
@@ -104,14 +106,14 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
             number(row["rmse_mm"], 2),
             number(row["sd_mm"], 2),
             percent(row["coverage_95"], 0),
-            seconds(row["lag_s"]),
-            seconds(row["lead_xcorr_s"]),
+            milliseconds(row["lag_s"]),
+            milliseconds(row["lead_xcorr_s"]),
             number(row["jitter_mm"], 2),
         )
         for row in material.rows("accuracy_means")
     )
     n, axes = len({row["session"] for row in rows}), len(material.study.axes)
-    standard = held_against(row["reference"] for row in rows)
+    standard = reference_phrase(row["reference"] for row in rows)
     known = SMOOTHED not in standard
     caption = (
         f"Accuracy of each estimator against {standard}" if known else f"Distance of each estimator from {standard}"
@@ -153,8 +155,10 @@ def _session_table(rows: list[Row], alone: Mapping[str, Sequence[str]]) -> Table
             number(row["rmse_mm"], 2),
             number(row["sd_mm"], 2),
             percent(row["coverage_95"], 0),
-            seconds(row["lag_s"]),
-            NOTHING if row["lag_low_s"] is None else f"[{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]",
+            milliseconds(row["lag_s"]),
+            NO_VALUE
+            if row["lag_low_s"] is None
+            else f"[{milliseconds(row['lag_low_s'])}, {milliseconds(row['lag_high_s'])}]",
             number(row["jitter_mm"], 2),
         )
         for row in rows[:_ROWS_MAX]

@@ -12,13 +12,10 @@ from pipeline.report.sections import checks, preregistration
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import (
-    counted,
-    finds_no_variance_between_people,
-    held_against,
-    listing,
-    measure_label,
-)
+from pipeline.words.accuracy_reference import reference_phrase
+from pipeline.words.comparison import no_variance_between_participants
+from pipeline.words.names import measure_label
+from pipeline.words.phrases import counted, listing
 
 _REMARKS_MAX = 3
 _FEW = 8  # participants
@@ -106,7 +103,7 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         yield (Strong("Skewed values "), f"{text} geometric means differ; see whether it gives the same result.")
     yield from _far_out(resting)
     yield from _aligned_ranks(rows)
-    singular = [row for row in rows if finds_no_variance_between_people(row)]
+    singular = [row for row in rows if no_variance_between_participants(row)]
     if singular:
         text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so it"
         yield (Strong("Singular fit "), f"{text} treats all rows as if they came from different people.")
@@ -118,7 +115,7 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
     ]
     if narrow:
-        standard = held_against(row["reference"] for row in material.rows("accuracy"))
+        standard = reference_phrase(row["reference"] for row in material.rows("accuracy"))
         text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain"
         yield (Strong("Stated uncertainty too small "), f"{text} {standard} in less than 90 % of instants.")
 

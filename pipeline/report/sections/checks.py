@@ -9,7 +9,8 @@ from pipeline.report.sections.material import Material
 from pipeline.report.traffic_lights import LIGHTS, SYMBOLS
 from pipeline.sessions.fusion_checks import WORSE
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, listing
+from pipeline.words.numbers import NO_VALUE
+from pipeline.words.phrases import counted, listing
 
 _ROWS_MAX = 40
 _NAMED_MAX = 3
@@ -50,7 +51,7 @@ def _lags(rows: Sequence[Row]) -> str:
 def _table(rows: Sequence[Row]) -> Table:
     cells = tuple(
         (
-            row["session"] or NOTHING,
+            row["session"] or NO_VALUE,
             row["check"],
             f"{SYMBOLS[row['status']]} {row['status']}",
             row["found"],

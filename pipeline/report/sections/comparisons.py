@@ -11,27 +11,13 @@ from pipeline.report.sections.material import Material
 from pipeline.statistics.diagnostics import OUTLIER_RULE
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import (
-    NOTHING,
-    adjustment,
-    capitalized,
-    contrast,
-    counted,
-    degrees_of_freedom,
-    effect_size,
-    interval,
-    listing,
-    measure_label,
-    number,
-    of_logarithms,
-    p_value,
-    percent,
-    reduction_of,
-    share,
-    statistic_name,
-    statistic_value,
-    test_label,
-)
+from pipeline.words.change import meaningful_reduction
+from pipeline.words.comparison import contrast, test_label, uses_logarithms
+from pipeline.words.effect_sizes import effect_size
+from pipeline.words.evidence import degrees_of_freedom, statistic_name, statistic_value
+from pipeline.words.names import adjustment_label, measure_label
+from pipeline.words.numbers import NO_VALUE, fraction, interval, number, p_value, percent
+from pipeline.words.phrases import capitalized, counted, listing
 
 
 def anchor(at: int) -> str:
@@ -45,7 +31,7 @@ def section(material: Material) -> Section | None:
     if not rows:
         return None
     tests = list(dict.fromkeys(row["test"] for row in rows))
-    filled = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NOTHING, "") for row in rows)]
+    filled = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NO_VALUE, "") for row in rows)]
     table = Table(
         "table-comparisons",
         f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
@@ -63,7 +49,7 @@ def section(material: Material) -> Section | None:
 
 
 def _of_logarithms(rows: Sequence[Row]) -> str:
-    return "; of tests of logarithms, that of the geometric mean" if any(map(of_logarithms, rows)) else ""
+    return "; of tests of logarithms, that of the geometric mean" if any(map(uses_logarithms, rows)) else ""
 
 
 def _who_counts(tests: Sequence[str]) -> str:
@@ -118,12 +104,12 @@ def _differences(row: Row, conditions: Sequence[str]) -> str:
 
 def _normality(details: Mapping[str, Any]) -> tuple[str, str]:
     prefix = "" if "shapiro_w" in details else "residual_"
-    return share(details[f"{prefix}shapiro_w"]), p_value(details[f"{prefix}shapiro_p"])
+    return fraction(details[f"{prefix}shapiro_w"]), p_value(details[f"{prefix}shapiro_p"])
 
 
 def _outliers(details: Mapping[str, Any]) -> str:
     if "outliers" not in details:
-        return NOTHING
+        return NO_VALUE
     if details["outliers"] is None:
         return "no spread"
     return listing(details["outliers"]) if details["outliers"] else "nobody"
@@ -135,7 +121,7 @@ def _statistic(row: Row) -> str:
 
 def _adjusted_p(row: Row) -> str:
     adjusted = row["p_adjusted"]
-    return NOTHING if adjusted is None else f"{p_value(adjusted)} ({adjustment(row['adjust'])})"
+    return NO_VALUE if adjusted is None else f"{p_value(adjusted)} ({adjustment_label(row['adjust'])})"
 
 
 def _corrected_p(row: Row) -> str:
@@ -146,7 +132,7 @@ def _bootstrap(row: Row) -> str:
     """The bootstrap interval of the mean difference, or why there is none."""
     details = row["details"] or {}
     bounds = details.get("bootstrap_ci_difference") or details.get("bootstrap_ci_ratio_to_first")
-    return interval(*bounds) if bounds else str(details.get("no_bootstrap", NOTHING))
+    return interval(*bounds) if bounds else str(details.get("no_bootstrap", NO_VALUE))
 
 
 ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
@@ -168,6 +154,6 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Effect size [95 % interval]", effect_size),
     ("Mean difference", lambda row: number(row["mean_difference"])),
     *ESTIMATES,
-    ("Reduction", lambda row: percent(reduction_of(row))),
+    ("Reduction", lambda row: percent(meaningful_reduction(row))),
 )
 """The table's columns; a column that no row fills is left out."""

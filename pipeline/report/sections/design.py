@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pipeline.report.document.model import Block, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.report.sections.material import ORIGINS, Material, conditions_text
-from pipeline.words import counted, listing, measure_label, number
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import number
+from pipeline.words.phrases import counted, listing
 
 
 def section(material: Material) -> Section:

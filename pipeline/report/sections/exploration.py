@@ -17,7 +17,10 @@ from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, 
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, interval, listing, number, percent, reduction_phrase, short_label
+from pipeline.words.change import reduction_phrase
+from pipeline.words.names import short_label
+from pipeline.words.numbers import NO_VALUE, interval, number, percent
+from pipeline.words.phrases import counted, listing
 
 ORIGIN = "Simulated participants; direction and rough size only."
 _ROWS_MAX = 150
@@ -162,12 +165,12 @@ def _outcome(row: Row) -> tuple[str, str]:
 
 def _with_interval(row: Row, name: str, unit: str) -> str:
     bounds = interval(row[f"{name}_low{unit}"], row[f"{name}_high{unit}"], 1)
-    return number(row[f"{name}{unit}"], 1) + ("" if bounds == NOTHING else f" {bounds}")
+    return number(row[f"{name}{unit}"], 1) + ("" if bounds == NO_VALUE else f" {bounds}")
 
 
 def _less(row: Row, here: Row, column: str) -> str:
     if row is here or row[column] is None or not here[column]:
-        return NOTHING
+        return NO_VALUE
     return percent(round(1 - row[column] / here[column], 2) + 0.0, 0)  # a zero without a sign
 
 
@@ -190,7 +193,7 @@ def _surfaces(explored: Explored, drawn: Path) -> Iterator[Block]:
 
 
 def _part(row: Row) -> str:
-    return percent(row["misses"] / row["selections"], 1) if row["selections"] else NOTHING
+    return percent(row["misses"] / row["selections"], 1) if row["selections"] else NO_VALUE
 
 
 def _place(row: Row) -> tuple[str, str, str]:

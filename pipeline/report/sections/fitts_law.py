@@ -11,7 +11,8 @@ from pipeline.report.document.model import Block, Notice, Paragraph, Section, St
 from pipeline.report.figures.fitts_law import line_in_words
 from pipeline.report.sections.material import Material
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, interval, listing, number, share
+from pipeline.words.numbers import NO_VALUE, fraction, interval, number
+from pipeline.words.phrases import listing
 
 
 def section(material: Material) -> Section | None:
@@ -40,7 +41,7 @@ def _sentence(rows: Sequence[Row]) -> str:
     for row in effective:
         line = "no line"
         if row["slope_s_bit"] is not None:
-            line = f"MT = {line_in_words(row['intercept_s'], row['slope_s_bit'])}, R² = {share(row['r_squared'])}"
+            line = f"MT = {line_in_words(row['intercept_s'], row['slope_s_bit'])}, R² = {fraction(row['r_squared'])}"
         parts.append(f"{row['condition']}, {line}, throughput {number(row['throughput_bits_s'])} bit/s")
     return f"by {effective[0]['difficulty']} difficulty, {'; '.join(parts)}"
 
@@ -55,7 +56,7 @@ def _table(rows: Sequence[Row]) -> Table:
             f"{row['blocks']}",
             _with_interval(row["intercept_s"], row["intercept_ci_low_s"], row["intercept_ci_high_s"]),
             _with_interval(row["slope_s_bit"], row["slope_ci_low_s_bit"], row["slope_ci_high_s_bit"]),
-            share(row["r_squared"]),
+            fraction(row["r_squared"]),
             number(row["throughput_bits_s"]),
         )
         for row in rows
@@ -68,7 +69,7 @@ def _table(rows: Sequence[Row]) -> Table:
 
 
 def _with_interval(value: float | None, low: float | None, high: float | None) -> str:
-    return NOTHING if value is None else f"{number(value)} {interval(low, high)}"
+    return NO_VALUE if value is None else f"{number(value)} {interval(low, high)}"
 
 
 def _cautions(rows: Sequence[Row]) -> list[Block]:

@@ -21,7 +21,7 @@ from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import TABLES
 from pipeline.tables.table import Row
-from pipeline.words import listing
+from pipeline.words.phrases import listing
 
 _NAME_LENGTH = 60
 

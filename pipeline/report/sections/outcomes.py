@@ -9,27 +9,19 @@ from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
-from pipeline.report.prose.sentences import with_article
 from pipeline.report.sections.comparisons import ESTIMATES
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.study.measures import MEASURES, measure
 from pipeline.study.measures import Section as SectionName
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import (
-    NOTHING,
-    capitalized,
-    comparison_sentence,
-    contrast,
-    effect_size,
-    evidence,
-    interval,
-    measure_label,
-    number,
-    p_value,
-    short_label,
-    statistic,
-)
+from pipeline.words.comparison import contrast
+from pipeline.words.effect_sizes import effect_size
+from pipeline.words.evidence import evidence, statistic
+from pipeline.words.names import measure_label, short_label
+from pipeline.words.numbers import NO_VALUE, interval, number, p_value
+from pipeline.words.phrases import capitalized
+from pipeline.words.sentences import brief_sentence, with_article
 
 _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
 
@@ -165,7 +157,7 @@ def _sentences(rows: Sequence[Row]) -> Iterator[str]:
     for (test, _, follows), group in groupby(rows, key=lambda row: (row["test"], row["effect"], follows_up(row))):
         pairs = list(group)
         if not follows:
-            yield from (comparison_sentence(row) for row in pairs)
+            yield from (brief_sentence(row) for row in pairs)
             continue
         told = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
         yield f"follow-up of {with_article(TESTS[test].label)}, n = {pairs[0]['n']}: {'; '.join(told)}"
@@ -204,7 +196,7 @@ def _ratings_table(material: Material, questionnaire: str, title: str, names: li
 
 
 def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
-    estimates = [(title, cell) for title, cell in ESTIMATES if any(cell(row) != NOTHING for row in rows)]
+    estimates = [(title, cell) for title, cell in ESTIMATES if any(cell(row) != NO_VALUE for row in rows)]
     titles = ("Scale", "Comparison", "n", "Statistic", "p", "p adjusted", "Effect size [95 % interval]")
     cells = tuple(
         (

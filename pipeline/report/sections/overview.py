@@ -28,27 +28,14 @@ from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words import (
-    EFFECTS_OF_CONDITION,
-    MINUS,
-    NOTHING,
-    adjustment,
-    amount_of_change,
-    comparison_sentence,
-    counted,
-    decisive_p,
-    direction,
-    interval,
-    listing,
-    measure_label,
-    number,
-    p_phrase,
-    ratio_to_first,
-    short_label,
-    statistic,
-    unit_of,
-    verdict,
-)
+from pipeline.words.change import amount_of_change, direction
+from pipeline.words.comparison import EFFECTS_OF_CONDITION, decisive_p
+from pipeline.words.effect_sizes import ratio_to_first
+from pipeline.words.evidence import statistic
+from pipeline.words.names import adjustment_label, measure_label, short_label, unit_of
+from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_phrase
+from pipeline.words.phrases import counted, listing
+from pipeline.words.sentences import brief_sentence, verdict
 
 _KEY_FIGURES_MAX = 3
 _SENTENCES = 2
@@ -111,7 +98,7 @@ def _sentence(material: Material, row: Row) -> str:
     """The result of a comparison of the conditions, with the means and their intervals."""
     label = short_label(row["measure"])
     if row["status"] != "ok":
-        return f"{label}: {comparison_sentence(row)}."
+        return f"{label}: {brief_sentence(row)}."
     study, p = material.study, decisive_p(row)
     significant = p is not None and p < study.alpha
     found = f"{p_phrase(p)}, n = {row['n']}"
@@ -138,7 +125,7 @@ def _sentence(material: Material, row: Row) -> str:
 def _mean(row: Row) -> str:
     """`12.3 s [10.1, 14.5]`: a mean and its 95 % interval."""
     parts = (number(row["mean"]), unit_of(row["measure"]), interval(row["ci_low"], row["ci_high"]))
-    return " ".join(part for part in parts if part not in ("", NOTHING))
+    return " ".join(part for part in parts if part not in ("", NO_VALUE))
 
 
 def _closest(material: Material) -> Text:
@@ -319,13 +306,13 @@ def _evidence(material: Material) -> list[Text]:
     answers: list[Text] = []
     for row in _headline_rows(material):
         if row["contrast"] is None and row["mean_difference"] is None and not ratio_to_first(row):
-            said = comparison_sentence(row)
+            said = brief_sentence(row)
             if row["status"] == "ok":
                 said = f"{verdict(row, material.study.alpha)} ({said})"
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     for row in _of_conditions(material):
         if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
-            said = f"{verdict(row, material.study.alpha)} ({comparison_sentence(row, with_change=False)})"
+            said = f"{verdict(row, material.study.alpha)} ({brief_sentence(row, with_change=False)})"
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
     answers += _ratings(material)
     means = _means(material)
@@ -363,8 +350,7 @@ def _ratings(material: Material) -> list[Text]:
         text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level before adjustment"
         if any(row["p_adjusted"] is not None for row in rows):
             kept = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
-            text += (
-                f", and {len(kept)} after adjustment for {counted(len(rows), 'test')} ({adjustment(rows[0]['adjust'])})"
-            )
+            method = adjustment_label(rows[0]["adjust"])
+            text += f", and {len(kept)} after adjustment for {counted(len(rows), 'test')} ({method})"
         answers.append((Strong(f"{label}: "), f"{text}."))
     return answers

@@ -17,7 +17,10 @@ from pipeline.report.sections.traces import PAGE as TRACES
 from pipeline.tables.catalogue import TABLES
 from pipeline.tables.columns import TEXT
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, held_against, measure_label, number, percent, seconds
+from pipeline.words.accuracy_reference import reference_phrase
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import NO_VALUE, milliseconds, number, percent
+from pipeline.words.phrases import counted
 
 FOLDER = "participants"
 _MANY = 40  # of sessions or participants: the report's own tables show no more than the first rows then
@@ -45,15 +48,15 @@ _SHOWN: dict[str, tuple[str, tuple[tuple[str, str, Cell], ...]]] = {
             ("RMSE (mm)", "rmse_mm", number),
             ("Stated SD (mm)", "sd_mm", number),
             ("In 95 % interval", "coverage_95", partial(percent, digits=0)),
-            ("Lag (ms)", "lag_s", seconds),
+            ("Lag (ms)", "lag_s", milliseconds),
             ("Jitter (mm)", "jitter_mm", number),
         ),
     ),
     "exclusions": (
         "What is missing or was left out, and why.",
         (
-            ("Condition", "condition", lambda name: name or NOTHING),
-            ("Session", "session", lambda name: name or NOTHING),
+            ("Condition", "condition", lambda name: name or NO_VALUE),
+            ("Session", "session", lambda name: name or NO_VALUE),
             ("Measure", "measure", lambda name: measure_label(name) if name else "all"),
             ("What", "what", str),
             ("Reason", "reason", lambda reason: reason or ""),
@@ -83,7 +86,7 @@ def write(material: Material, folder: Path) -> None:
     folder.mkdir()
     values = {name: material.participant_means(name) for name in dict.fromkeys(material.measures["measure"])}
     sessions, rows = _by_person(material)
-    standard = held_against(row["reference"] for row in material.rows("accuracy"))
+    standard = reference_phrase(row["reference"] for row in material.rows("accuracy"))
     for name, person in people.items():
         sections = (
             Section("measures", "Measures", (_measures(material.study.conditions, values, person),)),

@@ -9,12 +9,13 @@ from pipeline.report.document.model import Block, CrossReference, Paragraph, Sec
 from pipeline.report.figures.rainclouds import draws_within
 from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
-from pipeline.report.prose.sentences import StudyFacts, means_sentence, sentence, states_means, study_facts
 from pipeline.report.sections import practice
 from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import used_versions
 from pipeline.tables.table import Row
+from pipeline.words.condition_means import StudyFacts, means_sentence, states_means, study_facts
+from pipeline.words.sentences import full_sentence
 
 BIBLIOGRAPHY = "references.bib"
 """The file beside the report."""
@@ -71,7 +72,7 @@ def _results(material: Material) -> Iterator[Text]:
 
 
 def _linked(at: int, row: Row, facts: StudyFacts) -> tuple[str | Strong | CrossReference, ...]:
-    return f"{sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "
+    return f"{full_sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "
 
 
 def _references(material: Material) -> Table:

@@ -12,7 +12,17 @@ from pipeline.report.document.model import Block, Paragraph, Section, Strong, Ta
 from pipeline.report.sections.material import Material
 from pipeline.statistics import OK
 from pipeline.tables.table import Row
-from pipeline.words import MINUS, NOTHING, listing, p_phrase, p_value, percent, share, share_interval, statistic
+from pipeline.words.evidence import statistic
+from pipeline.words.numbers import (
+    MINUS,
+    NO_VALUE,
+    fraction,
+    fraction_interval,
+    p_phrase,
+    p_value,
+    percent,
+)
+from pipeline.words.phrases import listing
 
 _ORDER_CHECKS = ("order of the conditions", "times in each period", "times each condition comes just before each other")
 
@@ -117,7 +127,7 @@ def _table(rows: Sequence[Row], conditions: Sequence[str]) -> Table:
             row["contrast"] if row["contrast"] in conditions else _compared(row),
             f"{row['n']}" if row["left_out"] == 0 else f"{row['n']} ({row['left_out']} left out)",
             _change(row),
-            f"{share(row['slope'])} {share_interval(row['ci_low'], row['ci_high'], 3)}",
+            f"{fraction(row['slope'])} {fraction_interval(row['ci_low'], row['ci_high'], 3)}",
             statistic({**row, "df1": None}) if row["status"] == OK else row["status"],
             p_value(row["p_adjusted"]),
         )
@@ -133,6 +143,6 @@ def _table(rows: Sequence[Row], conditions: Sequence[str]) -> Table:
 def _change(row: Row) -> str:
     """`−7.0 %` of the time; nothing for a pair, whose ratio is one of ratios."""
     if row["first_trial_s"] is None and row["trials"] == ALL_TRIALS:
-        return NOTHING
+        return NO_VALUE
     change = row["ratio_when_trials_double"] - 1
     return f"{MINUS if change < 0 else '+'}{percent(abs(change))}"

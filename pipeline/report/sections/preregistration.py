@@ -20,7 +20,8 @@ from pipeline.report.sections.material import Material
 from pipeline.report.traffic_lights import SYMBOLS
 from pipeline.study.folder import PREREGISTERED
 from pipeline.tables.table import Row
-from pipeline.words import counted, measure_label
+from pipeline.words.names import measure_label
+from pipeline.words.phrases import counted
 
 ANCHOR = "preregistration"
 _DEVIATIONS_MAX = 6

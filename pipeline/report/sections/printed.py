@@ -8,7 +8,7 @@ from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UN
 from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.report.sections.material import Material
 from pipeline.tables.table import Row
-from pipeline.words import counted
+from pipeline.words.phrases import counted
 
 _VERDICTS = {AGREEMENT: "Agree", CONTRADICTION: "Contradict", REMARK: "Remarks", UNCHECKED: "Cannot be checked"}
 

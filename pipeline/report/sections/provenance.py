@@ -8,7 +8,7 @@ from pipeline.engine.code_digest import versions
 from pipeline.engine.provenance import LIBRARIES
 from pipeline.report.document.model import Column, Paragraph, Section, Table
 from pipeline.report.sections.material import Material
-from pipeline.words import counted
+from pipeline.words.phrases import counted
 
 _FILES_MAX = 60
 

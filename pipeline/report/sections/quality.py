@@ -14,7 +14,9 @@ from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, counted, listing, measure_label, number
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import NO_VALUE, number
+from pipeline.words.phrases import counted, listing
 
 _ROWS_MAX = 40  # a page stays readable; tables/quality.csv has them all
 
@@ -85,7 +87,7 @@ def _fact_light(figures: Sequence[Judged]) -> str:
     """The worst of a fact's figures, and how many others are as bad."""
     worst = session_quality.worst(figures)
     if worst is None:
-        return NOTHING
+        return NO_VALUE
     others = sum(one.light == worst.light for one in figures) - 1
     return worst.text + (f" and {others} more" if others and worst.light in ("amber", "red") else "")
 
@@ -121,7 +123,7 @@ def _quality_table(material: Material) -> Table:
             number(row["rate_hz"], 1),
             _milliseconds(row["gap_max_s"]),
             number(row["jitter_ms"], 1) if row["jitter_ms"] is None or row["jitter_ms"] >= 0.05 else "0.0",
-            NOTHING if row["out_of_order"] is None else f"{row['out_of_order']}",
+            NO_VALUE if row["out_of_order"] is None else f"{row['out_of_order']}",
             _milliseconds(row["latency_s"]),
             row["note"] or "",
         )
@@ -143,7 +145,7 @@ def _quality_table(material: Material) -> Table:
 
 
 def _milliseconds(seconds: float | None) -> str:
-    return NOTHING if seconds is None else number(1000 * seconds, 0 if seconds >= 0.01 else 1)
+    return NO_VALUE if seconds is None else number(1000 * seconds, 0 if seconds >= 0.01 else 1)
 
 
 def _orientation_table(material: Material) -> Table:
@@ -284,9 +286,9 @@ def _exclusions(material: Material) -> list[Block]:
     titles = ("Participant", "Condition", "Session", "Measure", "What", "Reason")
     cells = tuple(
         (
-            row["participant"] or NOTHING,
-            row["condition"] or NOTHING,
-            row["session"] or NOTHING,
+            row["participant"] or NO_VALUE,
+            row["condition"] or NO_VALUE,
+            row["session"] or NO_VALUE,
             measure_label(row["measure"]) if row["measure"] else "all",
             row["what"],
             row["reason"] or "",

@@ -24,7 +24,9 @@ from pipeline.report.sections.material import ORIGINS, draw_now
 from pipeline.report.sections.provenance import libraries
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import NOTHING, SMOOTHED, counted, held_against, interval, number, percent, seconds
+from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
+from pipeline.words.numbers import NO_VALUE, interval, milliseconds, number, percent
+from pipeline.words.phrases import counted
 
 _ROWS_MAX = 120
 _TITLES = (
@@ -75,7 +77,7 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
         rows = [row for row in every if row["study"] == study]
         if rows:
             of = found["accuracy"]
-            standard = held_against(of["reference"] if study is None else of.loc[of["study"] == study, "reference"])
+            standard = reference_phrase(of["reference"] if study is None else of.loc[of["study"] == study, "reference"])
             where = "all studies together" if study is None else f"study “{study}”"
             yield from _one(rows, where, standard, drawn / f"trade-off-{index}.svg")
     if all(row["rank"] is None for row in every):
@@ -123,12 +125,12 @@ def _called(row: Row) -> str:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    lag = seconds(row["lag_s"])
+    lag = milliseconds(row["lag_s"])
     if row["lag_low_s"] is not None:
-        lag += f" [{seconds(row['lag_low_s'])}, {seconds(row['lag_high_s'])}]"
+        lag += f" [{milliseconds(row['lag_low_s'])}, {milliseconds(row['lag_high_s'])}]"
     return (
         _called(row),
-        NOTHING if row["rank"] is None else str(row["rank"]),
+        NO_VALUE if row["rank"] is None else str(row["rank"]),
         str(row["n"]),
         _with_interval(row, "rmse"),
         lag,
@@ -150,7 +152,7 @@ def _left_out(excluded: pd.DataFrame) -> Table | None:
         return None
     more = f" The first {_ROWS_MAX} of {len(rows)}; all are in results.json." if len(rows) > _ROWS_MAX else ""
     cells = tuple(
-        tuple(row[key] or NOTHING for key in ("study", "session", "variant", "what", "reason"))
+        tuple(row[key] or NO_VALUE for key in ("study", "session", "variant", "what", "reason"))
         for row in rows[:_ROWS_MAX]
     )
     titles = columns(("Study", "Session", "Variant", "What", "Why"), 5)

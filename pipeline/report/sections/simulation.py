@@ -6,7 +6,9 @@ from pipeline.report.document.model import Block, Column, Notice, Paragraph, Sec
 from pipeline.report.sections.material import Material
 from pipeline.study.simulation import SelectionSimulation, Trait
 from pipeline.tables.table import Row
-from pipeline.words import counted, measure_label, number, percent
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import number, percent
+from pipeline.words.phrases import counted
 
 _MODELS = {
     "intermittent": "minimum-jerk movements that are planned anew after a refractory time (Flash and Hogan 1985)",

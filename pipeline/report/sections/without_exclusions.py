@@ -9,17 +9,12 @@ from collections.abc import Iterable, Iterator
 from pipeline.report.document.model import Block, Paragraph, Strong, Table, columns
 from pipeline.report.sections.material import Material
 from pipeline.tables.table import Row
-from pipeline.words import (
-    NOTHING,
-    contrast,
-    counted,
-    decisive_p,
-    effect_size,
-    measure_label,
-    p_value,
-    statistic,
-    test_label,
-)
+from pipeline.words.comparison import contrast, decisive_p, test_label
+from pipeline.words.effect_sizes import effect_size
+from pipeline.words.evidence import statistic
+from pipeline.words.names import measure_label
+from pipeline.words.numbers import NO_VALUE, p_value
+from pipeline.words.phrases import counted
 
 _FIGURES = ("n", "statistic", "p", "p_adjusted", "effect_size", "mean_difference", "status")
 _ROUND_OFF = 1e-9
@@ -86,6 +81,6 @@ def _cells(row: Row | None, other: Row | None, which: str) -> tuple[str, ...]:
     named = row or other or {}
     head = (measure_label(named["measure"]), test_label(named), contrast(named), f"{which} exclusions")
     if row is None:
-        return (*head, *(NOTHING,) * 4)
+        return (*head, *(NO_VALUE,) * 4)
     said = statistic(row) if row["status"] == "ok" else row["status"]
     return (*head, f"{row['n']}", said, p_value(decisive_p(row)), effect_size(row))

@@ -17,10 +17,11 @@ from pipeline.analysis.compare import descriptives
 from pipeline.analysis.comparisons import compared as rows_of
 from pipeline.report.prose.glossary import explained
 from pipeline.report.prose.references import bibliography, escaped, used
-from pipeline.report.prose.sentences import StudyFacts, sentence, study_facts
 from pipeline.report.sections.comparisons import anchor
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
+from pipeline.words.condition_means import StudyFacts, study_facts
+from pipeline.words.sentences import full_sentence, verdict
 from tests.pipeline.helpers import Steadyhand, as_printed
 from tests.pipeline.hostile import HOSTILE
 from tests.pipeline.reference import TASKS, compared, expected, study_of, the
@@ -55,7 +56,7 @@ def p_of(p: float) -> str:
 def sentences(steadyhand: Steadyhand, rows: Sequence[Row]) -> list[str]:
     results = steadyhand.results()
     told = study_facts(results["study"]["conditions"], results["study"]["alpha"], results["descriptives"])
-    return [sentence(row, told) for row in rows]
+    return [full_sentence(row, told) for row in rows]
 
 
 @pytest.mark.parametrize(("case", "task"), [pair for pair in TASKS if "paired" in expected(pair[0])["tasks"][pair[1]]])
@@ -168,7 +169,7 @@ def test_every_number_in_a_sentence_is_a_figure_of_its_row_rounded(
     conditions = ["alpha", "beta", "gamma"][: 3 if three else 2]
     rows, told = a_study(conditions, values, TESTS)
     for row in rows:
-        said = sentence(row, told)
+        said = full_sentence(row, told)
         known = figures_of(row) + [figure for one in told.descriptives.values() for figure in figures_of(dict(one))]
         known += [100 * row["reduction"]] if row["reduction"] is not None else []
         known += [1 / row["statistic"]] if row["statistic"] and row["test"] == "bayes_t" else []
@@ -184,7 +185,7 @@ def test_every_number_in_a_sentence_is_a_figure_of_its_row_rounded(
 def test_the_direction_is_that_of_the_test_and_significance_that_of_its_p(values: list[tuple[float, ...]]) -> None:
     rows, told = a_study(["alpha", "beta"], values, TESTS[:6])
     for row in (row for row in rows if row["status"] == "ok"):
-        said = sentence(row, told)
+        said = full_sentence(row, told)
         p = row["p"] if row["p_adjusted"] is None else row["p_adjusted"]
         assert ("not differ significantly" in said) == (p >= 0.05)
         way = row["effect_size"] if row["test"] in ("wilcoxon", "mixed_model") else row["mean_difference"]
@@ -198,7 +199,7 @@ def test_the_direction_is_that_of_the_test_and_significance_that_of_its_p(values
 
 def test_ranks_and_means_that_disagree_are_said_to() -> None:
     rows, told = a_study(["a", "b"], [(1, 2), (2, 3), (3, 4.5), (4, 5.5), (90, 5)], [{"test": "wilcoxon"}])
-    said = sentence(rows[0], told)
+    said = full_sentence(rows[0], told)
     assert "higher with b by ranks, while its mean was lower by 16.00 s" in said
 
 
@@ -206,15 +207,16 @@ def test_a_bayes_factor_beyond_all_numbers_is_said_by_its_logarithm() -> None:
     values = [(1000.0 + person % 2 / 1000, 1.0) for person in range(120)]
     rows, told = a_study(["a", "b"], values, [{"test": "bayes_t"}])
     assert rows[0]["statistic"] is None
-    said = sentence(rows[0], told)
+    said = full_sentence(rows[0], told)
     assert (
         "more than 10³⁰⁸ times as likely under a difference between a and b as under none, ln BF₁₀ = 1\u2009709" in said
     )
+    assert verdict(rows[0], 0.05) == "the data are more than 10³⁰⁸ times as likely under a difference as under none"
 
 
 def test_what_is_undefined_is_said_in_words() -> None:
     rows, told = a_study(["a", "b"], [(1, 1), (2, 2)], TESTS)
-    said = {row["test"]: sentence(row, told) for row in rows}
+    said = {row["test"]: full_sentence(row, told) for row in rows}
     assert said["rm_anova"] == "M: the repeated-measures ANOVA is undefined: all differences are zero (n = 2)."
     assert (
         said["wilcoxon"] == "M: the Wilcoxon signed-rank test of a − b is undefined: all differences are zero (n = 2)."
@@ -225,7 +227,7 @@ def test_what_is_undefined_is_said_in_words() -> None:
 def test_names_that_can_be_read_in_two_ways_are_not_taken_apart() -> None:
     conditions = ["a", "a - b", "b - c", "c"]
     rows, told = a_study(conditions, [(1, 2, 3, 4), (2, 4, 3, 1), (5, 4, 2, 2)], [{"test": "t_paired"}])
-    said = [(row["contrast"], sentence(row, told)) for row in rows]
+    said = [(row["contrast"], full_sentence(row, told)) for row in rows]
     assert "between a and c (" in dict(said)["a - c"]
     for contrast, text in said:
         assert text.startswith("M: the effect of a − b − c was not") == (contrast == "a - b - c")
@@ -234,7 +236,7 @@ def test_names_that_can_be_read_in_two_ways_are_not_taken_apart() -> None:
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_stay_as_they_are_in_sentences_and_do_no_harm_in_bibtex(name: str) -> None:
     rows, told = a_study([name, "b"], [(1, 2), (2, 5), (3, 4)], [{"test": "rm_anova"}])
-    assert f"with b by 1.67 s, 83.3 %; {name}: M = 2.00" in sentence(rows[0], told)
+    assert f"with b by 1.67 s, 83.3 %; {name}: M = 2.00" in full_sentence(rows[0], told)
     study = Study(title=name, citation=f"{name} {{ }} % @article{{x,", conditions=("a",), measures="m.csv")
     (source, *_), text = used(study, [], [], {}), escaped(name)
     assert source.fields["title"] == text

@@ -35,7 +35,7 @@ from pipeline.report.document.model import (
     Table,
 )
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words import interval, number, p_phrase, percent
+from pipeline.words.numbers import interval, number, p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand, as_printed, exit_code
 from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study

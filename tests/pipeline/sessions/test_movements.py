@@ -20,7 +20,7 @@ from pipeline.sessions.movements import Path as HandPath
 from pipeline.sessions.trials import selections_by_trial
 from pipeline.statistics.arrays import FloatArray
 from pipeline.tables import table as tables
-from pipeline.words import measure_label, unit_of
+from pipeline.words.names import measure_label, unit_of
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 

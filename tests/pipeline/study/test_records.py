@@ -14,7 +14,7 @@ from pipeline.study.comparison import Comparison
 from pipeline.study.measures import MEASURES, QUESTIONNAIRES, Section, measure, measure_order
 from pipeline.study.scoring import RULES
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
-from pipeline.words import measure_label
+from pipeline.words.names import measure_label
 
 
 def test_every_test_of_study_yaml_is_computed_by_a_function() -> None:

@@ -13,7 +13,7 @@ from scipy import stats
 from pipeline.report import figures
 from pipeline.report.figures.stated_sd import nine_of_ten, shares
 from pipeline.tables import table as tables
-from pipeline.words import SMOOTHED
+from pipeline.words.accuracy_reference import SMOOTHED
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
 

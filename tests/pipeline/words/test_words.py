@@ -5,19 +5,17 @@ from __future__ import annotations
 import pytest
 
 from pipeline.study.measures import measure_order
-from pipeline.words import (
-    effect_size,
+from pipeline.words.effect_sizes import effect_size
+from pipeline.words.evidence import statistic
+from pipeline.words.names import measure_as_subject, measure_label, short_label
+from pipeline.words.numbers import (
+    fraction,
+    fraction_interval,
     interval,
-    measure_label,
+    milliseconds,
     number,
     p_phrase,
     percent,
-    seconds,
-    share,
-    share_interval,
-    short_label,
-    statistic,
-    subject,
 )
 
 
@@ -40,13 +38,24 @@ def test_numbers(value: float | None, shown: str) -> None:
 def test_p_values_lags_and_shares() -> None:
     assert p_phrase(0.0071) == "p = .0071"
     assert p_phrase(3e-9) == "p < .0001"
-    assert (seconds(0.1166), seconds(-0.0004), seconds(-0.0123), seconds(None)) == ("+117", "0", "−12", "–")
+    assert (milliseconds(0.1166), milliseconds(-0.0004), milliseconds(-0.0123), milliseconds(None)) == (
+        "+117",
+        "0",
+        "−12",
+        "–",
+    )
     assert percent(0.3834) == "38.3 %"
 
 
 def test_what_cannot_exceed_one_has_no_leading_zero_and_p_is_never_nought_or_one() -> None:
-    assert [share(value, 2) for value in (0.157, -0.034, -0.001, 1.0, None)] == [".16", "−.03", ".00", "1.00", "–"]
-    assert share_interval(-0.034, 0.851) == "[−.03, .85]"
+    assert [fraction(value, 2) for value in (0.157, -0.034, -0.001, 1.0, None)] == [
+        ".16",
+        "−.03",
+        ".00",
+        "1.00",
+        "–",
+    ]
+    assert fraction_interval(-0.034, 0.851) == "[−.03, .85]"
     assert [p_phrase(p, digits=3) for p in (0.00049, 0.0071, 0.9994, 0.9996, 1.0)] == [
         "p < .001",
         "p = .007",
@@ -81,7 +90,7 @@ def test_effect_sizes() -> None:
 
 def test_measures_as_subjects() -> None:
     names = ("selection_mse_px2", "completion_time_s", "nasa_tlx/mental", "grip_force, left_s")
-    assert [subject(name) for name in names] == [
+    assert [measure_as_subject(name) for name in names] == [
         "Selection error (MSE)",
         "Completion time",
         "NASA-TLX mental",

@@ -1,0 +1,18 @@
+"""Lists, counts and capitals in a sentence."""
+
+from __future__ import annotations
+
+
+def listing(words: list[str]) -> str:
+    """`a, b and c`, of at least one word."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def counted(count: int, noun: str, plural: str | None = None) -> str:
+    """`1 session`, `3 sessions`."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def capitalized(sentence: str) -> str:
+    """The sentence with a capital letter first. The rest is left alone: names such as NASA-TLX keep their capitals."""
+    return sentence[:1].upper() + sentence[1:]
