@@ -10,9 +10,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pipeline.sessions.logs.log import Log, MessageType, Wanted
-from pipeline.sessions.logs.mcap.container import MAGIC, Walk, walk_log
+from pipeline.sessions.logs.mcap.container import MAGIC, walk_log
 from pipeline.sessions.logs.mcap.payload import counted, decode
 from pipeline.sessions.logs.mcap.schemas import content_of
+from pipeline.sessions.logs.mcap.walk import Walk
 from pipeline.sessions.logs.mcap.writer import Message, in_order, write
 
 __all__ = ["MAGIC", "Message", "in_order", "read", "write"]

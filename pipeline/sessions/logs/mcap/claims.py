@@ -9,8 +9,8 @@ import numpy as np
 
 from pipeline.sessions.logs.log import Claims, IntArray
 from pipeline.sessions.logs.mcap.cdr import NUMBERS
-from pipeline.sessions.logs.mcap.container import Walk
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.walk import Walk
 
 _NAME_BYTES, _NAME = 12, 16  # where the length of the frame's name stands, and its first byte
 _ORIENTATION, _RATE_COVARIANCE, _FORCE_COVARIANCE = 0, 16, 28  # of the 37 numbers of an Imu

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.sessions.logs.log import IntArray
-from pipeline.sessions.logs.mcap.container import BROKEN
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.records import BROKEN
 from pipeline.statistics.arrays import FloatArray
 
 WIDTHS: Mapping[str, int] = {"position": 3, "acceleration": 11}

@@ -16,11 +16,11 @@ from mcap.records import Channel, Schema
 from pipeline.errors import SessionError
 from pipeline.sessions.logs.log import Claims, Content, IntArray, Readings
 from pipeline.sessions.logs.mcap.claims import claimed
-from pipeline.sessions.logs.mcap.container import Walk
 from pipeline.sessions.logs.mcap.events import EVENTS_LIMIT, event
 from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields
 from pipeline.sessions.logs.mcap.messages import Messages, joined
 from pipeline.sessions.logs.mcap.schemas import SAMPLED
+from pipeline.sessions.logs.mcap.walk import Walk
 from pipeline.statistics.arrays import FloatArray
 
 _DECODERS: Mapping[str, str] = {
