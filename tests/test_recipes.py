@@ -131,8 +131,8 @@ RECIPES: dict[str, dict[str, Edit]] = {
             '    "count_signs": pairwise(lambda _, one, two: sign_of_means(one, two)),\n    "crossover": ',
             1,
         ).replace(
-            "from pipeline.statistics.rank import wilcoxon",
-            "from pipeline.statistics.paired import sign_of_means\nfrom pipeline.statistics.rank import wilcoxon",
+            "from pipeline.statistics.wilcoxon import wilcoxon",
+            "from pipeline.statistics.paired import sign_of_means\nfrom pipeline.statistics.wilcoxon import wilcoxon",
         ),
         "studies/README.md": after(
             "| test | what it is | effect size |\n|---|---|---|\n", "| `count_signs` | a count | |\n"
@@ -148,7 +148,7 @@ RECIPES: dict[str, dict[str, Edit]] = {
     },
     "A section of the report with a table": {
         "pipeline/report/sections/": lambda _: SECTION,
-        "pipeline/report/sections/__init__.py": lambda text: text.replace(
+        "pipeline/report/sections/order.py": lambda text: text.replace(
             "    provenance.section,\n)", "    provenance.section,\n    counts.section,\n)"
         ).replace("from pipeline.report.sections import (\n", "from pipeline.report.sections import (\n    counts,\n"),
     },

@@ -6,8 +6,9 @@ from pipeline.engine.jobs import Jobs
 from pipeline.engine.stage import Outcome, Work
 from pipeline.report.document import html, pdf
 from pipeline.report.document.model import Document
-from pipeline.report.sections import SECTIONS, glossary, participants, paste, traces
+from pipeline.report.sections import glossary, participants, paste, traces
 from pipeline.report.sections.material import ORIGINS, Material
+from pipeline.report.sections.order import SECTIONS
 from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import AS_CSV
