@@ -20,8 +20,8 @@ from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.equivalence import tost
 from pipeline.statistics.kruskal import kruskal_pairs, kruskal_wallis
 from pipeline.statistics.mann_whitney import mann_whitney
-from pipeline.statistics.rank import wilcoxon
 from pipeline.statistics.welch import anova_welch, games_howell
+from pipeline.statistics.wilcoxon import wilcoxon
 from pipeline.study.comparison import Comparison
 from pipeline.study.csv_tables import read_participants
 from pipeline.study.measures import has_total, measure_order

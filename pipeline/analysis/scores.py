@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.statistics.scoring import MISSING, OUT_OF_RANGE, Fault, cronbach_alpha, scored
-from pipeline.study.scoring import RULES, ScoringRule
+from pipeline.statistics.questionnaire_scores import MISSING, OUT_OF_RANGE, Fault, cronbach_alpha, participant_scores
+from pipeline.study.scoring_rules import RULES, ScoringRule
 from pipeline.study.scoring_settings import OWN_RULES
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
@@ -120,7 +120,7 @@ def score_values(scored_by: Sequence[Instrument], values: pd.DataFrame, exclusio
             for name, value in zip(cell_answers["measure"], cell_answers["value"], strict=True):
                 item, is_weight = names[name]
                 (weights if is_weight else ratings)[item] = float(value)
-            result = scored(
+            result = participant_scores(
                 ratings, instrument.rule.scales, instrument.limits, instrument.rule.reversed, weights or None
             )
             who: Row = {"participant": participant, "condition": condition, "session": _or_none(session)}

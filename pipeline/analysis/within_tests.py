@@ -16,10 +16,10 @@ from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.art import art_anova, art_contrasts
 from pipeline.statistics.crossover import crossover
+from pipeline.statistics.friedman import friedman
 from pipeline.statistics.logarithms import exponential, ratio_follow_ups, rm_anova_of_logarithms, t_paired_ratio
 from pipeline.statistics.mixed import Factor, cells_of, mixed_model
 from pipeline.statistics.paired import t_paired
-from pipeline.statistics.rank import friedman
 from pipeline.statistics.result import IntArray, Result
 from pipeline.statistics.shape import cell_shape
 from pipeline.tables.table import Row

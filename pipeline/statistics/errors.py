@@ -10,7 +10,7 @@ from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NOT_BINARY, with_statsmodels
 from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.rank import friedman
+from pipeline.statistics.friedman import friedman
 from pipeline.statistics.result import Result, too_few
 
 ONE_SIDED = "no finite odds ratio: nobody's answer changed in the other direction"

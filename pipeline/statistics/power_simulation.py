@@ -15,8 +15,8 @@ from scipy import linalg, stats
 
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.power import Design
-from pipeline.statistics.rank import signed_rank_p
 from pipeline.statistics.search import smallest
+from pipeline.statistics.wilcoxon import signed_rank_p
 
 BoolArray = npt.NDArray[np.bool_]
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, cast
 from pydantic import BeforeValidator, Field, model_validator
 
 from pipeline.study.fields import Finite, Frozen, Id, known
-from pipeline.study.scoring import RULES, ScoringRule, own_rule
+from pipeline.study.scoring_rules import RULES, ScoringRule, own_rule
 
 OWN_RULES = ("mean", "sum")
 """Rules of a study's own: the mean or the sum of all items."""

@@ -13,7 +13,7 @@ from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.clustered import Family, Trials, gee
-from pipeline.statistics.rank import wilcoxon
+from pipeline.statistics.wilcoxon import wilcoxon
 
 STUDIES, LARGE = 1000, 20_000
 SHIFTS = (0.0, 0.3, 0.6, 1.0, 1.5)

@@ -240,7 +240,7 @@ MUTANTS = (
     Mutant("sum(limits) - value if item in reversed_items", "limits[1] - value if item in reversed_items", _SCORING),
     Mutant("100 * (mean - low) / (high - low)", "100 * mean / (high - low)", _SCORING),
     Mutant("mean - (low + high) / 2", "mean - (high - low) / 2", _SCORING),
-    Mutant("float(np.average(values, weights=weigh))", "float(np.average(values))", _SCORING),
+    Mutant("float(np.average(values, weights=item_weights))", "float(np.average(values))", _SCORING),
     Mutant("all(total >= comb(count, 2)", "all(total >= 0", _SCORING),
     Mutant("df1, df2 = n - 1, (n - 1) * (k - 1)", "df1, df2 = n - 1, (n - 1) * k", _SCORING),
     Mutant("np.any(values <= 0)", "np.any(values < 0)", _LOGARITHMS),

@@ -14,9 +14,9 @@ from pipeline.statistics.anova import contrasts
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mann_whitney import rank_sum_p
 from pipeline.statistics.multiplicity import adjusted
-from pipeline.statistics.rank import signed_rank_p
 from pipeline.statistics.result import IntArray, rounded_differences
 from pipeline.statistics.sphericity import sphericity
+from pipeline.statistics.wilcoxon import signed_rank_p
 
 Figures = dict[str, float | None]
 

@@ -55,16 +55,16 @@ def test_a_module_reaches_the_stages_that_import_it(copied: Path) -> None:
     assert reached_by(copied, "fusion_core/window/gp.py") == {"fuse", "assess", "compare", "report"}
     assert reached_by(copied, "pipeline/sessions/logs/mcap/container.py") == {"ingest"}
     assert reached_by(copied, "pipeline/sessions/logs/mcap/protobuf_template.py") == {"ingest"}
-    assert reached_by(copied, "pipeline/statistics/rank.py") == {"compare"}
+    assert reached_by(copied, "pipeline/statistics/wilcoxon.py") == {"compare"}
     assert reached_by(copied, "pipeline/words/numbers.py") >= {"compare", "report"}
 
 
 def test_a_new_import_is_followed(copied: Path) -> None:
     path = "pipeline/sessions/ingest.py"
-    importing = (copied / path).read_bytes() + b"\nimport pipeline.statistics.rank\n"
+    importing = (copied / path).read_bytes() + b"\nimport pipeline.statistics.wilcoxon\n"
     original = (copied / path).read_bytes()
     (copied / path).write_bytes(importing)
-    assert reached_by(copied, "pipeline/statistics/rank.py") == {"ingest", "compare"}
+    assert reached_by(copied, "pipeline/statistics/wilcoxon.py") == {"ingest", "compare"}
     (copied / path).write_bytes(original)
 
 

@@ -15,7 +15,7 @@ from pipeline.statistics import STATUSES
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.clustered import Family, Trials, gee
 from pipeline.statistics.errors import cochran_q, mcnemar
-from pipeline.statistics.rank import friedman
+from pipeline.statistics.friedman import friedman
 from pipeline.statistics.result import Result
 from tests.pipeline import r_reference
 

@@ -33,8 +33,8 @@ from pipeline.statistics.power_simulation import (
     t_paired_p,
     wilcoxon_significant,
 )
-from pipeline.statistics.rank import wilcoxon
 from pipeline.statistics.sample_size import sample_size
+from pipeline.statistics.wilcoxon import wilcoxon
 from tests.pipeline.helpers import Ran, run
 
 Power = Callable[..., Ran]

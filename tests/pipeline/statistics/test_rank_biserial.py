@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.statistics.rank import wilcoxon
+from pipeline.statistics.wilcoxon import wilcoxon
 from tests.pipeline import r_reference
 
 CASES = [name for name in r_reference.expected("rank_biserial") if name != "versions"]

@@ -22,9 +22,10 @@ from pipeline.statistics.effect_size import (
     partial_eta_squared_interval,
 )
 from pipeline.statistics.equivalence import tost
+from pipeline.statistics.friedman import friedman
 from pipeline.statistics.paired import t_paired
-from pipeline.statistics.rank import friedman, wilcoxon
 from pipeline.statistics.result import Result, rounded_differences
+from pipeline.statistics.wilcoxon import wilcoxon
 
 EPOCH_US = (
     np.array([123456, 98765, 150001, 99999, 134567, 88888, 101010], dtype=float)

@@ -13,8 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.statistics.paired import t_paired
-from pipeline.statistics.scoring import IMPOSSIBLE_WEIGHTS, Fault, Scored, cronbach_alpha, scored
-from pipeline.study.scoring import RULES, ScoringRule, own_rule
+from pipeline.statistics.questionnaire_scores import (
+    IMPOSSIBLE_WEIGHTS,
+    Fault,
+    ParticipantScores,
+    cronbach_alpha,
+    participant_scores,
+)
+from pipeline.study.scoring_rules import RULES, ScoringRule, own_rule
 from tests.pipeline import r_reference
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "scoring"
@@ -26,10 +32,10 @@ def score(
     answers: Mapping[str, float | None],
     limits: tuple[float, float] | None = None,
     weights: Mapping[str, float | None] | None = None,
-) -> Scored:
+) -> ParticipantScores:
     stated = limits or rule.limits
     assert stated is not None
-    return scored(answers, rule.scales, stated, rule.reversed, weights)
+    return participant_scores(answers, rule.scales, stated, rule.reversed, weights)
 
 
 def in_order(rule: ScoringRule, *answers: float | None) -> dict[str, float | None]:

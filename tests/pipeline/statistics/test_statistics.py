@@ -17,9 +17,10 @@ from scipy import stats
 from pipeline.statistics import STATUSES
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.effect_size import hedges_correction, noncentral_t_cdf, partial_eta_squared_interval
+from pipeline.statistics.friedman import friedman
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
-from pipeline.statistics.rank import friedman, hodges_lehmann, signed_rank_p, wilcoxon
+from pipeline.statistics.wilcoxon import hodges_lehmann, signed_rank_p, wilcoxon
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.reference import (
     BAYES,

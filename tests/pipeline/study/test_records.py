@@ -12,7 +12,7 @@ from pipeline.analysis.comparisons import RUN
 from pipeline.report.prose import references
 from pipeline.study.comparison import Comparison
 from pipeline.study.measures import MEASURES, QUESTIONNAIRES, Section, measure, measure_order
-from pipeline.study.scoring import RULES
+from pipeline.study.scoring_rules import RULES
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from pipeline.words.names import measure_label
 

@@ -14,9 +14,10 @@ from scipy import stats
 from pipeline.analysis.audit.audit import audit
 from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.statistics.anova import rm_anova
+from pipeline.statistics.friedman import friedman
 from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
-from pipeline.statistics.rank import friedman, wilcoxon
+from pipeline.statistics.wilcoxon import wilcoxon
 from pipeline.study.printed import Publication
 
 Row = dict[str, Any]

@@ -20,7 +20,7 @@ from pipeline.analysis.audit.signed_rank import (
     smallest_p,
     untied_p_possible,
 )
-from pipeline.statistics.rank import signed_rank_p
+from pipeline.statistics.wilcoxon import signed_rank_p
 from pipeline.study.rounded import Interval, Rounded
 
 

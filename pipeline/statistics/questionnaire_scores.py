@@ -1,4 +1,4 @@
-"""Scores of questionnaires, from a table item → rating, and how well the items of a scale agree."""
+"""The scores of one participant's questionnaire from its ratings, and Cronbach's α of a scale's items."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ MISSING, OUT_OF_RANGE, IMPOSSIBLE_WEIGHTS = "missing", "out of range", "weights 
 
 @dataclass(frozen=True)
 class Fault:
-    """Why scores are undefined: an item's rating or weight is missing or out of range, or the weights do not add up.
+    """Why `scores` are undefined: an item's rating or weight is missing or out of range, or the weights do not add up.
 
-    `item` is empty where it is the weights as a whole; `value` is what was found (then their sum), None if nothing.
+    `value` is the offending rating or weight, None where it is missing. Where the weights as a whole are at fault,
+    `item` is empty and `value` is their sum.
     """
 
     item: str
@@ -32,51 +33,51 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Scored:
+class ParticipantScores:
     """A participant's scores in one condition, None where one is undefined, and every reason for that."""
 
     scores: Mapping[str, float | None]
     faults: tuple[Fault, ...]
 
 
-def scored(
+def participant_scores(
     ratings: Mapping[str, float | None],
     scales: Sequence[Scale],
     limits: tuple[float, float],
     reversed_items: Collection[str] = (),
     weights: Mapping[str, float | None] | None = None,
-) -> Scored:
+) -> ParticipantScores:
     """The scores of one participant in one condition from ratings by item; items of no scale are ignored.
 
     A score is undefined where one of its items is missing (absent, None or NaN) or outside the `limits`, the lowest
-    and the highest answer. A weighted score also needs possible `weights` by item: how often each item was chosen
-    when every two were compared.
+    and the highest answer. A weighted score also needs `weights` by item: how often each item was chosen when every
+    two were compared. Weights that no such comparison can give leave it undefined.
     """
-    known = {item: _number(ratings.get(item)) for scale in scales for item in scale.items}
+    rating_of = {item: _number(ratings.get(item)) for scale in scales for item in scale.items}
     faults = [
         Fault(item, what, value, tuple(scale.name for scale in scales if item in scale.items))
-        for item, value in known.items()
-        if (what := _wrong(value, limits)) is not None
+        for item, value in rating_of.items()
+        if (what := _fault(value, limits)) is not None
     ]
-    chosen = {item: _number(value) for item, value in (weights or {}).items()}
-    faults += [fault for scale in scales if scale.weighted for fault in _weight_faults(scale, chosen)]
+    weight_of = {item: _number(value) for item, value in (weights or {}).items()}
+    faults += [fault for scale in scales if scale.weighted for fault in _weight_faults(scale, weight_of)]
     undefined = {name for fault in faults for name in fault.scores}
-    turned = {
+    aligned = {
         item: sum(limits) - value if item in reversed_items else value
-        for item, value in known.items()
+        for item, value in rating_of.items()
         if value is not None
     }
-    return Scored(
-        {scale.name: None if scale.name in undefined else _score(scale, turned, chosen, limits) for scale in scales},
-        tuple(faults),
-    )
+    scores = {
+        scale.name: None if scale.name in undefined else _score(scale, aligned, weight_of, limits) for scale in scales
+    }
+    return ParticipantScores(scores, tuple(faults))
 
 
 def _number(value: float | None) -> float | None:
     return None if value is None or not isfinite(value) else float(value)
 
 
-def _wrong(value: float | None, limits: tuple[float, float]) -> str | None:
+def _fault(value: float | None, limits: tuple[float, float]) -> str | None:
     if value is None:
         return MISSING
     return None if limits[0] <= value <= limits[1] else OUT_OF_RANGE
@@ -86,7 +87,7 @@ def _weight_faults(scale: Scale, weights: Mapping[str, float | None]) -> Iterato
     """Weights of k items: whole numbers up to k − 1, and any j of them sum to at least j(j − 1)/2 (Landau 1953)."""
     by_item = [weights.get(item) for item in scale.items]
     most = len(scale.items) - 1
-    single = [_wrong(weight, (0, most)) for weight in by_item]
+    single = [_fault(weight, (0, most)) for weight in by_item]
     yield from (
         Fault(item, f"weight {what}", weight, (scale.name,))
         for item, weight, what in zip(scale.items, by_item, single, strict=True)
@@ -94,32 +95,32 @@ def _weight_faults(scale: Scale, weights: Mapping[str, float | None]) -> Iterato
     )
     if any(single):
         return
-    whole = sorted(weight for weight in by_item if weight is not None)
-    sums = list(accumulate(whole))
+    ascending = sorted(weight for weight in by_item if weight is not None)
+    sums = list(accumulate(ascending))
     enough = all(total >= comb(count, 2) for count, total in enumerate(sums, 1))
-    if sums[-1] != comb(len(whole), 2) or not enough or any(weight % 1 for weight in whole):
+    if sums[-1] != comb(len(ascending), 2) or not enough or any(weight % 1 for weight in ascending):
         yield Fault("", IMPOSSIBLE_WEIGHTS, sums[-1], (scale.name,))
 
 
 def _score(
     scale: Scale,
-    turned: Mapping[str, float],
+    aligned: Mapping[str, float],
     weights: Mapping[str, float | None],
     limits: tuple[float, float],
 ) -> float:
-    """A score whose items are all there; reversed ones are turned already."""
+    """A score from all its items, `aligned`: reversed items are turned already."""
     low, high = limits
-    values = np.array([turned[item] for item in scale.items])
-    weigh = np.array([weights.get(item) or 0.0 for item in scale.items]) if scale.weighted else None
-    mean = float(np.average(values, weights=weigh))
-    read = {
+    values = np.array([aligned[item] for item in scale.items])
+    item_weights = np.array([weights.get(item) or 0.0 for item in scale.items]) if scale.weighted else None
+    mean = float(np.average(values, weights=item_weights))
+    by_reading = {
         "mean": mean,
         "sum": float(np.sum(values)),
         "centred": mean - (low + high) / 2,
         "percent": 100 * (mean - low) / (high - low),
         "points": float(np.sum(values - low)),
     }
-    return scale.factor * read[scale.reading]
+    return scale.factor * by_reading[scale.reading]
 
 
 def cronbach_alpha(items: FloatArray) -> Result:

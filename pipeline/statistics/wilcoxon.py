@@ -1,4 +1,4 @@
-"""Rank tests: Wilcoxon signed-rank and Friedman, both exact with ties and zeros.
+"""The Wilcoxon signed-rank test, exact with ties and zeros.
 
 Theory of operation
 ===================
@@ -19,8 +19,6 @@ Before anything is ranked, differences that only round-off parts are made equal,
 (`result.rounded_differences`): 0.3 − 0.2 and 0.2 − 0.1 tie. scipy, pingouin and R do not do that, and each then
 breaks ties one way or the other.
 
-Friedman's statistic is exact in the same spirit, over the orders of each person's ranks (`friedman_exact`).
-
 What must stay true. p is the share of sign patterns with a W as far from its mean or farther: the tests enumerate all
 patterns for small n. The doubled ranks are whole numbers; anything else would need another lattice. Above
 `EXACT_UP_TO` pairs the normal approximation is taken, and `method` says so.
@@ -36,27 +34,17 @@ from scipy import optimize, signal, special, stats
 
 from pipeline.statistics import ALL_ZERO
 from pipeline.statistics.arrays import FloatArray
-from pipeline.statistics.friedman_exact import friedman_p
 from pipeline.statistics.rank_biserial import rank_biserial, rank_biserial_interval
 from pipeline.statistics.result import (
     IntArray,
     Result,
-    degenerate,
-    room_of,
     rounded_differences,
-    step_of,
-    tied,
     too_few,
 )
 
 EXACT_UP_TO = 3000  # pairs: beyond, the Walsh averages alone would fill the memory
 _BLOCK = 256
 _SHARPEST = -50.0
-NO_SPREAD = "no interval: leaving out one participant after the other shows no spread to judge by"
-TWO_PEOPLE = "no interval: it needs three participants"
-_BY_CHI2 = "Friedman, chi-squared approximation, ties corrected"
-_BY_ORDERS = "Friedman, exact over all orders of each participant's ranks, ties corrected"
-_BY_SIGNS = "Friedman of two conditions, exact: the sign test"
 
 
 def wilcoxon(
@@ -172,77 +160,3 @@ def hodges_lehmann(differences: FloatArray, level: float = 0.95) -> tuple[float,
     outside = int(np.searchsorted(cumulative, (1 - level) / 2 * (1 + 1e-12), side="right"))
     interval = (float(walsh[outside - 1]), float(walsh[-outside])) if outside > 0 else None
     return float(np.median(walsh)), interval
-
-
-def friedman(values: FloatArray, effect: str = "condition") -> Result:
-    """Friedman's test of values (n, k) with ties corrected, exact where that takes no longer than about a second.
-
-    Of two conditions it is the sign test. Beside it the p of χ² and Iman and Davenport's F. Effect size: Kendall's W,
-    with an interval by the jackknife over participants.
-    """
-    n, k = values.shape
-    blank = Result(effect, "chi2", _BY_CHI2, "Kendall's W", n, df1=k - 1)
-    status = too_few(n) or degenerate(values)
-    if status is not None:
-        return replace(blank, status=status)
-    room = room_of(values, step_of(values))
-    ranks = np.array([stats.rankdata(tied(*row)) for row in zip(values, room, strict=True)])
-    agreement = float(_agreement(n, ranks.sum(axis=0), np.sum(ranks**2)))
-    statistic = n * (k - 1) * agreement
-    low, high = _agreement_interval(ranks)
-    left = n * (k - 1) - statistic
-    f = (n - 1) * statistic / left if left > 1e-9 else None
-    by_chi2 = float(stats.chi2.sf(statistic, k - 1))
-    exact = _sign_p(ranks) if k == 2 else friedman_p(ranks)
-    return replace(
-        blank,
-        method=_BY_CHI2 if exact is None else _BY_SIGNS if k == 2 else _BY_ORDERS,
-        statistic=statistic,
-        p=by_chi2 if exact is None else exact,
-        effect_size=agreement,
-        ci_low=low,
-        ci_high=high,
-        details={
-            "chi2_p": by_chi2,
-            "iman_davenport_f": f,
-            "iman_davenport_p": None if f is None else float(stats.f.sf(f, k - 1, (k - 1) * (n - 1))),
-            **({"no_interval": NO_SPREAD if n > 2 else TWO_PEOPLE} if low is None else {}),
-        },
-    )
-
-
-def _sign_p(ranks: FloatArray) -> float:
-    """Of two conditions: how many participants rank the first above the second, by the binomial distribution."""
-    above, below = int(np.sum(ranks[:, 0] > ranks[:, 1])), int(np.sum(ranks[:, 0] < ranks[:, 1]))
-    return float(stats.binomtest(above, above + below).pvalue)
-
-
-def _agreement(n: int, sums: FloatArray, squares: FloatArray) -> FloatArray:
-    """Kendall's W, corrected for ties, from the sums of n people's ranks (…, k) and of their squares (…)."""
-    k = sums.shape[-1]
-    expected = n * (k + 1) / 2
-    agreement: FloatArray = np.sum((sums - expected) ** 2, axis=-1) / (n * squares - k * expected**2)
-    return agreement
-
-
-def _agreement_interval(ranks: FloatArray, level: float = 0.95) -> tuple[float | None, float | None]:
-    """By the jackknife (Arvesen 1969) of Fisher's z of the mean rank correlation ρ, where W = (1 + (n − 1)ρ) / n.
-
-    None at perfect agreement, where z is infinite, and below three participants. In simulations of 6 to 24
-    participants and 3 or 4 conditions 90 to 98 % of intervals held W; fewer where W was above .8 of three conditions
-    (82 % at n = 12, 63 % at n = 6).
-    """
-    n, k = ranks.shape
-    varied = np.sum((ranks - (k + 1) / 2) ** 2, axis=1)
-    if n < 3 or np.any(varied.sum() - varied < 1e-9):
-        return None, None
-    sums, squares = ranks.sum(axis=0), np.sum(ranks**2, axis=1)
-    whole = (n * float(_agreement(n, sums, squares.sum())) - 1) / (n - 1)
-    if whole > 1 - 1e-12:
-        return None, None
-    without = ((n - 1) * _agreement(n - 1, sums - ranks, squares.sum() - squares) - 1) / (n - 2)
-    influence = n * whole - (n - 1) * without
-    margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * float(np.std(influence, ddof=1)) / np.sqrt(n)
-    bounds = np.tanh(np.arctanh(whole) + np.array([-1, 1]) * margin / (1 - whole**2))
-    low, high = np.clip((1 + (n - 1) * bounds) / n, 0.0, 1.0)
-    return float(low), float(high)
