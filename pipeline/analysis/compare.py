@@ -145,11 +145,15 @@ def _without_accuracy(work: Work, quality: pd.DataFrame, accuracy: pd.DataFrame)
 
 
 def _participant_facts(work: Work, measures: pd.DataFrame) -> Row:
-    """The number of participants, and the facts about them from participants.csv."""
-    if work.study.participants is not None:
-        return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants))
-    people = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
-    return {"n": len(people)}
+    """The number of participants with a value or a session that counts, and the facts of participants.csv about them.
+
+    Who is listed there and has neither was not analysed.
+    """
+    counting = (session for session in work.sessions if not work.study.exclusion_of(session))
+    people = set(measures["participant"]) | {str(session.participant) for session in counting}
+    if work.study.participants is None:
+        return {"n": len(people)}
+    return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants), people)
 
 
 def _session_exclusions(work: Work) -> list[Row]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -204,9 +204,13 @@ def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, 
     return table, factors
 
 
-def participant_facts(table: pd.DataFrame) -> dict[str, Any]:
-    """How many, of which sex and age, for the report; what the file does not say is left out."""
-    facts: dict[str, Any] = {"n": len(table)}
+def participant_facts(listed: pd.DataFrame, analysed: Collection[str]) -> dict[str, Any]:
+    """How many were analysed, how many are listed, and the sex and age of those who are both, for the report.
+
+    What the file does not say is left out.
+    """
+    facts: dict[str, Any] = {"n": len(analysed), "listed": len(listed)}
+    table = listed[listed["participant"].isin(list(analysed))]
     columns = {str(name).lower(): str(name) for name in table}
     for name in ("sex", "gender"):
         if name in columns:

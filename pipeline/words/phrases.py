@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 
 def listing(words: list[str]) -> str:
     """`a, b and c`, of at least one word."""
@@ -16,3 +19,11 @@ def counted(count: int, noun: str, plural: str | None = None) -> str:
 def capitalized(sentence: str) -> str:
     """The sentence with a capital letter first. The rest is left alone: names such as NASA-TLX keep their capitals."""
     return sentence[:1].upper() + sentence[1:]
+
+
+def participants_counted(facts: Mapping[str, Any], who: str = "") -> str:
+    """`12 participants`, or `10 participants analysed of 12 listed` where not all are; `who` tells of them."""
+    people, listed = f"{counted(facts['n'], 'participant')}{who}", facts.get("listed", facts["n"])
+    if facts["n"] == listed:
+        return people
+    return f"{people} analysed of {listed} listed" if facts["n"] < listed else f"{people} analysed, {listed} listed"

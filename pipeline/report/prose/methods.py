@@ -16,7 +16,7 @@ from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
 from pipeline.words.numbers import number
-from pipeline.words.phrases import counted, listing
+from pipeline.words.phrases import counted, listing, participants_counted
 
 _ORIGINS = {
     "simulated": "The data were simulated by a model, not measured with people.",
@@ -42,7 +42,7 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     if study.data_origin in _ORIGINS:
         yield _ORIGINS[study.data_origin]
     facts, conditions = results["study"]["participants"], list(study.conditions)
-    people = counted(facts["n"], "participant") + _who(facts)
+    people = participants_counted(facts, _who(facts))
     if len(conditions) == 1:
         yield f"There were {people} and one condition, {conditions[0]}."
         return

@@ -6,7 +6,7 @@ from pipeline.report.document.model import Block, Notice, Paragraph, Section, St
 from pipeline.report.sections.material import ORIGINS, Material, conditions_text
 from pipeline.words.names import measure_label
 from pipeline.words.numbers import number
-from pipeline.words.phrases import counted, listing
+from pipeline.words.phrases import counted, listing, participants_counted
 
 
 def section(material: Material) -> Section:
@@ -38,12 +38,11 @@ def section(material: Material) -> Section:
 def _participants(material: Material) -> Text:
     """Number, sex and age, as far as participants.csv gives them."""
     facts = material.results["study"]["participants"]
-    text = counted(facts["n"], "participant")
-    if facts.get("sex"):
-        text += f" ({listing([f'{count} {name}' for name, count in facts['sex'].items()])})"
+    who = f" ({listing([f'{count} {name}' for name, count in facts['sex'].items()])})" if facts.get("sex") else ""
     if facts.get("age"):
         age = facts["age"]
-        text += f", aged {number(age['min'], 0)} to {number(age['max'], 0)} years (mean {number(age['mean'], 1)})"
+        who += f", aged {number(age['min'], 0)} to {number(age['max'], 0)} years (mean {number(age['mean'], 1)})"
+    text = participants_counted(facts, f"{who}," if who and facts["n"] != facts["listed"] else who)
     if material.study.participants is None:
         text += "; the study has no participants table, so age and sex are not known"
     return (Strong("Participants: "), text + ".")

@@ -34,7 +34,7 @@ from pipeline.words.effect_sizes import ratio_to_first
 from pipeline.words.evidence import statistic
 from pipeline.words.names import adjustment_label, measure_label, short_label, unit_of
 from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_phrase
-from pipeline.words.phrases import counted, listing
+from pipeline.words.phrases import counted, listing, participants_counted
 from pipeline.words.sentences import brief_sentence, verdict
 
 _KEY_FIGURES_MAX = 3
@@ -212,7 +212,7 @@ def _question(material: Material) -> Text:
     compared = (
         "" if len(conditions) == 1 else f" under {counted(len(conditions), 'condition')}, {listing(list(conditions))}"
     )
-    people = counted(material.results["study"]["participants"]["n"], "participant")
+    people = participants_counted(material.results["study"]["participants"])
     if material.rows("comparisons"):
         return (
             Strong("Do the conditions differ for the people who use them? "),
