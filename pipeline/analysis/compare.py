@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import pandas as pd
 
 from pipeline.analysis.audit.beside_computed import compare_printed
 from pipeline.analysis.comparisons import People, all_requests, compared, people_of
+from pipeline.analysis.descriptives import descriptives, differences, intervals_within
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.fitts_law import fitts_law
 from pipeline.analysis.measure import ALL_DATA
@@ -21,7 +22,6 @@ from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator
-from pipeline.statistics.descriptive import summarize
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.measures import measure_order
 from pipeline.study.preregistration import read_preregistered
@@ -40,14 +40,15 @@ def run(work: Work) -> Outcome:
     for name in study.estimators:
         build_estimator(study, name)  # so that a misspelt estimator is an error even where there is no log to run it on
     measured = work.entry("measure")
-    measures = tables.read("measures", measured)
+    measures, observations = (tables.read(name, measured) for name in ("measures", "observations"))
     frames: dict[str, pd.DataFrame] = {
         "trials": tables.read("trials", measured),
         "measures": measures,
         "reliability": tables.read("reliability", measured),
-        "descriptives": tables.frame("descriptives", descriptives(study, measures)),
+        "descriptives": tables.frame("descriptives", descriptives(study, measures, observations)),
+        "intervals_within": tables.frame("intervals_within", intervals_within(study, measures, observations)),
+        "differences": tables.frame("differences", differences(study, measures)),
     }
-    observations = tables.read("observations", measured)
     people = people_of(study, work.folder)
     rows, left_out = compared(study, measures, observations, people)
     frames["comparisons"] = tables.frame("comparisons", rows)
@@ -168,33 +169,6 @@ def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataF
     """The rows of a table without those of sessions that study.yaml excludes as a whole, which the exclusions list."""
     excluded = {session.id for session in work.sessions if study.exclusion_of(session)}
     return table[~table["session"].isin(excluded)]
-
-
-def descriptives(study: Study, measures: pd.DataFrame) -> list[Row]:
-    """n, mean, SD, median and the t interval of the mean, one row per measure and condition."""
-    rows: list[Row] = []
-    for measure in sorted(set(measures["measure"]), key=measure_order):
-        wide = tables.participant_means(measures, measure, study.conditions)
-        for condition in study.conditions:
-            values = wide[condition].dropna().to_numpy(np.float64)
-            if len(values):
-                rows.append({"measure": measure, "condition": condition, **summarize(values)})
-    return rows + _root_rows(rows)
-
-
-def _root_rows(rows: Iterable[Row]) -> list[Row]:
-    """selection_rmse: the root of the mean over participants of their MSEs, never a mean of RMSEs."""
-    names = {"selection_mse_px2": "selection_rmse_px", "selection_mse_mm2": "selection_rmse_mm"}
-    return [
-        {
-            "measure": names[row["measure"]],
-            "condition": row["condition"],
-            "n": row["n"],
-            "mean": float(np.sqrt(row["mean"])),
-        }
-        for row in rows
-        if row["measure"] in names and row["mean"] >= 0
-    ]
 
 
 def accuracy_means(accuracy: pd.DataFrame) -> list[Row]:

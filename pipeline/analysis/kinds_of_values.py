@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pandas as pd
 
 from pipeline.analysis.complete_cases import Request
 from pipeline.statistics.shape import SKEWED, residual_skewness
@@ -23,9 +24,7 @@ def yes_or_no(requests: Sequence[Request]) -> Iterator[Row]:
     """Measures whose values are all 0 or 1, in tests that treat them as measurements."""
     for name, of_measure in _by_measure(requests):
         rows = of_measure[0].observations[of_measure[0].observations["measure"] == name]
-        ones = (rows["value"] * rows["n"].astype("float64")).to_numpy("float64")
-        whole = len(ones) > 0 and bool((abs(ones - ones.round()) < _WHOLE).all())
-        if not (whole and rows["value"].between(0, 1).all() and rows["value"].nunique() > 1):
+        if not (are_answers(rows) and rows["value"].nunique() > 1):
             continue
         row = {"what": "kind of values", "measure": name, "found": "0 or 1 in every trial"}
         of_answers = [one for one in of_measure if TESTS[one.entry.test].values == "answers"]
@@ -42,6 +41,14 @@ def yes_or_no(requests: Sequence[Request]) -> Iterator[Row]:
             kinds = f"McNemar's or Cochran's test, or a logistic model, suits such data (test: {suited})"
             remark = f"{_labels(as_measured)} treat yes and no as measurements; {kinds}"
             yield {**row, "expected": "measurements", "remark": remark}
+
+
+def are_answers(observations: pd.DataFrame) -> bool:
+    """Are all values behind the observations of a measure 0 or 1, so that each mean of several is a share?"""
+    values = observations["value"].to_numpy(np.float64)
+    ones = values * observations["n"].to_numpy(np.float64)
+    whole = len(ones) > 0 and bool((abs(ones - ones.round()) < _WHOLE).all())
+    return whole and bool(((values >= 0) & (values <= 1)).all())
 
 
 def skewed(requests: Sequence[Request]) -> Iterator[Row]:

@@ -66,3 +66,10 @@ OF_LOGARITHMS = ", of the logarithms"
 
 RATIO = "ratio of geometric means"
 """The effect size of a test of two means of logarithms."""
+
+T = "t"
+WILSON = "Wilson"
+T_OF_SHARES = "t, cut at 0 and 1"
+T_BEYOND = "t, reaching beyond 0 to 1, where all values are"
+NONE_OF_ALIKE = "none: all shares are alike"
+"""How the interval of a condition's mean is computed, as `statistics.descriptive` explains."""

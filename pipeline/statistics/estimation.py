@@ -121,12 +121,14 @@ def _signed_sums(values: FloatArray) -> FloatArray:
     return sums
 
 
-def within_intervals(values: FloatArray, level: float = 0.95) -> list[tuple[float, float] | None]:
+def within_intervals(
+    values: FloatArray, level: float = 0.95, bounded: bool = False
+) -> list[tuple[float, float] | None]:
     """Of each condition's mean, of values (n, k): without the differences between participants, for figures.
 
     Cousineau's (2005) normalization with Morey's (2008) correction √(k/(k − 1)): t intervals of the values less their
     participant's mean. They show what a paired test rests on and are no intervals of the conditions' own means. None
-    for fewer than two participants or conditions.
+    for fewer than two participants or conditions. `bounded`: they are of shares, and are cut at 0 and 1.
     """
     n, k = values.shape
     if n < 2 or k < 2:
@@ -136,7 +138,7 @@ def within_intervals(values: FloatArray, level: float = 0.95) -> list[tuple[floa
     error = np.std(normalized, axis=0, ddof=1) * np.sqrt(k / (k - 1) / n)
     margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * error
     means = scaled.mean(axis=0)
-    return [
-        (float(low), float(high))
-        for low, high in zip(np.ldexp(means - margin, exponent), np.ldexp(means + margin, exponent), strict=True)
-    ]
+    low, high = np.ldexp(means - margin, exponent), np.ldexp(means + margin, exponent)
+    if bounded:
+        low, high = np.clip(low, 0, 1), np.clip(high, 0, 1)
+    return [(float(start), float(end)) for start, end in zip(low, high, strict=True)]

@@ -34,6 +34,15 @@ def cochran_q(values: FloatArray) -> tuple[float, float]:
     return float(result.statistic), float(result.pvalue)
 
 
+def wilson_interval(yes: int, n: int) -> tuple[float, float]:
+    """The 95 % score interval (Wilson 1927) of a share of `yes` among n answers."""
+    with _quiet():
+        from statsmodels.stats.proportion import proportion_confint
+
+        low, high = proportion_confint(yes, n, method="wilson")
+    return float(low), float(high)
+
+
 @dataclass(frozen=True)
 class Estimated:
     """Log odds or log rates (k,), their covariances (k, k), corrected for few clusters and not, means, dispersion."""

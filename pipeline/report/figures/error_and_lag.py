@@ -12,6 +12,7 @@ from pipeline.report.figures.style import (
     GREY,
     MARKS_MAX,
     PALE,
+    arms_of,
     as_label,
     colour,
     draw_mean,
@@ -118,12 +119,12 @@ def lag_and_error(accuracy: pd.DataFrame) -> Figure:
             continue
         rmse, lag = finite(known["rmse_mm"]), 1000 * finite(known["lag_s"])
         axes.scatter(rmse, lag, s=9, color=colour(index), alpha=0.4, linewidth=0, rasterized=len(accuracy) > MARKS_MAX)
-        (x, half_x), (y, half_y) = mean_and_interval(rmse), mean_and_interval(lag)
+        (x, *ends_x), (y, *ends_y) = mean_and_interval(rmse), mean_and_interval(lag)
         axes.errorbar(
             [x],
             [y],
-            xerr=None if np.isnan(half_x) else [half_x],
-            yerr=None if np.isnan(half_y) else [half_y],
+            xerr=arms_of(x, *ends_x),
+            yerr=arms_of(y, *ends_y),
             fmt=marker(index),
             color=colour(index),
             markersize=8,

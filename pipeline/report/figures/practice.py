@@ -110,7 +110,7 @@ def points(trials: pd.DataFrame, width: int) -> tuple[np.ndarray[Any, Any], ...]
     for own in (own for _, own in placed.groupby("point")):
         values = own.groupby("participant")["log"].mean().to_numpy(np.float64)
         if len(values) >= _SHARE_MIN * people:
-            mean, half = mean_and_interval(values)
-            rows.append((float(own["point"].iloc[0]) * width + (width + 1) / 2, mean, mean - half, mean + half))
+            mean, low, high = mean_and_interval(values)
+            rows.append((float(own["point"].iloc[0]) * width + (width + 1) / 2, mean, low, high))
     at, *logs = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return at, *map(np.exp, logs)

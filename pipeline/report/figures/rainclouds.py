@@ -27,6 +27,7 @@ from pipeline.report.figures.style import (
     styled,
 )
 from pipeline.report.figures.wording import complete_counts, listed, mean_with_interval, spaced
+from pipeline.statistics import T_OF_SHARES, WILSON, T
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words.names import measure_label, short_label, unit_of
 from pipeline.words.numbers import MINUS, number
@@ -35,13 +36,19 @@ from pipeline.words.phrases import counted
 _CLOUD = 0.3  # height of a density, where conditions are 1 apart
 _BOX = 0.07  # half the width of the line at the median
 _BESIDE = 0.1  # from a condition's place to that of its mean
+_INTERVALS = {
+    WILSON: " (Wilson's, of answers 0 or 1)",
+    T_OF_SHARES: " (t intervals, cut at 0 and 1, beyond which no share can be)",
+}
 
 
-def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
+def _paired_words(wide: pd.DataFrame, measure: str, shares: bool = False) -> Words:
     """The means, the differences, and how many participants have the same sign."""
+    method = method_of(wide, measure, shares)
     label, unit, complete = measure_label(measure), spaced(unit_of(measure)), wide.dropna()
     means = listed(
-        f"{name} {mean_with_interval(finite(wide[name]))}{unit} (n = {wide[name].count()})" for name in wide.columns
+        f"{name} {mean_with_interval(finite(wide[name]), method)}{unit} (n = {wide[name].count()})"
+        for name in wide.columns
     )
     between = met_one_each(wide)
     who = f"{counted(len(wide), 'participant')}, one condition each" if between else _complete_of(complete)
@@ -54,14 +61,22 @@ def _paired_words(wide: pd.DataFrame, measure: str) -> Words:
     legend_text = (
         " Small marks are participants"
         + (", joined by lines" if len(wide.columns) > 1 and not between else "")
-        + "; shapes show their density, pale bars the middle half of them, large marks the means with 95 % intervals."
+        + "; shapes show their density, pale bars the middle half of them, large marks the means with 95 % intervals"
+        f"{interval_words(wide, measure, shares)}."
     )
-    if draws_within(wide):
+    if draws_within(wide, method):
         legend_text += (
-            f" Thick arms: within-participant 95 % intervals, Cousineau-Morey, of the {len(complete)} complete"
-            " participants; they leave out how far people differ, as paired tests do."
+            f" The arms within are of the {len(complete)} complete participants; they leave out how far people differ,"
+            " as paired tests do."
         )
     return Words(head + legend_text, alt)
+
+
+def interval_words(wide: pd.DataFrame, measure: str, shares: bool = False) -> str:
+    """After "means with 95 % intervals": which kind, where it is not t, and what the thick arms are."""
+    method = method_of(wide, measure, shares)
+    thick = "; thick arms: within-participant 95 % intervals, Cousineau-Morey" if draws_within(wide, method) else ""
+    return f"{_INTERVALS.get(method, '')}{thick}"
 
 
 def met_one_each(wide: pd.DataFrame) -> bool:
@@ -69,9 +84,19 @@ def met_one_each(wide: pd.DataFrame) -> bool:
     return len(wide.columns) > 1 and int(wide.notna().sum(axis=1).max()) <= 1
 
 
-def draws_within(wide: pd.DataFrame) -> bool:
-    """Are there participants who met every condition, so that intervals within participants exist?"""
-    return len(wide.columns) > 1 and len(wide.dropna()) > 1
+def draws_within(wide: pd.DataFrame, method: str) -> bool:
+    """Are there participants who met every condition, so that intervals within participants exist?
+
+    Differences of single answers 0 or 1 are no measurements, and have none.
+    """
+    return method != WILSON and len(wide.columns) > 1 and len(wide.dropna()) > 1
+
+
+def method_of(wide: pd.DataFrame, measure: str, shares: bool = False) -> str:
+    """How the intervals of a measure's means are computed; `shares`: it is of each participant's answers 0 or 1."""
+    from pipeline.statistics.descriptive import interval_method
+
+    return interval_method(finite(wide), shares, unit_of(measure) != "")
 
 
 def _complete_of(complete: pd.DataFrame) -> str:
@@ -91,19 +116,20 @@ def _differences_words(complete: pd.DataFrame, unit: str) -> str:
 
 @drawing(_paired_words)
 @styled
-def paired(wide: pd.DataFrame, measure: str) -> Figure:
+def paired(wide: pd.DataFrame, measure: str, shares: bool = False) -> Figure:
     """Rainclouds of a measure, one per condition, and beside them the differences from the first condition.
 
     `wide` has one row per participant and one column per condition, as `participant_means` gives it. A raincloud shows
-    the participants, joined by lines if complete, their density and quartiles, and the mean with its 95 % t interval
-    and, of conditions that the same people met, the Cousineau-Morey interval within participants.
+    the participants, joined by lines if complete, their density and quartiles, and the mean with its 95 % interval and,
+    of conditions that the same people met, the Cousineau-Morey interval within participants. `shares`: each value is a
+    participant's share of answers 0 or 1.
     """
     complete = wide.dropna()
     compared = len(wide.columns) > 1 and len(complete) > 1
     ratio = [len(wide.columns) + 0.4, len(wide.columns) - 0.4]
     options: dict[str, Any] = {"gridspec_kw": {"width_ratios": ratio}} if compared else {}
     figure, axes = panels(1, 2 if compared else 1, 3.1, **options)
-    _rainclouds(axes[0], wide)
+    _rainclouds(axes[0], wide, method_of(wide, measure, shares))
     _from_zero(axes[0], [wide])
     axes[0].set_ylabel(as_label(measure_label(measure)))
     axes[0].set_title(f"Participants (n = {len(wide) if met_one_each(wide) else f'{len(complete)} complete'})")
@@ -150,7 +176,7 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
     """The same for every scale of a questionnaire: one small panel per scale, all with the same axis."""
     figure, every, across = multiples(len(wide), 1.9, a_row=3, sharex=False)
     for index, (axes, (measure, table)) in enumerate(zip(every, wide.items(), strict=True)):
-        _rainclouds(axes, table, small=True)
+        _rainclouds(axes, table, method_of(table, measure), small=True)
         axes.set_title(f"{as_label(short_label(measure), 24)} (n = {len(table.dropna())})")
         if index % across == 0:
             axes.set_ylabel("Rating")
@@ -158,7 +184,7 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
     return figure
 
 
-def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
+def _rainclouds(axes: Axes, wide: pd.DataFrame, method: str, small: bool = False) -> None:
     """One raincloud per condition: participants in the middle, density outside, mean and quartiles between."""
     at = np.arange(len(wide.columns))
     complete = wide.dropna().to_numpy(np.float64)
@@ -167,13 +193,14 @@ def _rainclouds(axes: Axes, wide: pd.DataFrame, small: bool = False) -> None:
         axes.plot(at, complete.T, color=GREY, **faint)
     from pipeline.statistics.estimation import within_intervals
 
-    within = within_intervals(complete)
+    bounded = method == T_OF_SHARES
+    within = within_intervals(complete, bounded=bounded) if draws_within(wide, method) else [None] * len(at)
     for index, condition in enumerate(wide.columns):
         side = -1 if index == 0 and len(at) > 1 else 1  # the lines from the first condition lead to the right
         ends = within[index]
         if ends is not None:  # in two tiers, as Baguley (2012) has them: inside the interval of the mean itself
             axes.vlines(index + side * _BESIDE, *ends, color=colour(index), linewidth=3.5 if small else 5, zorder=4)
-        _raincloud(axes, index, side, finite(wide[condition]), (colour(index), marker(index)))
+        _raincloud(axes, index, side, finite(wide[condition]), (colour(index), marker(index)), method)
     length = max(8, (24 if small else 40) // len(at))
     axes.set_xticks(at, [as_label(condition, length) for condition in wide.columns])
     axes.set_xlim(-0.6, len(at) - 0.4)
@@ -186,7 +213,7 @@ def _from_zero(axes: Axes, tables: Iterable[pd.DataFrame]) -> None:
         axes.set_ylim(bottom=0)
 
 
-def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple[str, str]) -> None:
+def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple[str, str], method: str = T) -> None:
     """Participants, density, quartiles and mean of one condition."""
     if not len(values):
         return
@@ -203,7 +230,7 @@ def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple
         place = at + side * 0.2
         axes.vlines(place, low, high, color=shade, linewidth=5, alpha=0.35, zorder=2)
         axes.hlines(middle, place - _BOX, place + _BOX, color=shade, linewidth=1.2, zorder=3)
-    draw_mean(axes, at + side * _BESIDE, values, look)
+    draw_mean(axes, at + side * _BESIDE, values, look, method=method)
 
 
 def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArray] | None:

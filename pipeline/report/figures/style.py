@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import showable
+from pipeline.statistics import T
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words.numbers import MINUS, THIN_SPACE
 
@@ -139,16 +140,12 @@ def legend(figure: Figure, axes: Iterable[Axes], columns: int = 4, place: Place 
         figure.legend(list(handles.values()), list(handles), loc=place, ncols=columns)
 
 
-def mean_and_interval(values: FloatArray) -> tuple[float, float]:
-    """Mean and half the width of its 95 % t interval; NaN where there are too few values."""
-    if len(values) == 0:
-        return np.nan, np.nan
-    if len(values) < 2:
-        return float(values[0]), np.nan
-    from scipy import stats
+def mean_and_interval(values: FloatArray, method: str = T) -> tuple[float, float, float]:
+    """Mean and the ends of its 95 % interval by a method of `statistics.descriptive`; NaN for what there is none of."""
+    from pipeline.statistics.descriptive import mean_interval
 
-    half = stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
-    return float(np.mean(values)), float(half)
+    mean = float(np.mean(values)) if len(values) else np.nan
+    return mean, *(mean_interval(values, method) or (np.nan, np.nan))
 
 
 def finite(values: Any) -> FloatArray:
@@ -158,15 +155,17 @@ def finite(values: Any) -> FloatArray:
     return kept
 
 
-def draw_mean(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], upright: bool = True) -> None:
+def draw_mean(
+    axes: Axes, at: float, values: FloatArray, look: tuple[str, str], upright: bool = True, method: str = T
+) -> None:
     """Draw a mean with its 95 % interval at a place on the axis; `look` is colour and marker."""
-    mean, half = mean_and_interval(values)
+    mean, low, high = mean_and_interval(values, method)
     shade, mark = look
     place = ([at], [mean]) if upright else ([mean], [at])
-    arms: dict[str, Any] = {"yerr" if upright else "xerr": None if np.isnan(half) else [half]}
+    ends: dict[str, Any] = {"yerr" if upright else "xerr": arms_of(mean, low, high)}
     axes.errorbar(
         *place,
-        **arms,
+        **ends,
         fmt=mark,
         color=shade,
         markersize=8,
@@ -175,6 +174,11 @@ def draw_mean(axes: Axes, at: float, values: FloatArray, look: tuple[str, str], 
         linewidth=2,
         zorder=4,
     )
+
+
+def arms_of(mean: float, low: float, high: float) -> FloatArray | None:
+    """The interval of a single mean as matplotlib takes it; None where there is none."""
+    return None if np.isnan(low) else np.array([[mean - low], [high - mean]])
 
 
 def arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -8,16 +8,17 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report.figures.style import mean_and_interval
+from pipeline.statistics import T
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words.numbers import interval, number
 
 _LISTED_MAX = 8  # a sentence with more parts is hard to read
 
 
-def mean_with_interval(values: FloatArray, digits: int = 2) -> str:
+def mean_with_interval(values: FloatArray, method: str = T, digits: int = 2) -> str:
     """`12.30 [10.10, 14.50]`: a mean, with its 95 % interval if there is one."""
-    mean, half = mean_and_interval(values)
-    return number(mean, digits) + ("" if np.isnan(half) else f" {interval(mean - half, mean + half, digits)}")
+    mean, low, high = mean_and_interval(values, method)
+    return number(mean, digits) + ("" if np.isnan(low) else f" {interval(low, high, digits)}")
 
 
 def listed(parts: Iterable[str], joint: str = "; ") -> str:

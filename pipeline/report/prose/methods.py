@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from pipeline.sessions.estimators import build_estimator
+from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON
 from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES
 from pipeline.study.comparison import Comparison
 from pipeline.study.settings import Study
@@ -32,6 +33,7 @@ def methods(study: Study, results: Mapping[str, Any], versions: Mapping[str, str
         *_estimators(study),
         *_without_reference(results),
         *_tests(study, results["comparisons"]),
+        *_intervals(results["descriptives"]),
         *_exclusions(study, results["exclusions"]),
         *_software(versions),
     ]
@@ -145,6 +147,24 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
         yield "With more than two conditions, p was corrected for sphericity (Greenhouse-Geisser)."
     yield f"The level of significance was {_level(study.alpha)}; intervals are 95 % intervals."
+
+
+def _intervals(rows: Sequence[Row]) -> Iterator[str]:
+    """How the intervals of means were computed, where it is not by t alone."""
+
+    def of(*methods: str) -> str:
+        names = list(dict.fromkeys(subject(row["measure"]) for row in rows if row["interval"] in methods))
+        return listing(names) if names else ""
+
+    if of(WILSON):
+        yield f"Intervals of the shares of answers 0 or 1 ({of(WILSON)}) are Wilson's."
+    if of(T_OF_SHARES, NONE_OF_ALIKE):
+        yield (
+            f"Intervals of means of participants' shares ({of(T_OF_SHARES, NONE_OF_ALIKE)}) are t intervals, cut at 0"
+            " and 1, where their mean cannot be; where all shares are alike there is none."
+        )
+    if of(T_BEYOND):
+        yield f"The t interval of {of(T_BEYOND)} reaches beyond 0 to 1, where all values are."
 
 
 def _named(pattern: str) -> str:

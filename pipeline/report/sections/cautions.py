@@ -10,6 +10,7 @@ from pipeline.report.document.model import Strong, Text
 from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
 from pipeline.report.sections import checks, preregistration
 from pipeline.report.sections.material import Material
+from pipeline.statistics import T_BEYOND
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import reference_phrase
@@ -88,6 +89,12 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
         found = _details(row, *names)
         return found is not None and found < alpha
 
+    beyond = [row for row in material.rows("descriptives") if row["interval"] == T_BEYOND]
+    if beyond:
+        text = (
+            f"for {_named(beyond)}, although all values lie between: a share cannot be there. State each answer as 0 or"
+        )
+        yield (Strong("A t interval reaches beyond 0 to 1 "), f"{text} 1, with its trial, or read it as approximate.")
     violated = [row for row in rows if TESTS[row["test"]].assumes_sphericity and below(row, "mauchly_p")]
     if violated:
         text = f"(the differences between conditions vary unequally) for {_named(violated)}: use the"

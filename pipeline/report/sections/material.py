@@ -16,6 +16,7 @@ from pipeline.engine.jobs import Jobs
 from pipeline.report import figures
 from pipeline.report.document.model import Figure
 from pipeline.report.figures import Drawing
+from pipeline.statistics import NONE_OF_ALIKE, T_OF_SHARES
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -82,6 +83,11 @@ class Material:
     def participant_means(self, measure: str) -> pd.DataFrame:
         """One row per participant and one column per condition."""
         return tables.participant_means(self.measures, measure, self.study.conditions)
+
+    def of_shares(self, measure: str) -> bool:
+        """Is each value of a measure a participant's share of answers 0 or 1?"""
+        found = (row["interval"] for row in self.rows("descriptives") if row["measure"] == measure)
+        return not {T_OF_SHARES, NONE_OF_ALIKE}.isdisjoint(found)
 
     def figure(
         self,

@@ -11,6 +11,7 @@ from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
 from pipeline.report.sections.comparisons import ESTIMATES
 from pipeline.report.sections.material import Material, first_of, safe_name
+from pipeline.statistics import T
 from pipeline.study.measures import MEASURES, measure
 from pipeline.study.measures import Section as SectionName
 from pipeline.study.statistical_tests import TESTS
@@ -20,7 +21,7 @@ from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import evidence, statistic
 from pipeline.words.names import measure_label, short_label
 from pipeline.words.numbers import NO_VALUE, interval, number, p_value
-from pipeline.words.phrases import capitalized
+from pipeline.words.phrases import capitalized, listing
 from pipeline.words.sentences import brief_sentence, with_article
 
 _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
@@ -105,7 +106,17 @@ def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Ta
         for row in rows
     )
     caption = "Means over participants; each participant has one value in each condition."
-    return Table(table_id, caption, columns(titles, 2), cells)
+    return Table(table_id, caption, columns(titles, 2), cells, interval_note(rows))
+
+
+def interval_note(rows: Sequence[Row]) -> str:
+    """How the intervals of these descriptives were computed, where it is not by t alone."""
+    of: dict[str, list[str]] = {}
+    for row in rows:
+        if row["interval"] not in (None, T):
+            of.setdefault(row["interval"], []).append(measure_label(row["measure"]))
+    told = (f"{listing(list(dict.fromkeys(labels)))}: {method}" for method, labels in of.items())
+    return f"Intervals are t intervals; of {'; of '.join(told)}." if of else ""
 
 
 def _measured(material: Material, measure: str) -> list[Block]:
@@ -113,8 +124,8 @@ def _measured(material: Material, measure: str) -> list[Block]:
     wide = material.participant_means(measure)
     if not wide.notna().any().any():
         return []
-    label = measure_label(measure)
-    blocks: list[Block] = [material.drawn(f"measure-{safe_name(measure)}", figures.paired, wide, measure)]
+    label, shown = measure_label(measure), (wide, measure, material.of_shares(measure))
+    blocks: list[Block] = [material.drawn(f"measure-{safe_name(measure)}", figures.paired, *shown)]
     for sentence in _sentences(material.comparisons_of(measure)):
         blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
     return blocks

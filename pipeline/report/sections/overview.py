@@ -19,7 +19,7 @@ from pipeline.report.document.model import (
     Text,
     columns,
 )
-from pipeline.report.figures.rainclouds import met_one_each
+from pipeline.report.figures.rainclouds import interval_words, met_one_each
 from pipeline.report.prose.accuracy_claims import without_reference
 from pipeline.report.prose.answer import HEADER, answer, notes, shown
 from pipeline.report.sections import preregistration, traces
@@ -184,6 +184,8 @@ def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
         " Right: each participant's difference, and the mean difference with its interval; zero is no difference."
     )
     mark = "each small mark is a participant" if met_one_each(wide) else "each line is a participant"
+    shares = material.of_shares(measure)
+    large = f"large marks are means with 95 % intervals{interval_words(wide, measure, shares)}"
     told = [
         f"{row['condition']} {_mean(row)}"
         for row in material.rows("descriptives")
@@ -192,10 +194,11 @@ def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
     return material.figure(
         "answer",
         figures.paired,
-        f"{label}: {mark}, large marks are means with 95 % intervals.{differences if compared else ''}",
+        f"{label}: {mark}, {large}.{differences if compared else ''}",
         f"{label} of each participant by condition. Means with 95 % intervals: {'; '.join(told)}.",
         wide,
         measure,
+        shares,
     )
 
 

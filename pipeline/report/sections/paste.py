@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import groupby
 
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, Text, columns
-from pipeline.report.figures.rainclouds import draws_within
 from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
 from pipeline.report.sections import practice
 from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import used_versions
+from pipeline.statistics import WILSON
 from pipeline.tables.table import Row
 from pipeline.words.condition_means import StudyFacts, means_sentence, states_means, study_facts
 from pipeline.words.sentences import full_sentence
@@ -39,16 +39,18 @@ def section(material: Material) -> Section:
 def references(material: Material) -> list[Reference]:
     """What the study's report rests on."""
     rows, measures = material.rows("comparisons"), material.measured()
-    return used(material.study, rows, measures, used_versions(), _shown(material, measures))
+    return used(material.study, rows, measures, used_versions(), _shown(material))
 
 
-def _shown(material: Material, measures: Iterable[str]) -> Iterator[tuple[str, str]]:
+def _shown(material: Material) -> Iterator[tuple[str, str]]:
     """What sections and figures rest on that belongs to no test."""
     if practice.section_rows(material):
         yield "newell1981", "power law of practice"
     if material.rows("fitts"):
         yield "soukoreff2004", "Fitts' law"
-    if any(draws_within(material.participant_means(name)) for name in measures):
+    if any(row["interval"] == WILSON for row in material.rows("descriptives")):
+        yield "wilson1927", "intervals of shares of answers"
+    if material.rows("intervals_within"):
         yield "morey2008", "intervals within participants"
 
 

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pypdf import PdfReader
 
-from pipeline.analysis.compare import descriptives
 from pipeline.analysis.comparisons import compared as rows_of
+from pipeline.analysis.descriptives import descriptives
 from pipeline.report.prose.glossary import explained
 from pipeline.report.prose.references import bibliography, escaped, used
 from pipeline.report.sections.comparisons import anchor
@@ -141,14 +141,17 @@ def a_study(
         for condition, value in zip(conditions, row, strict=False)
     ]
     measures = tables.frame("measures", cells)
-    rows, _ = rows_of(study, measures, tables.frame("observations", [{**cell, "n": 1} for cell in cells]))
+    observations = tables.frame("observations", [{**cell, "n": 1} for cell in cells])
+    rows, _ = rows_of(study, measures, observations)
     for row in rows:
         row["details"] = json.loads(row["details"]) if row["details"] else None
     complete = list(
         tables.records("comparisons", tables.frame("comparisons", [{**row, "details": None} for row in rows]))
     )
     found = [{**whole, "details": row["details"]} for whole, row in zip(complete, rows, strict=True)]
-    described = list(tables.records("descriptives", tables.frame("descriptives", descriptives(study, measures))))
+    described = list(
+        tables.records("descriptives", tables.frame("descriptives", descriptives(study, measures, observations)))
+    )
     return found, study_facts(conditions, study.alpha, described)
 
 

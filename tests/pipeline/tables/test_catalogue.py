@@ -50,6 +50,8 @@ def test_a_record_is_complete(table: Table) -> None:
 def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
     assert IN_STUDY_RESULTS == (
         "descriptives",
+        "intervals_within",
+        "differences",
         "comparisons",
         "comparisons_all_data",
         "accuracy",

@@ -1,0 +1,89 @@
+"""What the participants' means say of each condition, before any test: all that the figures of a measure show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import pandas as pd
+
+from pipeline.analysis.kinds_of_values import are_answers
+from pipeline.statistics import T_OF_SHARES, WILSON
+from pipeline.statistics.descriptive import described, interval_method, summarize
+from pipeline.statistics.estimation import within_intervals
+from pipeline.study.measures import measure, measure_order
+from pipeline.study.settings import Study
+from pipeline.tables import table as tables
+from pipeline.tables.table import Row
+
+
+def descriptives(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> list[Row]:
+    """n, mean, SD, median and the interval of the mean, one row per measure and condition."""
+    rows: list[Row] = []
+    for name, wide, method in _by_measure(study, measures, observations):
+        everything = wide.stack().to_numpy(np.float64)
+        within_unit = not measure(name).unit and bool(((everything >= 0) & (everything <= 1)).all())
+        for condition in study.conditions:
+            values = wide[condition].dropna().to_numpy(np.float64)
+            if len(values):
+                rows.append({"measure": name, "condition": condition, **described(values, method, within_unit)})
+    return rows + _root_rows(rows)
+
+
+def intervals_within(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> list[Row]:
+    """The Cousineau-Morey interval of each condition's mean, of the participants who met every condition.
+
+    None of single answers 0 or 1, whose differences are no measurements; of shares it is cut at 0 and 1.
+    """
+    rows: list[Row] = []
+    for name, wide, method in _by_measure(study, measures, observations):
+        complete = wide.dropna()
+        values = complete.to_numpy(np.float64)
+        intervals = [None] if method == WILSON else within_intervals(values, bounded=method == T_OF_SHARES)
+        for condition, bounds in zip(study.conditions, intervals, strict=False):
+            if bounds is not None:
+                cell = {"measure": name, "condition": condition, "n": len(complete)}
+                rows.append(
+                    {**cell, "mean": float(complete[condition].mean()), "ci_low": bounds[0], "ci_high": bounds[1]}
+                )
+    return rows
+
+
+def differences(study: Study, measures: pd.DataFrame) -> list[Row]:
+    """The baseline minus each other condition, of the participants who met every condition, with the t interval."""
+    rows: list[Row] = []
+    for name in sorted(set(measures["measure"]), key=measure_order):
+        complete = tables.participant_means(measures, name, study.conditions).dropna()
+        first, *others = study.conditions
+        for other in others if len(complete) > 1 else ():
+            apart = (complete[first] - complete[other]).to_numpy(np.float64)
+            found = summarize(apart)
+            bounds = {end: found[end] for end in ("mean", "ci_low", "ci_high")}
+            lower = int(np.sum(apart > 0))
+            rows.append({"measure": name, "contrast": f"{first} - {other}", "n": len(apart), **bounds, "lower": lower})
+    return rows
+
+
+def _by_measure(
+    study: Study, measures: pd.DataFrame, observations: pd.DataFrame
+) -> Iterator[tuple[str, pd.DataFrame, str]]:
+    """Each measure with the participants' means by condition, and the method of the intervals of its means."""
+    for name in sorted(set(measures["measure"]), key=measure_order):
+        wide = tables.participant_means(measures, name, study.conditions)
+        shares = are_answers(observations[observations["measure"] == name])
+        yield name, wide, interval_method(wide.stack().to_numpy(np.float64), shares, measure(name).unit != "")
+
+
+def _root_rows(rows: Iterable[Row]) -> list[Row]:
+    """selection_rmse: the root of the mean over participants of their MSEs, never a mean of RMSEs."""
+    names = {"selection_mse_px2": "selection_rmse_px", "selection_mse_mm2": "selection_rmse_mm"}
+    return [
+        {
+            "measure": names[row["measure"]],
+            "condition": row["condition"],
+            "n": row["n"],
+            "mean": float(np.sqrt(row["mean"])),
+        }
+        for row in rows
+        if row["measure"] in names and row["mean"] >= 0
+    ]
