@@ -23,7 +23,7 @@ from pipeline.words.numbers import MINUS
 NOMINAL, EFFECTIVE = "nominal", "effective"
 BLOCKS_MIN = 3
 R_SQUARED_MIN = 0.8  # our own limit: lines through means over participants are usually above .9
-INTERCEPT_MIN_S = -0.2  # below it the line is no movement time (Soukoreff and MacKenzie 2004)
+INTERCEPT_MIN_S = -0.2  # our own limit: no movement takes less than no time, and the rest is for noise
 _FIGURES = ["amplitude_mm", "moved_mm", "along_mm", "duration_s"]
 _PERSON = ["condition", "block", "participant"]
 
@@ -160,6 +160,6 @@ def _remark(blocks: int, slope_s_bit: float | None, intercept_s: float | None, r
     if intercept_s is not None and intercept_s < INTERCEPT_MIN_S:
         remarks.append(
             f"an intercept below {MINUS}{-1000 * INTERCEPT_MIN_S:g} ms, where no movement time can be, points to"
-            " something other than difficulty (Soukoreff and MacKenzie 2004)"
+            " something other than difficulty"
         )
     return "; ".join(remarks) or None

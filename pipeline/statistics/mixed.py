@@ -79,7 +79,7 @@ def mixed_model(
     people = {name: index for index, name in enumerate(dict.fromkeys(participants))}
     index = np.array([people[name] for name in participants], dtype=np.int64)
     (scaled,), exponent = at_unit_scale([values])
-    rows = Rows(scaled, _design(columns, terms, len(values)), index)
+    rows = Rows(scaled, design(columns, terms, len(values)), index)
     groupings = {PARTICIPANT: index, **(random or {})}
     blank = Result("", "t", method_text(groupings), "estimate", len(people))
     fitted_model = _undefined(rows, columns) or fitted(rows, groupings)
@@ -136,22 +136,22 @@ def _undefined(rows: Rows, columns: Mapping[str, Column]) -> str | None:
     if people < 2:
         return ONE_COMPLETE if people else NO_COMPLETE
     mean_values, mean_design = rows.means
-    within, design = rows.values - mean_values, rows.design - mean_design
+    within, design_within = rows.values - mean_values, rows.design - mean_design
     condition = columns["condition"].columns
     if not np.any(condition - (rows.sums(condition) / rows.sizes[rows.participants][:, None])):
         return CONFOUNDED
-    terms, inside = rows.design.shape[1], int(np.linalg.matrix_rank(design))
+    terms, inside = rows.design.shape[1], int(np.linalg.matrix_rank(design_within))
     if np.linalg.matrix_rank(rows.design) < terms:
         return ALIASED
     if len(within) - people - inside < 1 or people + inside - terms < 1:
         return TOO_FEW_VALUES
     if negligible(float(np.sum(within**2)), rows.values):
         return NO_VARIATION if negligible(float(np.sum((mean_values - mean_values[0]) ** 2)), rows.values) else ALL_ZERO
-    left = within - design @ np.linalg.lstsq(design, within, rcond=None)[0]
+    left = within - design_within @ np.linalg.lstsq(design_within, within, rcond=None)[0]
     return NO_ERROR if negligible(float(np.sum(left**2)), rows.values) else None
 
 
-def _design(columns: Mapping[str, Column], terms: Sequence[str], rows: int) -> FloatArray:
+def design(columns: Mapping[str, Column], terms: Sequence[str], rows: int) -> FloatArray:
     """The intercept and each term's columns (N, p): products of its factors' indicators."""
     blocks = [np.ones((rows, 1))]
     for term in terms:
@@ -194,15 +194,15 @@ def _hypotheses(columns: Mapping[str, Column], terms: Sequence[str], term: str) 
     grid: dict[str, Column] = {name: Covariate(np.zeros(len(cells))) for name in columns}
     grid |= {name: replace(factor, codes=cells[:, at]) for at, (name, factor) in enumerate(factors.items())}
     if isinstance(columns.get(term), Covariate):
-        slope = _design({**grid, term: Covariate(np.ones(len(cells)))}, terms, len(cells))
-        return (slope - _design(grid, terms, len(cells)))[:1]
+        slope = design({**grid, term: Covariate(np.ones(len(cells)))}, terms, len(cells))
+        return (slope - design(grid, terms, len(cells)))[:1]
     named = term.split(":")
     weights: FloatArray = np.ones((1, 1))
     for name, factor in factors.items():
         count = len(factor.levels)
         others = np.full((1, count), 1 / count)
         weights = np.kron(weights, np.eye(count)[0] - np.eye(count)[1:] if name in named else others)
-    return weights @ _design(grid, terms, len(cells))
+    return weights @ design(grid, terms, len(cells))
 
 
 def _t_row(fitted: Fit, hypothesis: FloatArray, blank: Result) -> Result:

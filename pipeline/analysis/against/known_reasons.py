@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from pipeline.analysis.against import conventions, ways
+from pipeline.analysis.against import conventions, derivatives, digits, ways
 from pipeline.analysis.against.problems import P_ADJUSTED
 from pipeline.statistics.arrays import FloatArray
 
@@ -64,6 +64,12 @@ _PAIRED = (
         ways.of_data(conventions.d_av),
     ),
     KnownReason(("bayes_t",), ("statistic",), "its prior scale is √2/2 = 0.70711; ours is 0.707", ways.medium_prior),
+    KnownReason(
+        ("bayes_t",),
+        ("statistic",),
+        "its integration over g from 0 to ∞ misses digits in the long tail of a t this large; ours is over ln g",
+        ways.integrated_over_g,
+    ),
 )
 
 _FRIEDMAN = (
@@ -96,6 +102,12 @@ _ANALYSES = (
         ("mauchly_w", "mauchly_p"),
         "there is no such test of so few participants; its formula gives 0",
         ways.no_mauchly,
+    ),
+    KnownReason(
+        ("rm_anova",),
+        ("statistic", "p", "p_gg"),
+        "its digits run out, for the values are far larger than what they differ by; exact fractions give ours",
+        digits.run_out,
     ),
     KnownReason(("mixed_anova",), ("statistic", "p", "p_gg"), _PLAIN_MEAN, ways.weighted_by_group),
     KnownReason(
@@ -159,6 +171,20 @@ _MODELS = (
         _FITTED,
         "its search stopped before the largest likelihood",
         ways.at_lower_likelihood,
+    ),
+    KnownReason(
+        _OF_MODEL,
+        ("statistic", "se"),
+        "standard error from the joint information of coefficients and variances; ours, as lme4's, takes the variances"
+        " as known, which is the same only in balanced data",
+        derivatives.of_observed_information,
+    ),
+    KnownReason(
+        _OF_MODEL,
+        ("statistic", "df2", "p"),
+        "its second derivatives of the likelihood by θ and σ have an eigenvalue that it takes for zero (below 1e-8), as"
+        " of variances or units of extreme size; ours come from closed forms",
+        derivatives.where_it_is_flat,
     ),
 )
 

@@ -92,6 +92,21 @@ def medium_prior(problem: Problem, _theirs: Figures, _quantity: str) -> float:
     return float(np.exp(log_bayes_factor(t, len(data.first), float(np.sqrt(0.5)))))
 
 
+def integrated_over_g(problem: Problem, _theirs: Figures, _quantity: str) -> float:
+    """The Bayes factor by the same integral, over g instead of its logarithm (Rouder et al. 2009, eq. 1)."""
+    from scipy.integrate import quad
+
+    data: Any = problem.data
+    t, n, scale = conventions.t_of_floats(data)["statistic"], len(data.first), problem.entry.prior_scale
+
+    def weight(g: float) -> float:
+        spread = 1 + n * g * scale**2
+        prior = (2 * np.pi) ** -0.5 * g**-1.5 * np.exp(-1 / (2 * g))
+        return float(spread**-0.5 * (1 + t**2 / (spread * (n - 1))) ** (-n / 2) * prior)
+
+    return float(quad(weight, 0, np.inf)[0] * (1 + t**2 / (n - 1)) ** (n / 2))
+
+
 def no_mauchly(problem: Problem, _theirs: Figures, quantity: str) -> float | None:
     """0 where we have no figure."""
     return 0.0 if ours(problem.row, quantity) is None else None

@@ -11,13 +11,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy import stats
 
-from pipeline.analysis.against import conventions, in_r
+from pipeline.analysis.against import conventions, derivatives, digits, in_r
 from pipeline.analysis.against.agreement import held_against
 from pipeline.analysis.against.known_reasons import REASONS
-from pipeline.analysis.against.problems import Groups, Paired, Problem, Within
+from pipeline.analysis.against.problems import Groups, Model, Paired, Problem, Within
 from pipeline.analysis.against.programs import LIBRARIES
 from pipeline.analysis.against.theirs import Call, Figure, Theirs, ask, rounded
+from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.mixed import Factor, mixed_model
 from pipeline.statistics.paired import t_paired
 from pipeline.study.comparison import Comparison
 
@@ -110,3 +112,42 @@ def test_what_r_wrote_before_it_was_stopped_counts() -> None:
     assert (test.call, test.figures["statistic"]) == ("t.test(x, y)", Figure(2.5))
     assert math.isnan(test.figures["p"].value)
     assert found[1] == [Theirs("aov", failure="no F")]
+
+
+def a_model(values: FloatArray, people: list[str], condition: list[int]) -> Problem:
+    factor = Factor(("A", "B"), np.array(condition))
+    (result,) = mixed_model(values, people, {"condition": factor}, ["condition"])
+    data = Model(values, people, {"condition": factor}, ["condition"], {}, "condition", (0, 1))
+    details = dict(result.details)
+    row = {"statistic": result.statistic, "df2": result.df2, "p": result.p, "effect_size": result.effect_size}
+    named = {"statistic_name": "t", "status": "ok", "effect": "condition", "contrast": result.contrast}
+    entry = Comparison.model_validate({"measure": "m", "test": "mixed_model"})
+    return Problem({**row, **named, "details": details}, "mixed_model", data, entry)
+
+
+def test_standard_errors_from_the_joint_information_are_those_of_statsmodels_and_in_balanced_data_ours() -> None:
+    random = np.random.default_rng(5)
+    people, condition = [f"P{at}" for at in range(8) for _ in range(4)], [0, 0, 1, 1] * 8
+    values = random.normal(0, 1, 8).repeat(4) + random.normal(0, 1, 32) + np.array(condition)
+    whole = a_model(values, people, condition)
+    kept = [at for at in range(32) if at not in (1, 2, 5, 8, 13)]
+    gaps = a_model(values[kept], [people[at] for at in kept], [condition[at] for at in kept])
+    for problem in (whole, gaps):
+        (theirs,) = ask({"mixed_model": LIBRARIES["statsmodels"].calls["mixed_model"]}, problem)
+        joint = derivatives.of_observed_information(problem, theirs.figures, "se")
+        assert joint == pytest.approx(theirs.figures["se"].value, rel=1e-5)
+        own = problem.row["details"]["se"]
+        assert (joint == pytest.approx(own, rel=1e-6)) == (problem is whole)
+
+
+def test_no_reason_of_extreme_numbers_is_given_of_plain_ones() -> None:
+    values = np.array([1.0, 2.5, 2, 3, 3, 5, 4, 4, 5, 7.5])
+    people, condition = [f"P{at}" for at in range(5) for _ in range(2)], [0, 1] * 5
+    model = a_model(values, people, condition)
+    far = {"df1": 1.0, "df2": 7.0, "statistic": 3.0, "log_likelihood": model.row["details"]["log_likelihood"]}
+    figures = {name: Figure(value) for name, value in far.items()}
+    assert derivatives.where_it_is_flat(model, figures, "df2") is None
+    (anova,) = rm_anova(values.reshape(5, 2), ("condition",))
+    row = {"statistic": anova.statistic, "df2": anova.df2, "p": anova.p, "status": "ok", "details": {}}
+    problem = Problem(row, "rm_anova", Within(values.reshape(5, 2), (0,)), model.entry)
+    assert digits.run_out(problem, {"statistic": Figure((anova.statistic or 0) * 1.00001)}, "statistic") is None

@@ -193,8 +193,7 @@ def results_of_one(folder: Folder, steadyhand: Steadyhand, trials: str) -> list[
         ({"slope_s_bit": -0.04, "intercept_s": 0.8}, "movement time does not rise with difficulty"),
         (
             {"slope_s_bit": 0.6, "intercept_s": -0.6},
-            "an intercept below −200 ms, where no movement time can be, points to something other than difficulty"
-            " (Soukoreff and MacKenzie 2004)",
+            "an intercept below −200 ms, where no movement time can be, points to something other than difficulty",
         ),
     ],
 )

@@ -68,6 +68,35 @@ def test_every_difference_of_r_has_a_verified_reason(against: Against) -> None:
     assert "oneway.test(value ~ g) agrees: F, df1, df2, p" in ran.out
 
 
+@pytest.mark.parametrize(
+    ("case", "reason"),
+    [
+        ("confound", "standard error from the joint information of coefficients and variances"),
+        ("n2big", "its integration over g from 0 to ∞ misses digits in the long tail"),
+    ],
+)
+def test_extreme_and_unbalanced_data_have_a_reason_in_the_libraries(against: Against, case: str, reason: str) -> None:
+    ran = against(case, "pingouin,statsmodels")
+    assert ran.code == 0, ran.out
+    assert reason in ran.out
+
+
+@HAS_R
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("case", "reason"),
+    [
+        ("epoch_us", "its digits run out, for the values are far larger than what they differ by"),
+        ("giant_outlier", "have an eigenvalue that it takes for zero"),
+        ("n2big", "have an eigenvalue that it takes for zero"),
+    ],
+)
+def test_extreme_data_have_a_reason_in_r(against: Against, case: str, reason: str) -> None:
+    ran = against(case, "r")
+    assert ran.code == 0, ran.out
+    assert reason in ran.out
+
+
 def test_adjusted_p_values_are_of_the_p_that_is_judged_by(against: Against) -> None:
     ran = against("gg_holm", "statsmodels")
     assert ran.code == 0
