@@ -23,7 +23,7 @@ from pipeline.engine.run import bring_up_to_date, run_variants
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
 from pipeline.report.document import html, pdf
-from pipeline.report.sections.replay import document
+from pipeline.report.sections.replay import document, in_doubt
 from pipeline.sessions.variants import Variant, read_changes, read_estimators, variants
 from pipeline.stages import INGEST, REPLAY
 from pipeline.study.folder import load_study
@@ -134,9 +134,17 @@ def _gather(
             "title": result.study.title,
             "data_origin": result.study.data_origin,
             "sessions": len(entries),
+            "sessions_in_doubt": _in_doubt(result, [session.id for session, _ in entries]),
             "variants": [_settings(variant) for variant in listed],
         }
     )
+
+
+def _in_doubt(result: Result, sessions: Sequence[str]) -> list[str]:
+    """The replayed sessions with a red check, whose readings contradict each other or study.yaml."""
+    checks = tables.read("checks", [result.entries["ingest"][session].folder for session in sessions])
+    red = set(checks.loc[checks["status"] == "red", "session"])
+    return [session for session in sessions if session in red]
 
 
 def _failures(
@@ -192,6 +200,8 @@ def _write(gathered: _Gathered, folder: Path) -> None:
             copy(Path(filled) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
     _say(list(tables.records("replay_means", written["replay_means"])), reference_phrase(accuracy["reference"]))
+    for caution in in_doubt(gathered.studies):
+        console.say(caution)
     console.say(f"Report: {console.short_path(folder / _PAGE)}  {console.short_path(folder / _PRINT)}")
 
 

@@ -40,7 +40,7 @@ def run(work: Work) -> Outcome:
     rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
     known = [row for row in rows if row]
     tables.write("accuracy", tables.of_rows("accuracy", known), work.out)
-    checked = fusion_check_rows(study, session.id, loaded, reference, known)
+    checked = fusion_check_rows(study, session.id, loaded, reference, tracks)
     tables.write("checks", tables.of_rows("checks", checked), work.out)
     tables.write("replay_agreement", tables.of_rows("replay_agreement", _agreement(work, loaded)), work.out)
     phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]

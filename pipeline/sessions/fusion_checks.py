@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
-from fusion_core import Raw, Samples, accuracy
-from pipeline.sessions.checks.finding import Finding, Status, graded, of, rows_of
+from fusion_core import Raw, Samples
+from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.sessions.estimators import fusing, sensors
-from pipeline.sessions.recording import Recording, where_judged
+from pipeline.sessions.recording import Recording, Shown, where_judged
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
 
 USED, WORSE = "accelerations used", "fusion against tracker"
 _LEFT_OUT = 0.01  # of the accelerations
-_WORSE = (1.0, 1.5)  # times the tracker's own error
+_PLAIN, _RED = 1.15, 1.5  # times the tracker's own error; between 1 and the first, an interval decides
+_BLOCK_S = 2.0  # errors of instants further apart than a reach have little to do with each other
+_BLOCKS_MIN = 4
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """An estimator's RMSE and its tracker's at the same instants, in mm; is it larger, by much or beyond chance?"""
+
+    rmse_mm: float
+    alone_mm: float
+    clearly_worse: bool
 
 
 def fusion_check_rows(
@@ -24,11 +38,10 @@ def fusion_check_rows(
     session: str,
     loaded: Recording,
     reference: tuple[str, Samples] | None,
-    rows: Sequence[Row],
+    tracks: Mapping[str, Shown],
 ) -> list[Row]:
-    """Rows of the table `checks`; `rows` are the session's of `accuracy`."""
-    rmse_mm = {str(row["estimator"]): float(row["rmse_mm"]) for row in rows}
-    return rows_of([*used(loaded), *against_tracker(study, loaded, reference, rmse_mm)], session)
+    """Rows of the table `checks`."""
+    return rows_of([*used(loaded), *against_tracker(study, loaded, reference, tracks)], session)
 
 
 def used(loaded: Recording) -> Iterator[Finding]:
@@ -53,25 +66,28 @@ def used(loaded: Recording) -> Iterator[Finding]:
 
 
 def against_tracker(
-    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, rmse_mm: Mapping[str, float]
+    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, tracks: Mapping[str, Shown]
 ) -> Iterator[Finding]:
-    """Each fusing estimator's error against that of its tracker as it arrives. Needs a recorded reference.
+    """Each fusing estimator's error against that of its tracker's last frame, held. Needs a recorded reference.
 
-    Where another one helps with the same readings, these do not contradict study.yaml: no more than amber.
+    Where another one helps with the same readings, nothing contradicts study.yaml: the row is green and its message
+    says so. A small difference that blocks of two seconds do not agree on may be chance: green without a message.
     """
-    alone_mm = _tracker_alone_mm(study, loaded, reference)
-    if alone_mm is None:
-        return
-    rated = [name for name in fusing(study) if name in rmse_mm]
-    helping = [name for name in rated if rmse_mm[name] <= alone_mm]
-    for name in rated:
-        status = graded(rmse_mm[name], _WORSE[0] * alone_mm, _WORSE[1] * alone_mm)
+    compared = {}
+    for name in fusing(study):
+        if name in tracks and (beside := _beside_tracker(study, loaded, reference, tracks[name])) is not None:
+            compared[name] = beside
+    helping = [name for name, one in compared.items() if one.rmse_mm <= one.alone_mm]
+    for name, one in compared.items():
+        status: Status = "green"
         message = ""
-        if status != "green":
-            status = "amber" if helping else status
-            how = f"{name} is {rmse_mm[name]:.3g} mm off and its tracker alone {alone_mm:.3g}"
+        if one.clearly_worse:
+            if not helping:
+                status = "red" if one.rmse_mm > _RED * one.alone_mm else "amber"
+            how = f"{name} is {one.rmse_mm:.3g} mm off and its tracker alone {one.alone_mm:.3g}"
             message = f"{how}: {_cause(name, helping)}"
-        yield Finding(of(WORSE, name), status, f"{rmse_mm[name]:.3g} mm", f"{alone_mm:.3g} mm", message)
+        expected = f"{one.alone_mm:.3g} mm" + (f", or {helping[0]} to be better" if message and helping else "")
+        yield Finding(of(WORSE, name), status, f"{one.rmse_mm:.3g} mm", expected, message)
 
 
 def _cause(name: str, helping: Sequence[str]) -> str:
@@ -86,16 +102,37 @@ def _cause(name: str, helping: Sequence[str]) -> str:
     )
 
 
-def _tracker_alone_mm(study: Study, loaded: Recording, reference: tuple[str, Samples] | None) -> float | None:
-    """RMSE in mm of the tracker's last frame, held, on the grid of accuracy."""
+def _beside_tracker(
+    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, shown: Shown
+) -> _Beside | None:
+    """None without a recorded reference where the estimate is; accuracy is judged at the same instants."""
     tracker = study.tracker
     if reference is None or reference[0] == SMOOTHED or tracker is None:
         return None
-    judged = where_judged(study, loaded, reference, loaded.times)
+    time = loaded.to_s(shown.time_ns)
+    judged = where_judged(study, loaded, reference, time)
     if judged is None:
         return None
     on_grid, truth = judged
     samples = {tracker: loaded.samples[tracker]}
-    held = Raw({tracker: sensors(study)[tracker]}).replay(samples, loaded.times[on_grid]).mean
-    known = np.isfinite(held).all(axis=1)
-    return accuracy.rmse(held[known], truth[known]) if known.any() else None
+    held = Raw({tracker: sensors(study)[tracker]}).replay(samples, time[on_grid]).mean
+    estimated, alone = (np.sum((one - truth) ** 2, axis=1) for one in (shown.mean[on_grid], held))
+    known = np.isfinite(estimated) & np.isfinite(alone)
+    if not known.any():
+        return None
+    rmse_mm, alone_mm = (float(np.sqrt(np.mean(one[known]))) for one in (estimated, alone))
+    slightly = alone_mm < rmse_mm <= _PLAIN * alone_mm
+    beyond_chance = slightly and _above_zero((estimated - alone)[known], time[on_grid][known])
+    return _Beside(rmse_mm, alone_mm, rmse_mm > _PLAIN * alone_mm or beyond_chance)
+
+
+def _above_zero(difference: FloatArray, time: FloatArray) -> bool:
+    """Is the mean above 0 beyond chance? By a t interval of blocks' means; without enough of them nobody can tell."""
+    block = np.floor((time - time[0]) / _BLOCK_S).astype(np.int64)
+    count = np.bincount(block)
+    there = count > count.max() / 2
+    means = np.bincount(block, difference)[there] / count[there]
+    if len(means) < _BLOCKS_MIN:
+        return False
+    half = float(stdtrit(len(means) - 1, 0.975) * np.std(means, ddof=1) / np.sqrt(len(means)))
+    return float(np.mean(means)) - half > 0

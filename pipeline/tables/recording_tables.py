@@ -90,7 +90,7 @@ CHECKS = Table(
         text("status", "green, amber or red"),
         text("found", "what the readings say"),
         text("expected", "what they should say"),
-        text("message", "the likely cause and the remedy; null where it is green"),
+        text("message", "the likely cause and the remedy; null where there is nothing to say"),
     ),
     stages=("ingest", "assess", "measure", "compare"),
     key=("session", "check"),

@@ -28,8 +28,11 @@ from pipeline.words.numbers import milliseconds, number
 from pipeline.words.phrases import counted, listing
 
 
-def _errors_words(accuracy: pd.DataFrame) -> Words:
-    """Which estimators have the smallest and the largest error, and which the smallest lag, where that is known."""
+def _errors_words(accuracy: pd.DataFrame, contradicted: str = "") -> Words:
+    """Which estimators have the smallest and the largest error, and which the smallest lag, where that is known.
+
+    `contradicted` says why none is called the best although there is a reference.
+    """
     n = counted(accuracy["session"].nunique(), "session")
     standard = reference_phrase(accuracy["reference"])
     if SMOOTHED in standard:
@@ -41,11 +44,11 @@ def _errors_words(accuracy: pd.DataFrame) -> Words:
         )
     rmse = accuracy.groupby("estimator", sort=False)["rmse_mm"].mean().dropna().sort_values(kind="stable")
     lag = accuracy.groupby("estimator", sort=False)["lag_s"].mean().dropna()
-    summary = ""
-    if len(rmse):
+    summary = contradicted
+    if len(rmse) and not contradicted:
         summary = f"Smallest RMSE: {rmse.index[0]}, {number(rmse.iloc[0])} mm"
         summary += f"; largest: {rmse.index[-1]}, {number(rmse.iloc[-1])} mm." if len(rmse) > 1 else "."
-    if len(lag):
+    if len(lag) and not contradicted:
         nearest = int(np.argmin(np.abs(lag.to_numpy(np.float64))))
         summary += f" Smallest lag: {lag.index[nearest]}, {milliseconds(float(lag.iloc[nearest]))} ms."
     return Words(
@@ -57,7 +60,7 @@ def _errors_words(accuracy: pd.DataFrame) -> Words:
 
 @drawing(_errors_words)
 @styled
-def errors(accuracy: pd.DataFrame) -> Figure:
+def errors(accuracy: pd.DataFrame, contradicted: str = "") -> Figure:
     """RMSE and lag of every estimator: one mark per session, and the mean over sessions with its 95 % t interval."""
     names, standard = list(dict.fromkeys(accuracy["estimator"])), reference_phrase(accuracy["reference"])
     figure, axes = panels(1, 2, 1.1 + 0.36 * len(names), sharey=True)
@@ -84,8 +87,8 @@ def errors(accuracy: pd.DataFrame) -> Figure:
     return figure
 
 
-def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
-    """Which estimators no other beats in both error and lag, where that is known."""
+def _lag_and_error_words(accuracy: pd.DataFrame, contradicted: str = "") -> Words:
+    """Which estimators no other beats in both error and lag, where that is known; `contradicted` as above."""
     n, standard = counted(accuracy["session"].nunique(), "session"), reference_phrase(accuracy["reference"])
     if SMOOTHED in standard:
         return Words(
@@ -99,6 +102,7 @@ def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
     beaten = [bool(np.any(np.all(cost <= own, axis=1) & np.any(cost < own, axis=1))) for own in cost]
     best = [str(name) for name, worse in zip(means.index, beaten, strict=True) if not worse]
     summary = f"No other estimator has both less error and less lag than {listing(best)}." if best else ""
+    summary = contradicted or summary
     n = counted(known["session"].nunique(), "session")
     return Words(
         f"Lag against error: means over {n} with 95 % intervals; small marks are sessions. Better is further left and"
@@ -109,7 +113,7 @@ def _lag_and_error_words(accuracy: pd.DataFrame) -> Words:
 
 @drawing(_lag_and_error_words)
 @styled
-def lag_and_error(accuracy: pd.DataFrame) -> Figure:
+def lag_and_error(accuracy: pd.DataFrame, contradicted: str = "") -> Figure:
     """Lag against RMSE, one mark per estimator: means over sessions with 95 % t intervals; small marks are sessions."""
     figure, (axes,) = panels(height=3.4)
     standard = reference_phrase(accuracy["reference"])

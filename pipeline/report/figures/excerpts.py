@@ -78,8 +78,11 @@ def streams(excerpts: pd.DataFrame) -> Figure:
     return figure
 
 
-def _estimates_words(excerpts: pd.DataFrame) -> Words:
-    """Each estimator's error in this stretch, and how often it lies within the stated band."""
+def _estimates_words(excerpts: pd.DataFrame, contradicted: str = "") -> Words:
+    """Each estimator's error in this stretch, and how often it lies within the stated band.
+
+    The smallest comes first, unless `contradicted` says why none is called the best.
+    """
     names = list(dict.fromkeys(excerpts.loc[excerpts["kind"] == "estimate", "name"]))
     parts = []
     for name in names:
@@ -89,9 +92,10 @@ def _estimates_words(excerpts: pd.DataFrame) -> Words:
             rms = float(np.sqrt(np.mean(error[known] ** 2)))
             inside = float(np.mean(np.abs(error[known]) <= 2 * sd[known]))
             parts.append((rms, f"{name} {number(rms, 1)} mm, {percent(inside, 0)} within ± 2 SD"))
-    errors = (
-        f" Error (RMS) in this stretch, smallest first: {listed(text for _, text in sorted(parts))}." if parts else ""
-    )
+    order = "" if contradicted else ", smallest first"
+    texts = [text for _, text in (parts if contradicted else sorted(parts))]
+    errors = f" Error (RMS) in this stretch{order}: {listed(texts)}." if parts else ""
+    errors += f" {contradicted}" if parts and contradicted else ""
     return Words(
         f"What each estimator makes of these readings ({_span(excerpts)}): its mean with a band of two stated SDs"
         f"{', and beside it its error and the same band' if parts else ''}.{errors}",
@@ -101,7 +105,7 @@ def _estimates_words(excerpts: pd.DataFrame) -> Words:
 
 @drawing(_estimates_words)
 @styled
-def estimates(excerpts: pd.DataFrame) -> Figure:
+def estimates(excerpts: pd.DataFrame, contradicted: str = "") -> Figure:
     """Each estimator's mean and two SDs (paper, Figs. 7 and 8), and beside it its error if there is a reference.
 
     `excerpts` has the columns of that table, of one session.

@@ -22,7 +22,7 @@ def lag_label(standard: str = RECORDED) -> str:
 def along_rmse(axes: Axes, rmse_mm: pd.Series, standard: str = RECORDED) -> None:
     """Put RMSE along x, on a logarithmic scale if the largest is more than 15 times the smallest.
 
-    `standard` is what estimates are held against, as in `held_against`.
+    `standard` is what estimates are held against, as in `reference_phrase`.
     """
     if rmse_mm.max() > 15 * rmse_mm.min() > 0:
         axes.set_xscale("log")

@@ -153,7 +153,7 @@ def _intervals(rows: Sequence[Row]) -> Iterator[str]:
     """How the intervals of means were computed, where it is not by t alone."""
 
     def of(*methods: str) -> str:
-        names = list(dict.fromkeys(subject(row["measure"]) for row in rows if row["interval"] in methods))
+        names = list(dict.fromkeys(measure_as_subject(row["measure"]) for row in rows if row["interval"] in methods))
         return listing(names) if names else ""
 
     if of(WILSON):

@@ -8,6 +8,7 @@ import pandas as pd
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
+from pipeline.report.sections.cautions import contradicted
 from pipeline.report.sections.material import Material
 from pipeline.sessions.checks.finding import of
 from pipeline.sessions.estimators import fusing
@@ -123,10 +124,11 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         if known
         else "No column says which estimator is best."
     )
+    unsure = contradicted(material) if known else ""
     where = f"{axes} axes together" if axes > 1 else f"along {material.study.axes[0]}"
     return Table(
         "table-accuracy",
-        f"{caption}, means over {counted(n, 'session')} ({where}). {judged}",
+        f"{caption}, means over {counted(n, 'session')} ({where}). {judged}{unsure and f' {unsure}'}",
         columns(titles, 1),
         cells,
         f"RMSE: root mean square distance to {standard}. Stated SD: the error the estimator says it makes. In 95 %"
@@ -177,9 +179,9 @@ def _session_table(rows: list[Row], alone: Mapping[str, Sequence[str]]) -> Table
 
 def _over_sessions(material: Material, rows: pd.DataFrame) -> list[Block]:
     """Error and lag by estimator, one against the other, and the stated SD against what happened."""
-    blocks: list[Block] = [material.drawn("accuracy", figures.errors, rows)]
+    blocks: list[Block] = [material.drawn("accuracy", figures.errors, rows, contradicted(material))]
     if rows["lag_s"].notna().any():
-        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, rows))
+        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, rows, contradicted(material)))
     counts = material.table("calibration")
     if len(counts):
         blocks.append(material.drawn("calibration", figures.calibration, counts))
@@ -194,7 +196,7 @@ def _session_figures(material: Material) -> list[Block]:
     if len(excerpts):
         blocks.append(material.drawn("streams", figures.streams, excerpts))
     if (excerpts["kind"] == "estimate").any():
-        blocks.append(material.drawn("estimates", figures.estimates, excerpts))
+        blocks.append(material.drawn("estimates", figures.estimates, excerpts, contradicted(material)))
     if len(curves):
         blocks.append(material.drawn("lead", figures.lead, curves))
     return blocks

@@ -89,16 +89,17 @@ def caution(material: Material) -> Iterator[Text]:
 
 
 def worse_than_tracker(material: Material) -> Iterator[Text]:
-    """For the first page: where fusion made it worse, by estimator and session."""
-    rows = [row for row in _contradicted(material.rows("checks")) if row["check"].startswith(WORSE)]
-    if not rows:
-        return
-    told = [
-        f"{row['check'].partition(': ')[2]} in {row['session']} (RMSE {row['found']}, the tracker {row['expected']})"
-        for row in rows[:_NAMED_MAX]
-    ]
-    more = f", and {len(rows) - _NAMED_MAX} more in the table of checks" if len(rows) > _NAMED_MAX else ""
-    yield (Strong("Fusion is worse than its tracker alone: "), f"{'; '.join(told)}{more}.")
+    """For the first page: which estimators made it worse, in how many sessions, with one as an example."""
+    compared = [row for row in material.rows("checks") if row["check"].startswith(WORSE)]
+    parts = []
+    for check in dict.fromkeys(row["check"] for row in compared):
+        rows = [row for row in compared if row["check"] == check]
+        worse = [row for row in rows if row["message"]]
+        if worse:
+            example = f"such as {worse[0]['session']}: {worse[0]['message']}"
+            parts.append(f"{check.partition(': ')[2]} in {len(worse)} of {counted(len(rows), 'session')} ({example})")
+    if parts:
+        yield (Strong("Fusion is worse than its tracker alone: "), f"{'; '.join(parts)}.")
 
 
 def of_tables(material: Material) -> Iterator[Text]:

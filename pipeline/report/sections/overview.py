@@ -289,8 +289,9 @@ def _of_errors(material: Material, n: int) -> tuple[str, str]:
             f"Distance from the smoothed readings (left) and lag behind them (right) of each estimator, {marks}.",
             f"Dot plot of distance and lag from the smoothed readings by estimator over {counted(n, 'session')}.",
         )
+    where = contradicted(material) or "An estimator that helps sits to the left in both."
     return (
-        f"Error (left) and lag (right) of each estimator, {marks}. An estimator that helps sits to the left in both.",
+        f"Error (left) and lag (right) of each estimator, {marks}. {where}",
         f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
     )
 

@@ -29,6 +29,7 @@ from pipeline.words.numbers import NO_VALUE, interval, milliseconds, number, per
 from pipeline.words.phrases import counted
 
 _ROWS_MAX = 120
+_NAMED_MAX = 3
 _TITLES = (
     "Estimator",
     "Rank",
@@ -73,6 +74,9 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
     )
     if (found["accuracy"]["reference"] == SMOOTHED).any():
         yield Paragraph((Strong("No reference was recorded in some study."), SMOOTHED_REMARK))
+    cautions = list(in_doubt(studies))
+    if cautions:
+        yield Notice("The data contradict themselves or study.yaml", tuple((caution,) for caution in cautions))
     for index, study in enumerate([None, *(study["name"] for study in studies)]):
         rows = [row for row in every if row["study"] == study]
         if rows:
@@ -91,6 +95,18 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
             ),
         ),
     )
+
+
+def in_doubt(studies: Sequence[Row]) -> Iterator[str]:
+    """A caution for each study with a red check: the order of its variants is that of figures not to be relied on."""
+    for study in studies:
+        red = study["sessions_in_doubt"]
+        if red:
+            named = ", ".join(red[:_NAMED_MAX]) + (", …" if len(red) > _NAMED_MAX else "")
+            yield (
+                f"{study['name']}: {len(red)} of {counted(study['sessions'], 'session')} with a red check ({named}): do"
+                " not rely on the order of the variants before that is resolved; steadyhand report says what is wrong."
+            )
 
 
 def _one(rows: Sequence[Row], where: str, standard: str, path: Path) -> Iterator[Block]:

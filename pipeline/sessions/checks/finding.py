@@ -13,7 +13,10 @@ Status = Literal["green", "amber", "red"]
 
 @dataclass(frozen=True)
 class Finding:
-    """`found` and `expected` as people read them; `message` names the likely cause and the remedy, "" where green."""
+    """`found` and `expected` as people read them; `message` names the likely cause and the remedy.
+
+    Where green it is "", but for what contradicts nothing and a reader should know all the same.
+    """
 
     check: str
     status: Status
