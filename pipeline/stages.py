@@ -40,6 +40,7 @@ STAGES: tuple[Stage, ...] = (
             "conditions",
             "display",
             "exclusions",
+            "missing",
             "scoring",
             "factors",
             "participants",

@@ -94,10 +94,10 @@ def _table_checks(work: Work, values: pd.DataFrame, selections: pd.DataFrame) ->
     typed = {str(name) for name in (work.study.questionnaires, work.study.measures) if name is not None}
     path = table_path(work, "trials")
     if path is None:
-        return table_checks.check_rows(values[values["source"].isin(typed)], None)
+        return table_checks.check_rows(values[values["source"].isin(typed)], None, work.study.scoring)
     timed = (values["source"] == "the trials") & (values["measure"] == "trial_time_s")
     trials = values[values["source"].isin(typed) | timed].replace({"source": {"the trials": path.name}})
-    return table_checks.check_rows(trials, selections)
+    return table_checks.check_rows(trials, selections, work.study.scoring)
 
 
 def _starts(work: Work) -> pd.DataFrame:

@@ -6,7 +6,8 @@ that a slow task or a coarse scale is no alarm.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,8 @@ import pandas as pd
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
+from pipeline.study.scoring import RULES
+from pipeline.study.scoring_settings import ScoringEntry
 from pipeline.tables.table import Row
 from pipeline.words.phrases import listing
 
@@ -31,25 +34,29 @@ _SINCE_1970 = {1e9: "seconds", 1e12: "milliseconds", 1e15: "microseconds", 1e18:
 _CODES = (-9.0, -99.0, -999.0, -9999.0, 99.0, 999.0, 9999.0)
 _FAR = 3.0  # times the largest of the others: a code, not a slow participant
 _OTHERS_MIN = 3
-_RATED_FROM, _RATED_TO = 0.0, 100.0  # of the NASA-TLX, however it was asked
+_TLX = (0.0, 100.0)  # however it was asked
+_CENTRED = (-3.0, 3.0)  # answers of the UEQ that are coded around zero, and its scores
+_SCORE = {"percent": (0.0, 100.0), "centred": _CENTRED}
 _UNITS_APART = 50.0
 _FARTHEST_MM = 20_000.0
 _SAME_NS = 60e9  # logs of one minute were not recorded one after the other
 _NAMED_MAX = 3
 
 
-def check_rows(values: pd.DataFrame, selections: pd.DataFrame | None) -> list[Row]:
+def check_rows(
+    values: pd.DataFrame, selections: pd.DataFrame | None, scoring: Mapping[str, ScoringEntry] = MappingProxyType({})
+) -> list[Row]:
     """Rows of the table `checks`.
 
     `values` are those of tables, one a row: `participant`, `measure`, `value` and the `source` they stand in.
-    `selections` have the targets and selections of trials.csv; None where there is none.
+    `selections` have the targets and selections of trials.csv; None where there is none. `scoring` is study.yaml's.
     """
     findings: list[Finding] = []
     for (name, source), rows in values[np.isfinite(values["value"])].groupby(["measure", "source"], sort=False):
         value = rows["value"].to_numpy(np.float64)
         findings += unit_of_time(str(name), str(source), value)
         findings += missing_code(str(name), str(source), value, rows["participant"])
-        findings += rated_range(str(name), str(source), value)
+        findings += rated_range(str(name), str(source), value, scoring)
     if selections is not None:
         findings += targets(selections)
     return rows_of(findings)
@@ -92,10 +99,12 @@ def missing_code(name: str, source: str, value: FloatArray, participants: pd.Ser
     people = list(dict.fromkeys(participants[rows].astype(str)))
     who = listing(people[:_NAMED_MAX]) + (", …" if len(people) > _NAMED_MAX else "")
     named = listing([f"{code:g}" for code in codes])
+    key = f"missing: [{', '.join(f'{code:g}' for code in codes)}]"
     rest = value[~rows]
     message = (
         f'"{name}" in {source} is {named} in {int(rows.sum())} rows ({who}) and {rest.min():.3g} to {rest.max():.3g}'
-        f" in all others: {named} probably stands for a missing value, and counts as a number; leave the cell empty"
+        f" in all others: {named} probably stands for a missing value, and counts as a number; write {key}"
+        " in study.yaml, or leave the cell empty"
     )
     yield Finding(check, "amber", f"{named} in {int(rows.sum())} rows", "none", message)
 
@@ -106,24 +115,54 @@ def _stands_out(value: FloatArray, code: float) -> bool:
     if not np.any(value == code) or len(rest) < _OTHERS_MIN:
         return False
     if code < 0:
-        return bool(rest.min() >= 0)
+        return bool(rest.min() >= 0 or (code <= -99.0 and rest.min() > code / _FAR))
     return bool(rest.max() * _FAR < code and rest.min() >= 0)
 
 
-def rated_range(name: str, source: str, value: FloatArray) -> Iterator[Finding]:
-    """Ratings of the NASA-TLX outside 0 to 100; instruments with a rule of scoring list such answers themselves."""
-    questionnaire, slash, scale = name.partition("/")
-    if not slash or questionnaire != "nasa_tlx" or scale == "total":
+def rated_range(name: str, source: str, value: FloatArray, scoring: Mapping[str, ScoringEntry]) -> Iterator[Finding]:
+    """Answers and scores that their instrument cannot have, whether or not a score is made of them."""
+    limits = rated_limits(name, value, scoring)
+    if limits is None:
         return
-    outside = (value < _RATED_FROM) | (value > _RATED_TO)
-    found, expected = f"{value.min():g} to {value.max():g}", f"{_RATED_FROM:g} to {_RATED_TO:g}"
+    low, high = limits
+    outside = (value < low) | (value > high)
     message = ""
     if outside.any():
         message = (
-            f'{int(outside.sum())} ratings of "{name}" in {source} are outside the scale, such as '
-            f"{value[outside][0]:g}: correct them, or leave the cell empty"
+            f'{int(outside.sum())} ratings of "{name}" in {source} are outside {low:g} to {high:g}, such as '
+            f"{value[outside][0]:g}: correct them, or leave the cell empty; if the sheet runs otherwise, "
+            "state its range under scoring: in study.yaml"
         )
-    yield Finding(of(SCALE, name), "amber" if outside.any() else "green", found, expected, message)
+    status: Status = "amber" if outside.any() else "green"
+    yield Finding(of(SCALE, name), status, f"{value.min():g} to {value.max():g}", f"{low:g} to {high:g}", message)
+
+
+def rated_limits(name: str, value: FloatArray, scoring: Mapping[str, ScoringEntry]) -> tuple[float, float] | None:
+    """The lowest and the highest value that a measure can have; None for what is no answer of a known instrument.
+
+    A range under `scoring` counts more than the instrument's own. The UEQ is coded from 1 to 7 or from -3 to 3; values
+    tell which.
+    """
+    questionnaire, slash, scale = name.partition("/")
+    entry = scoring.get(questionnaire)
+    rule = RULES.get(entry.rule if entry is not None else questionnaire)
+    if not slash or _weighs(scale):
+        return None
+    if entry is not None and (rule is None or rule.item(scale) is not None):
+        return None if rule is None and scale == "score" else entry.limits
+    if questionnaire == "nasa_tlx":
+        return None if scale == "total" else _TLX
+    if rule is None or rule.limits is None:
+        return None
+    if rule.item(scale) is not None:
+        coded = rule.name.startswith("ueq") and value.min() < 0 and value.max() <= _CENTRED[1]
+        return _CENTRED if coded else rule.limits
+    return next((_SCORE[one.reading] for one in rule.scales if one.name == scale and one.reading in _SCORE), None)
+
+
+def _weighs(scale: str) -> bool:
+    """A participant's weight of a scale is no rating."""
+    return "weight" in scale
 
 
 def targets(selections: pd.DataFrame) -> Iterator[Finding]:

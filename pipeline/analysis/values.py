@@ -40,7 +40,7 @@ def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
             f"{path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:` out of "
             "study.yaml"
         )
-    table = study_tables.read_trials(path, work.study.conditions)
+    table = study_tables.read_trials(path, work.study.conditions, work.study.missing)
     squared = np.zeros(len(table))
     for axis in "xyz":
         # A trial counts over the axes its target has; a selection that lacks one of them cannot be measured.
@@ -67,7 +67,9 @@ def all_movements(work: Work) -> pd.DataFrame:
     path = table_path(work, "trials")
     if path is None:
         return tables.read("movements", work.entries["assess"])
-    table = study_tables.read_trials(path, work.study.conditions).sort_values("start_s", kind="stable")
+    table = study_tables.read_trials(path, work.study.conditions, work.study.missing).sort_values(
+        "start_s", kind="stable"
+    )
     table["left_s"] = table["selection_s"]
     for axis in "xyz":
         table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
@@ -167,7 +169,7 @@ def rated_values(work: Work) -> Iterator[pd.DataFrame]:
     """Ratings from questionnaires."""
     path = table_path(work, "questionnaires")
     if path is not None:
-        ratings = study_tables.read_questionnaires(path, work.study.conditions)
+        ratings = study_tables.read_questionnaires(path, work.study.conditions, work.study.missing)
         ratings["session"] = ratings.get("session")
         names = ratings["questionnaire"] + "/" + ratings["scale"]
         yield _values(ratings, "", "rating", str(work.study.questionnaires)).assign(measure=names)
@@ -176,7 +178,7 @@ def rated_values(work: Work) -> Iterator[pd.DataFrame]:
 def measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
     """The table of measures and its further factors, if the study has one."""
     path = table_path(work, "measures")
-    return None if path is None else study_tables.read_measures(path, work.study.conditions)
+    return None if path is None else study_tables.read_measures(path, work.study.conditions, work.study.missing)
 
 
 def tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:

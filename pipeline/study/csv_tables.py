@@ -14,6 +14,8 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.fields import identifier
 
 MISSING = ("", "NA", "N/A")
+Codes = Sequence[float | str]
+"""What study.yaml lists under `missing`: numbers or words that stand for a value that is not there."""
 _SHOWN_FAULTS = 5
 _HUGE, _TINY = 1e100, 1e-100
 
@@ -93,18 +95,20 @@ def _number(text: str) -> float:
     return value
 
 
-def _numbers(path: Path, table: pd.DataFrame, column: str) -> pd.Series:
-    """A column as numbers, NaN for a missing cell. Raises PipelineError, naming the rows, for other text."""
+def _numbers(path: Path, table: pd.DataFrame, column: str, codes: Codes = ()) -> pd.Series:
+    """A column as numbers, NaN for a missing cell or code. Raises PipelineError, naming the rows, for other text."""
     values, faults = [], []
     for line, text in table[column].items():
         try:
-            values.append(np.nan if text in MISSING else _number(text))
+            value = np.nan if text in MISSING or text in codes else _number(text)
+            values.append(np.nan if value in codes else value)
         except ValueError as error:
             span = str(error) if str(error).startswith(" between") else ""
             faults.append(f'row {line}: "{column}" should be a number{span}, found "{text}"')
     if faults:
         more = f"; and {len(faults) - _SHOWN_FAULTS} more" if len(faults) > _SHOWN_FAULTS else ""
         hint = " (a decimal comma? use a point)" if any('"' in f and "," in f.split("found")[1] for f in faults) else ""
+        hint = hint or " (if that stands for a missing value, list it under `missing:` in study.yaml)"
         raise PipelineError(f"{path}, {'; '.join(faults[:_SHOWN_FAULTS])}{more}{hint}")
     return pd.Series(values, index=table.index, dtype=np.float64)
 
@@ -158,7 +162,7 @@ def read_participants(path: Path) -> pd.DataFrame:
     return table
 
 
-def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
+def read_trials(path: Path, conditions: Sequence[str], codes: Codes = ()) -> pd.DataFrame:
     """One row per trial: ids, trial (whole number), coordinates in mm and times in s (NaN where missing)."""
     table = _read(path, TRIAL_REQUIRED, TRIAL_OPTIONAL)
     for column in TRIAL_OPTIONAL:
@@ -169,25 +173,25 @@ def read_trials(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
     table["trial"] = _whole_numbers(path, table, "trial")
     _check_unique(path, table, ["participant", "condition", "session", "trial"])
     for column in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]):
-        table[column] = _numbers(path, table, column)
+        table[column] = _numbers(path, table, column, codes)
     for line, width in table["target_width_mm"].items():
         if width <= 0:
             raise PipelineError(f'{path}, row {line}: "target_width_mm" should be above 0, found {width:g}')
     return table
 
 
-def read_questionnaires(path: Path, conditions: Sequence[str]) -> pd.DataFrame:
+def read_questionnaires(path: Path, conditions: Sequence[str], codes: Codes = ()) -> pd.DataFrame:
     """One row per rating, NaN where missing."""
     table = _read(path, RATING_REQUIRED, ("session",))
     _required_text(path, table, RATING_REQUIRED[:4])
     _check_conditions(path, table, conditions)
-    table["rating"] = _numbers(path, table, "rating")
+    table["rating"] = _numbers(path, table, "rating", codes)
     keys = [*RATING_REQUIRED[:4], *(["session"] if "session" in table else [])]
     _check_unique(path, table, keys)
     return table
 
 
-def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
+def read_measures(path: Path, conditions: Sequence[str], codes: Codes = ()) -> tuple[pd.DataFrame, list[str]]:
     """One row per value, NaN where missing, and the names of further within-factors, each a column of text.
 
     The column period, if there is one, holds whole numbers.
@@ -196,7 +200,7 @@ def read_measures(path: Path, conditions: Sequence[str]) -> tuple[pd.DataFrame, 
     factors = [str(name) for name in table if name not in MEASURE_REQUIRED and name not in MEASURE_RESERVED]
     _required_text(path, table, MEASURE_REQUIRED[:3])
     _check_conditions(path, table, conditions)
-    table["value"] = _numbers(path, table, "value")
+    table["value"] = _numbers(path, table, "value", codes)
     if "period" in table:
         table["period"] = _periods(path, table)
     keys = [*MEASURE_REQUIRED[:3], *factors, *(name for name in ("trial", "period") if name in table)]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.study.comparison import Comparison
-from pipeline.study.fields import Axes, Frozen, Id, Positive, known, unique
+from pipeline.study.fields import Axes, Finite, Frozen, Id, Positive, known, unique
 from pipeline.study.preregistration_settings import Preregistration
 from pipeline.study.scoring_settings import Scoring
 from pipeline.study.session import Session, check_pattern
@@ -115,6 +115,7 @@ class Study(Frozen):
     printed: str | None = None
     repeats: str | None = None
     factors: Mapping[Id, Literal["between"]] = {}
+    missing: tuple[Finite | str, ...] = ()
     scoring: Mapping[Id, Scoring] = {}
     comparisons: tuple[Comparison, ...] = ()
     question: tuple[tuple[Id, Id], ...] = ()

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.analysis.table_checks import check_rows, order_rows
+from pipeline.study.scoring_settings import ScoringEntry
 from tests.pipeline.helpers import Steadyhand
 
 Folder = Callable[..., Path]
@@ -51,11 +52,20 @@ def alarms(values: pd.DataFrame, selections: pd.DataFrame | None = None) -> list
             "is -99 in 2 rows (P8 and P9) and 6.28 to 11 in all others",
         ),
         ("time", [*TIMES, 999.0], "code for missing", "leave the cell empty"),
+        ("time", [*TIMES, 999.0], "code for missing", "write missing: [999] in study.yaml"),
+        ("ueq/q1", [1, -2, 3, -99], "code for missing", "is -99 in 1 rows"),
         ("nasa_tlx/mental", [10, 20, 15, 250], "range of the scale", "such as 250"),
+        ("sus/q3", [1, 2, 5, 7], "range of the scale", "outside 1 to 5, such as 7"),
+        ("sus/score", [70, 85, 102.5], "range of the scale", "outside 0 to 100, such as 102.5"),
+        ("ueq/q1", [1, 7, 0, 3], "range of the scale", "outside 1 to 7, such as 0"),
+        ("ueq/q1", [-3, 0, -4, 3], "range of the scale", "outside -3 to 3, such as -4"),
+        ("ueq/attractiveness", [1.2, 0.4, 3.5], "range of the scale", "outside -3 to 3, such as 3.5"),
+        ("ssq/nausea", [0, 3, 4], "range of the scale", "outside 0 to 3, such as 4"),
+        ("ipq/sp1", [0, 6, 7], "range of the scale", "outside 0 to 6, such as 7"),
     ],
 )
 def test_what_is_not_what_it_is_taken_for_is_amber(measure: str, values: list[float], check: str, says: str) -> None:
-    (found,) = alarms(typed(measure, *values))
+    (found,) = (row for row in alarms(typed(measure, *values)) if row["check"].startswith(check))
     assert (found["check"], found["status"]) == (f"{check}: {measure}", "amber")
     assert says in found["message"]
 
@@ -68,12 +78,25 @@ def test_what_is_not_what_it_is_taken_for_is_amber(measure: str, values: list[fl
         ("score", [90.0, 95.0, 99.0, 100.0]),
         ("bias_mm", [-99.0, -40.0, 30.0, 80.0]),
         ("nasa_tlx/effort", [0.0, 100.0, 55.0]),
+        ("sus/q3", [1.0, 5.0, 3.0]),
+        ("sus/score", [0.0, 100.0, 72.5]),
+        ("ueq/q1", [-3.0, 3.0, 0.0]),
+        ("ueq/q1", [1.0, 7.0, 4.0]),
+        ("ssq/total", [0.0, 200.0, 30.0]),
+        ("own/q1", [1.0, 500.0, 30.0]),
         ("steps", [1.2e9, 15.0, 1.0]),
         ("time_s", [float("nan"), float("inf"), 3.0]),
     ],
 )
 def test_a_slow_task_or_a_wide_scale_is_no_alarm(measure: str, values: list[float]) -> None:
     assert alarms(typed(measure, *values)) == []
+
+
+def test_a_range_that_study_yaml_states_counts_more_than_the_instruments_own() -> None:
+    stated = {"nasa_tlx": ScoringEntry(rule="raw_tlx", range=(0, 20)), "own": ScoringEntry(rule="mean", range=(1, 7))}
+    for measure, value, limits in (("nasa_tlx/mental", 21.0, "0 to 20"), ("own/q1", 8.0, "1 to 7")):
+        (row,) = (row for row in check_rows(typed(measure, 3.0, value), None, stated) if row["status"] != "green")
+        assert f"outside {limits}, such as {value:g}" in row["message"]
 
 
 @given(st.lists(st.floats(0.2, 60), min_size=1, max_size=30))
@@ -118,6 +141,21 @@ def test_an_order_that_contradicts_the_dates_of_the_logs_names_who() -> None:
     as_stated = [(person, condition, place * 10**9) for place, (person, condition, _) in enumerate(began)]
     (row,) = order_rows(stated, pd.DataFrame(as_stated, columns=columns))
     assert row["status"] == "green"  # logs of the same minute, as simulated ones are, have no order
+
+
+def test_codes_listed_under_missing_are_missing_values(folder: Folder, steadyhand: Steadyhand) -> None:
+    rows = "".join(f"P{n},{c},time,{value}\n" for n in range(5) for c, value in (("a", 3 + n), ("b", 4 + 2 * n)))
+    rows += "P5,a,time,-99\nP5,b,time,5\nP6,a,time,k. A.\nP6,b,time,-99.0\n"
+    settings = "conditions: [a, b]\nmeasures: measures.csv\ncomparisons: [{measure: time, test: t_paired}]\n"
+    header = {"measures.csv": f"participant,condition,measure,value\n{rows}"}
+    ran = steadyhand("compare", folder(settings, **header))
+    assert ran.code == 2
+    assert 'found "k. A." (if that stands for a missing value, list it under `missing:` in study.yaml)' in ran.err
+    ran = steadyhand("compare", folder(f"missing: [-99, k. A.]\n{settings}", **header))
+    assert ran.code == 0, ran.err
+    found = steadyhand.results()
+    assert [row["n"] for row in found["comparisons"]] == [5]
+    assert [row["check"] for row in found["checks"] if row["status"] != "green"] == []
 
 
 @pytest.mark.usefixtures("blank_figures")
