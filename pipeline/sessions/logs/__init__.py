@@ -1,4 +1,4 @@
-"""Log formats: one module a format, each with `read(path, wanted) -> Log`."""
+"""Log formats: one module per format, each with `read(path, wanted) -> Log`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ READERS = {".mcap": "pipeline.sessions.logs.mcap"}
 
 
 def read_log(path: Path, wanted: Iterable[Wanted]) -> Log:
-    """A log by the reader of its suffix; SessionError where there is none, or the log cannot be used."""
+    """A log, read by the module for its suffix. Raises SessionError if there is none, or the log cannot be used."""
     module = READERS.get(path.suffix.lower())
     if module is None:
         raise SessionError(f"no reader for files ending in {path.suffix!r}; known: {', '.join(READERS)}")

@@ -27,7 +27,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Claims:
-    """What messages say beside their values, for checks alone; arrays (n,), or empty where the format does not tell.
+    """What messages say in addition to their values, used by checks only; arrays (n,), empty if the format has none.
 
     `frame` counts into the names of `frames`. Of an IMU: the length of the orientation as logged, NaN where the log
     says that it is unknown, and whether a covariance of −1 says to disregard acceleration or angular velocity.
@@ -42,11 +42,11 @@ class Claims:
 
 @dataclass(frozen=True)
 class Readings:
-    """A topic's messages in the order of the file. `lost` is None where nobody can know.
+    """A topic's messages in the order of the file. `lost` counts those lost, None where that cannot be known.
 
     `values` are SI, by content: position (n, 3) m; acceleration (n, 10): specific force in m/s², angular velocity
     in rad/s, orientation xyzw (NaN where unknown); events and anything (n, 0). `events` holds the decoded objects.
-    `sampled` says that they come at a steady rate, so that one which is missing can be told.
+    `sampled` is true of messages at a steady rate, where a missing one leaves a gap.
     """
 
     stamp_ns: IntArray
@@ -66,7 +66,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class MessageType:
-    """What a topic's messages are called and how they are encoded; `content` is None where the name does not tell."""
+    """The type and encoding of a topic's messages; `content` is None where the type's name does not say it."""
 
     name: str
     encoding: str

@@ -1,7 +1,7 @@
-"""MCAP logs with messages in CDR, protobuf or JSON: reading what is readable of a damaged one, and writing.
+"""MCAP logs with messages in CDR, protobuf or JSON: reads what is readable of a damaged one, and writes.
 
-Records are parsed by the `mcap` package, and what is unusual in payloads by the stock decoders; the walk through the
-file is ours, and so is the decoding of many messages at once.
+`container` walks through the file, `records` reads its records by the `mcap` package, `damage` says what is wrong with
+it. `payload` decodes messages: many at once where their shape is known, unusual ones by the stock decoders.
 """
 
 from __future__ import annotations
@@ -20,27 +20,25 @@ __all__ = ["MAGIC", "Message", "in_order", "read", "write"]
 
 
 def read(path: Path, wanted: Iterable[Wanted]) -> Log:
-    """The wanted topics of a log, decoded; SessionError if it is none, is a bomb, or contradicts itself.
+    """The wanted topics of a log, decoded. With nothing wanted, the messages of every topic are counted only.
 
-    With nothing wanted, every message of every topic is counted, and those that a study could not decode are said.
+    Raises SessionError for a file that is no log, is a decompression bomb, or contradicts itself.
     """
     content_of = {want.topic: want.content for want in wanted}
-    walked = walk_log(path, content_of or None)
+    walk = walk_log(path, content_of or None)
     if content_of:
-        topics = {
-            topic: decode(walked, topic, content) for topic, content in content_of.items() if topic in walked.topics
-        }
+        topics = {topic: decode(walk, topic, content) for topic, content in content_of.items() if topic in walk.topics}
     else:
-        topics = {topic: counted(walked, topic) for topic in walked.topics}
-    return Log(walked.facts, topics, tuple(walked.faults), _types(walked))
+        topics = {topic: counted(walk, topic) for topic in walk.topics}
+    return Log(walk.facts, topics, tuple(walk.faults), _types(walk))
 
 
-def _types(walked: Walk) -> dict[str, MessageType]:
+def _types(walk: Walk) -> dict[str, MessageType]:
     """The type of every topic that the log names; of several on one topic the last."""
-    found = {}
-    for channel in walked.channels.values():
-        schema = walked.schemas.get(channel.schema_id)
+    types = {}
+    for channel in walk.channels.values():
+        schema = walk.schemas.get(channel.schema_id)
         name = "" if schema is None else schema.name
         content = content_of(channel.message_encoding, name)
-        found[channel.topic] = MessageType(name, channel.message_encoding, content)
-    return found
+        types[channel.topic] = MessageType(name, channel.message_encoding, content)
+    return types

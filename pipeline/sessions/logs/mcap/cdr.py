@@ -24,7 +24,7 @@ COLUMNS: Mapping[str, tuple[int, ...]] = {
     "position": (0, 1, 2),
     "acceleration": (25, 26, 27, 13, 14, 15, 0, 1, 2, 3, 4),
 }
-"""Which of them are kept: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""
+"""Which of them are used: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""
 
 _HEADER = 4
 _NAME = 16  # where the frame's name begins, its length before it
@@ -32,7 +32,7 @@ _EMPTY_NAME_BYTES = 20
 
 
 def fields(rows: Bytes, content: str) -> Fields:
-    """The fields of equally long messages, shape (n, length); of those that do not fit nothing is to be believed."""
+    """The fields of equally long messages, shape (n, length). Where `fits` is false the values mean nothing."""
     count, length = rows.shape
     body = length - (length - _HEADER) % 8 - 8 * NUMBERS[content]
     result = Fields.none_of(count, content)
@@ -82,10 +82,10 @@ def _is_text(name: bytes, size: int) -> bool:
 
 
 def laid_out_alike(row: Bytes, content: str, stock: Callable[[bytes], Reading]) -> bool:
-    """Whether the stock decoder finds the fields of such a message where they are looked for here.
+    """Whether the stock decoder reads a message of this shape in the same way.
 
-    It follows the log's own schema. It is given the message with other figures in it, each different and the stamp
-    before 1970, so that none can be taken for another.
+    It follows the log's own schema. The probe is the message with other figures in it, each different and the stamp
+    before 1970, so that no field can be mistaken for another.
     """
     probe = row.copy()[np.newaxis]
     body = len(row) - (len(row) - _HEADER) % 8 - 8 * NUMBERS[content]

@@ -1,6 +1,6 @@
-"""What messages in CDR say beside the values that are used: their frame, and what is to be disregarded.
+"""What messages in CDR say in addition to their values: the frame, and which values to disregard.
 
-Nothing is decoded by it and nothing can fail by it: messages of another encoding claim nothing.
+It is for checks only: nothing is decoded by it and it never fails. Messages of other encodings claim nothing.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def _frames(rows: np.ndarray[tuple[int, int], np.dtype[np.uint8]], names: dict[b
     text = rows[:, _NAME : _NAME + width]
     if not changes[1:].any() and len(text) and (text == text[0]).all():
         return np.full(len(rows), names.setdefault(text[0].tobytes().rstrip(b"\0"), len(names)))
-    found = np.zeros(len(rows), np.int64)
+    numbers = np.zeros(len(rows), np.int64)
     for index, row in enumerate(rows):
         size = int.from_bytes(row[_NAME_BYTES:_NAME].tobytes(), "little" if row[1] == 1 else "big")
-        found[index] = names.setdefault(row[_NAME : _NAME + size].tobytes().rstrip(b"\0"), len(names))
-    return found
+        numbers[index] = names.setdefault(row[_NAME : _NAME + size].tobytes().rstrip(b"\0"), len(names))
+    return numbers

@@ -1,4 +1,4 @@
-"""A ROS 2 message definition, looked at before the stock decoder follows it.
+"""Checks a ROS 2 message definition before the stock decoder follows it.
 
 That decoder reads arrays of messages beyond the end of the bytes, so a definition could keep it busy for ever.
 """

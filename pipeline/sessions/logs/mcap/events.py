@@ -18,24 +18,24 @@ _EVENT_LIMIT = 64 * 1024  # bytes of one event
 
 
 def event(channel: Channel, payload: bytes, farthest_m: float) -> Mapping[str, object]:
-    """What is used of an event: type, trial, and the target and selected position in metres.
+    """The used fields of an event: type, trial, and the target and selected position in metres.
 
-    ValueError, or another that JSON and its types raise, where it is none.
+    Raises ValueError, or what JSON and its types raise, for anything that is not an event.
     """
     if channel.message_encoding != "json":
         raise ValueError(f'its encoding is "{channel.message_encoding}", not json')
     if len(payload) > _EVENT_LIMIT:
         raise ValueError(f"it is longer than {_EVENT_LIMIT // 1024} KiB, which no event is")
-    said = json.loads(payload)
-    if not isinstance(said, dict) or said.get("type") not in EVENT_TYPES:
+    message = json.loads(payload)
+    if not isinstance(message, dict) or message.get("type") not in EVENT_TYPES:
         raise ValueError(f"it is not an event: `type` must be one of {', '.join(EVENT_TYPES)}")
-    trial = said.get("trial")
+    trial = message.get("trial")
     if trial is not None and not (isinstance(trial, int) and abs(trial) < _NUMBER_LIMIT):
         raise ValueError("its trial is not a whole number")
-    found = {"type": said["type"], "trial": trial}
+    fields = {"type": message["type"], "trial": trial}
     for key in ("target_x", "target_y", "target_z", "x", "y", "z"):
-        if said.get(key) is not None:
-            found[key] = float(said[key])
-            if np.isfinite(found[key]) and abs(found[key]) > farthest_m:
+        if message.get(key) is not None:
+            fields[key] = float(message[key])
+            if np.isfinite(fields[key]) and abs(fields[key]) > farthest_m:
                 raise ValueError(f"{UNFIT}: a figure is out of all range")
-    return found
+    return fields

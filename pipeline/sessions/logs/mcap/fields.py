@@ -1,4 +1,4 @@
-"""What a message holds, whatever its encoding: where its fields are called what, and the arrays they are put in."""
+"""The fields of a message, whatever its encoding: their names in known types, and the arrays for their values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.sessions.logs.mcap.records import BROKEN
 from pipeline.statistics.arrays import FloatArray
 
 WIDTHS: Mapping[str, int] = {"position": 3, "acceleration": 11}
-"""How many figures are kept: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""
+"""How many values are used: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""
 
 UNFIT = "the bytes do not fit the schema"
 UNDECODABLE = (*BROKEN, AttributeError, TypeError, LookupError, RuntimeError)
@@ -32,12 +32,12 @@ POINTS: Sequence[Path] = (("point",), ("pose", "position"))
 FORCE, RATE, TURN, COVARIANCE = "linear_acceleration", "angular_velocity", "orientation", "orientation_covariance"
 
 Reading = tuple[int, int, list[float]]
-"""A stamp's seconds and nanoseconds, and the kept figures."""
+"""A stamp's seconds and nanoseconds, and the used values."""
 
 
 @dataclass(frozen=True)
 class Fields:
-    """What n messages hold: stamps (n,), the kept figures (n, w), and which of the messages are decoded (n,)."""
+    """What n messages hold: stamps (n,), the used values (n, w), and which of the messages are decoded (n,)."""
 
     seconds: IntArray
     nanoseconds: IntArray
@@ -46,7 +46,7 @@ class Fields:
 
     @staticmethod
     def none_of(count: int, content: str) -> Fields:
-        """Room for so many messages, none of them decoded."""
+        """Arrays for `count` messages, none of them decoded yet."""
         return Fields(
             np.zeros(count, np.int64),
             np.zeros(count, np.int64),
@@ -55,16 +55,17 @@ class Fields:
         )
 
     def take(self, at: IntArray, of: Fields, which: IntArray) -> None:
-        """Put messages `which` of others in at `at`, as decoded."""
+        """Copy the messages `which` of `of` to the places `at`, and mark them as decoded."""
         self.seconds[at], self.nanoseconds[at] = of.seconds[which], of.nanoseconds[which]
         self.values[at], self.fits[at] = of.values[which], True
 
 
 @dataclass(frozen=True)
 class Decoder:
-    """A channel's decoder. `one` is the stock packages' way, raising where a message cannot be read.
+    """A channel's decoder, slow and fast.
 
-    `many` decodes as many as it can of the messages at some indices, as `one` would; the others it leaves.
+    `one` decodes a message with the stock packages, and raises for one that cannot be read. `many` decodes as many as
+    it can of the messages at some indices, with the same result as `one`, and leaves the others to `one`.
     """
 
     one: Callable[[bytes], Reading]
@@ -72,13 +73,13 @@ class Decoder:
 
 
 def check_size(payload: bytes) -> None:
-    """ValueError for a message that would grow beyond measure when it is decoded."""
+    """Raise ValueError for a message that is too long: decoded, it could fill the memory."""
     if len(payload) > PAYLOAD_LIMIT:
         raise ValueError(f"it is longer than {PAYLOAD_LIMIT // 1024} KiB, which no sensor's message is")
 
 
 def check_stamp(seconds: int, nanoseconds: int) -> None:
-    """ValueError for a stamp that no stamp's fields can hold."""
+    """Raise ValueError for a stamp outside what its 32-bit fields can hold."""
     if not (-(2**31) <= seconds < 2**32 and 0 <= nanoseconds < 2**32):
         raise ValueError(UNFIT)
 

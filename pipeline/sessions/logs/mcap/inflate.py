@@ -1,4 +1,4 @@
-"""A chunk's bytes, never more of them than it states, nor than a log may hold."""
+"""Unpacks a chunk, never to more bytes than it states and than a log may hold."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHUNK_LIMIT = 128 * 2**20
 
 
 def inflate(chunk: Chunk) -> bytes:
-    """The chunk's bytes; one of DAMAGED if it does not hold what it states, or cannot be inflated."""
+    """The chunk's bytes. Raises one of `DAMAGED` if it cannot be unpacked or holds more or less than it states."""
     stated = chunk.uncompressed_size
     if chunk.compression == "":
         data = bytes(chunk.data)
@@ -31,14 +31,14 @@ def inflate(chunk: Chunk) -> bytes:
 
 
 def check_stated_size(chunk: Chunk) -> None:
-    """One of DAMAGED where the compressed bytes themselves say another size than the chunk does."""
-    own = None
+    """Raise one of `DAMAGED` where the compressed bytes state a smaller size than the chunk does."""
+    own_size = None
     if chunk.compression == "zstd":
         size = zstandard.frame_content_size(chunk.data)
-        own = None if size < 0 else size
+        own_size = None if size < 0 else size
     elif chunk.compression == "lz4":
-        own = lz4.frame.get_frame_info(chunk.data)["content_size"] or None
+        own_size = lz4.frame.get_frame_info(chunk.data)["content_size"] or None
     elif chunk.compression == "":
-        own = len(chunk.data)
-    if own is not None and own < chunk.uncompressed_size:
-        raise ValueError(f"it states {chunk.uncompressed_size} bytes and holds {own}")
+        own_size = len(chunk.data)
+    if own_size is not None and own_size < chunk.uncompressed_size:
+        raise ValueError(f"it states {chunk.uncompressed_size} bytes and holds {own_size}")

@@ -46,7 +46,7 @@ _UNUSUAL = (ValueError, TypeError, LookupError, OverflowError)
 
 
 def decoder(_: Channel, schema: Schema | None, content: str) -> Decoder:
-    """ValueError if the schema is not JSON's; how it is called does not matter, fields are found by their names."""
+    """The decoder of a channel. Raises ValueError if the schema is not a JSON schema; its name does not matter."""
     if schema is not None and schema.encoding not in ("jsonschema", ""):
         raise ValueError(f'its schema is written as "{schema.encoding}", not jsonschema')
 
@@ -58,9 +58,9 @@ def decoder(_: Channel, schema: Schema | None, content: str) -> Decoder:
         check_stamp(seconds, nanoseconds)
         return seconds, nanoseconds, _figures(message, names, content)
 
-    def many(messages: Messages, which: IntArray, found: Fields) -> None:
+    def many(messages: Messages, which: IntArray, fields: Fields) -> None:
         for begin in range(0, len(which), _BLOCK):
-            _decode_block(messages, which[begin : begin + _BLOCK], content, found)
+            _decode_block(messages, which[begin : begin + _BLOCK], content, fields)
 
     return Decoder(one, many)
 
@@ -76,14 +76,14 @@ class _Names:
 
 
 def _names(message: object, content: str) -> _Names:
-    """ValueError where a message lacks what it must have."""
+    """The names that a message uses. Raises ValueError where a required field is missing."""
     if not isinstance(message, dict):
         raise ValueError("it is no JSON object")
-    stamp = _first_there(message, STAMPS)
-    units = [_first_there(message, [(*stamp, name) for name in names])[-1] for names in (SECONDS, NANOSECONDS)]
+    stamp = _first_present(message, STAMPS)
+    units = [_first_present(message, [(*stamp, name) for name in names])[-1] for names in (SECONDS, NANOSECONDS)]
     stamps = ((*stamp, units[0]), (*stamp, units[1]))
     if content == "position":
-        return _Names(stamps, [(_first_there(message, POINTS), "xyz")], False, False)
+        return _Names(stamps, [(_first_present(message, POINTS), "xyz")], False, False)
     oriented = message.get(TURN) is not None
     return _Names(
         stamps,
@@ -93,7 +93,7 @@ def _names(message: object, content: str) -> _Names:
     )
 
 
-def _first_there(message: object, paths: Sequence[Path]) -> Path:
+def _first_present(message: object, paths: Sequence[Path]) -> Path:
     for path in paths:
         try:
             if _at(message, path) is not None:
@@ -125,22 +125,22 @@ def _number(value: object, name: str) -> float:
 
 
 def _figures(message: dict[str, Any], names: _Names, content: str) -> list[float]:
-    """The figures of one message, an orientation that is not there as zeros, which no orientation has."""
+    """The values of one message; a missing orientation as zeros, which no real one has."""
     paths = [(*path, axis) for path, axes in names.vectors for axis in axes]
-    found = [_number(_at(message, path), ".".join(path)) for path in paths]
-    found += [0.0] * (min(WIDTHS[content], 10) - len(found))
+    values = [_number(_at(message, path), ".".join(path)) for path in paths]
+    values += [0.0] * (min(WIDTHS[content], 10) - len(values))
     if content == "position":
-        return found
+        return values
     if not names.covariance:
-        return [*found, 0.0]
+        return [*values, 0.0]
     covariance = message[COVARIANCE]
     if not isinstance(covariance, list) or not covariance:
         raise ValueError(f"its {COVARIANCE} is no list of numbers")
-    return [*found, _number(covariance[0], f"{COVARIANCE}[0]")]
+    return [*values, _number(covariance[0], f"{COVARIANCE}[0]")]
 
 
-def _decode_block(messages: Messages, which: IntArray, content: str, found: Fields) -> None:
-    """Fill in some messages, all or none: they are left where their fields are not called alike."""
+def _decode_block(messages: Messages, which: IntArray, content: str, fields: Fields) -> None:
+    """Fill in some messages, all or none: none where their fields have different names."""
     if messages.length[which].max() > PAYLOAD_LIMIT:
         return
     try:
@@ -154,7 +154,7 @@ def _decode_block(messages: Messages, which: IntArray, content: str, found: Fiel
         return
     if holds_stamps(seconds, nanoseconds).all():
         every = np.arange(len(which))
-        found.take(which, Fields(seconds, nanoseconds, values, np.ones(len(which), bool)), every)
+        fields.take(which, Fields(seconds, nanoseconds, values, np.ones(len(which), bool)), every)
 
 
 def _matrix(parsed: Sequence[Any], names: _Names, content: str) -> FloatArray:
@@ -187,7 +187,7 @@ def _column(parsed: Sequence[Any], path: Path, kinds: tuple[type, ...]) -> np.nd
 
 
 def _array(values: Iterable[Any], kinds: tuple[type, ...]) -> np.ndarray[Any, Any]:
-    """Numbers of these types only: NumPy would take truth values for numbers, and text too."""
+    """Numbers of these types only: NumPy would accept truth values and text as numbers too."""
     flat = list(values)
     if not set(map(type, flat)) <= set(kinds):
         raise TypeError("not all numbers")

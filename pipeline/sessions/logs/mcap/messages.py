@@ -1,4 +1,4 @@
-"""Messages as arrays: where each lies in a run of records, gathered without a Python object a message."""
+"""Messages as arrays: where each lies in a run of records, without one Python object per message."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Messages:
         return list(zip(numbers.tolist(), np.split(order, begins[1:]), strict=True))
 
     def chosen(self, which: IntArray, payloads: bool = True) -> Messages:
-        """Some of the messages, holding on to no bytes but their own, or to none."""
+        """Some of the messages with a copy of their own bytes, so that the rest can be freed; or without any bytes."""
         length = self.length[which] if payloads else np.zeros(len(which), np.int64)
         if len(length) and np.all(length == length[0]):
             data = self.rows(which).tobytes() if length[0] else b""
@@ -81,7 +81,7 @@ class Messages:
 
 
 def joined(parts: Sequence[Messages]) -> Messages:
-    """One after the other."""
+    """All messages in one, in their order."""
 
     def column(name: str, kind: type) -> npt.NDArray[Any]:
         return np.concatenate([np.zeros(0, kind), *(getattr(part, name) for part in parts)])
@@ -126,5 +126,5 @@ def messages_at(data: bytes, starts: IntArray) -> tuple[Messages, int]:
     length = head["size"].astype(np.int64) - (_HEAD.itemsize - RECORD_HEAD_BYTES)
     whole = length >= 0
     head, length, begin = head[whole], length[whole], within[whole] + _HEAD.itemsize
-    found = Messages(head["log_time"], head["publish_time"], head["channel"], begin, length, data)
-    return found, len(starts) - len(found)
+    messages = Messages(head["log_time"], head["publish_time"], head["channel"], begin, length, data)
+    return messages, len(starts) - len(messages)

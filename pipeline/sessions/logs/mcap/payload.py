@@ -1,6 +1,6 @@
-"""Messages decoded, by the encoding of each channel: many at once, and by the stock decoder what is unusual.
+"""Decodes a topic's messages by the encoding of each channel: many at once, unusual ones by the stock decoder.
 
-What does not fit is lost and counted.
+A message that cannot be decoded is counted as lost, with the reason in the notes.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ _DECODERS: Mapping[str, str] = {
 
 _TIME_LIMIT_NS = 2**62
 _PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond it the bytes are something else
-_TYPES_LIMIT = 64  # of one topic; following a schema takes its time
+_TYPES_LIMIT = 64  # types of one topic, because following each schema takes time
 _REASON_LIMIT = 300  # characters: names in a log may be long
-_NOTES = 3  # reasons told apart; the rest are counted together
+_NOTES = 3  # reasons named one by one; messages with others are counted together
 
 Failures = dict[int, str]
 """Why a message cannot be read, by its index."""
 
 
 def decode(walk: Walk, topic: str, content: Content) -> Readings:
-    """A topic's messages, as its content; what does not fit is lost and said."""
+    """A topic's messages, decoded as `content`; those that cannot be are counted as lost, and the notes say why."""
     messages = joined(walk.topics[topic].parts)
     failures: Failures = {}
     stamp = np.minimum(messages.publish_time, _TIME_LIMIT_NS).astype(np.int64)
@@ -53,15 +53,15 @@ def decode(walk: Walk, topic: str, content: Content) -> Readings:
         stamp, values = _measured(walk, messages, content, failures)
     for index in np.flatnonzero(np.maximum(messages.log_time, messages.publish_time) > _TIME_LIMIT_NS).tolist():
         failures.setdefault(index, "its time is out of all range")
-    whole = np.ones(len(messages), bool)
-    whole[list(failures)] = False
-    kept = np.flatnonzero(whole)
-    claims = claimed(walk, messages, kept, content) if content in SAMPLED else Claims()
+    is_readable = np.ones(len(messages), bool)
+    is_readable[list(failures)] = False
+    readable = np.flatnonzero(is_readable)
+    claims = claimed(walk, messages, readable, content) if content in SAMPLED else Claims()
     return Readings(
-        stamp[kept],
-        messages.log_time[kept].astype(np.int64),
-        values[kept],
-        tuple(events[index] for index in kept.tolist()) if content == "events" else (),
+        stamp[readable],
+        messages.log_time[readable].astype(np.int64),
+        values[readable],
+        tuple(events[index] for index in readable.tolist()) if content == "events" else (),
         _lost(walk, topic, len(failures)),
         _notes(failures),
         content in SAMPLED,
@@ -70,7 +70,7 @@ def decode(walk: Walk, topic: str, content: Content) -> Readings:
 
 
 def counted(walk: Walk, topic: str) -> Readings:
-    """A topic's messages, all of them; those that a study could not decode are said, as far as the schema tells."""
+    """A topic's messages, counted. Notes say which a study could not decode, where the schema says what they hold."""
     every = decode(walk, topic, "anything")
     content = walk.topics[topic].content
     if content is None:
@@ -79,8 +79,8 @@ def counted(walk: Walk, topic: str) -> Readings:
         notes = decode(walk, topic, content).notes
     except SessionError as error:
         notes = (str(error),)
-    said = tuple(f"counted, but a study would lose them: {note}" for note in notes if note not in every.notes)
-    return replace(every, notes=(*every.notes, *said), sampled=content in SAMPLED)
+    undecodable = tuple(f"counted, but a study would lose them: {note}" for note in notes if note not in every.notes)
+    return replace(every, notes=(*every.notes, *undecodable), sampled=content in SAMPLED)
 
 
 def _notes(failures: Failures) -> tuple[str, ...]:
@@ -92,19 +92,19 @@ def _notes(failures: Failures) -> tuple[str, ...]:
 
 
 def _lost(walk: Walk, topic: str, undecodable: int) -> int | None:
-    """How many messages the log says it held and that are not there; None where it does not say."""
-    gathered = walk.topics[topic]
+    """How many messages the log states that it holds and does not; None where it does not state that."""
+    collected = walk.topics[topic]
     if walk.stated is not None:
-        stated = sum(walk.stated.get(channel, 0) for channel in gathered.channels)
-        return max(stated - gathered.read, gathered.in_damaged_chunks) + undecodable
+        stated = sum(walk.stated.get(channel, 0) for channel in collected.channels)
+        return max(stated - collected.read, collected.in_damaged_chunks) + undecodable
     if walk.unknown_loss:
         return None
-    return gathered.in_damaged_chunks + undecodable
+    return collected.in_damaged_chunks + undecodable
 
 
 def _measured(walk: Walk, messages: Messages, content: str, failures: Failures) -> tuple[IntArray, FloatArray]:
     """Stamps (ns) and values of positions or accelerations."""
-    found = Fields.none_of(len(messages), content)
+    fields = Fields.none_of(len(messages), content)
     decoders: dict[tuple[str, int], Decoder | str] = {}
     for channel_id, own in messages.by_channel():
         channel = walk.channels[channel_id]
@@ -118,15 +118,15 @@ def _measured(walk: Walk, messages: Messages, content: str, failures: Failures) 
         if isinstance(decoder, str):
             failures.update(dict.fromkeys(own.tolist(), decoder))
             continue
-        decoder.many(messages, own, found)
-        for index in own[~found.fits[own]].tolist():
+        decoder.many(messages, own, fields)
+        for index in own[~fields.fits[own]].tolist():
             try:
-                found.seconds[index], found.nanoseconds[index], found.values[index] = decoder.one(
+                fields.seconds[index], fields.nanoseconds[index], fields.values[index] = decoder.one(
                     messages.payload(index)
                 )
             except UNDECODABLE as error:
                 failures[index] = _reason(error)
-    return _judged(found, content, failures)
+    return _plausible(fields, content, failures)
 
 
 def _decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder | str:
@@ -146,21 +146,24 @@ def _reason(error: Exception) -> str:
     return text if len(text) <= _REASON_LIMIT else f"{text[:_REASON_LIMIT]} …"
 
 
-def _judged(found: Fields, content: str, failures: Failures) -> tuple[IntArray, FloatArray]:
-    """Stamps and values; NaN and infinity stay, which are the study's business and not the format's."""
-    motion = found.values[:, : 3 if content == "position" else 6]
+def _plausible(fields: Fields, content: str, failures: Failures) -> tuple[IntArray, FloatArray]:
+    """Stamps and values, where values beyond all range fail; NaN and infinity stay for the checks of the study.
+
+    An orientation is NaN where the log says that it is unknown, or its length is not 1.
+    """
+    motion = fields.values[:, : 3 if content == "position" else 6]
     too_far = ((np.abs(motion) > _PLAUSIBLE[content]) & np.isfinite(motion)).any(axis=1)
-    no_stamp = (found.nanoseconds < 0) | (found.nanoseconds >= 1_000_000_000)
+    no_stamp = (fields.nanoseconds < 0) | (fields.nanoseconds >= 1_000_000_000)
     for unfit, reason in ((no_stamp, UNFIT), (too_far, f"{UNFIT}: a figure is out of all range")):
         for index in np.flatnonzero(unfit).tolist():
             failures.setdefault(index, reason)
-    stamp = found.seconds * 1_000_000_000 + found.nanoseconds
+    stamp = fields.seconds * 1_000_000_000 + fields.nanoseconds
     if content == "position":
         return stamp, motion
-    turn = found.values[:, 6:10]
+    turn = fields.values[:, 6:10]
     with np.errstate(over="ignore", invalid="ignore"):
         length = (turn**2).sum(axis=1)
-    known = (found.values[:, 10] != -1) & (length > 0.8) & (length < 1.25)
+    known = (fields.values[:, 10] != -1) & (length > 0.8) & (length < 1.25)
     return stamp, np.hstack([motion, np.where(known[:, np.newaxis], turn, np.nan)])
 
 

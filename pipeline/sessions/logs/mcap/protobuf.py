@@ -49,7 +49,7 @@ _FIGURES = frozenset({FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT})
 
 @dataclass(frozen=True)
 class _Layout:
-    """The paths of a stamp's two fields and of the kept figures, and of the messages that must be there."""
+    """The paths of a stamp's two fields, of the used values, and of the messages that must be present."""
 
     stamp: tuple[Path, Path]
     figures: tuple[Path, ...]
@@ -68,7 +68,7 @@ class _Layout:
 
 
 def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
-    """ValueError or McapError if the schema lacks the content's fields, or cannot be read."""
+    """The decoder of a channel. Raises ValueError or McapError if the schema lacks needed fields or cannot be read."""
     if schema is None:
         raise ValueError("it has no schema, and protobuf cannot be read without")
     if schema.encoding != "protobuf":
@@ -94,13 +94,13 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         check_stamp(seconds, nanoseconds)
         return seconds, nanoseconds, [float(_value(message, path)) for path in layout.figures]
 
-    def many(messages: Messages, which: IntArray, found: Fields) -> None:
+    def many(messages: Messages, which: IntArray, fields: Fields) -> None:
         for length in np.unique(messages.length[which]).tolist():
             if length <= PAYLOAD_LIMIT:
-                _decode_equally_long(messages, which[messages.length[which] == length], found)
+                _decode_equally_long(messages, which[messages.length[which] == length], fields)
 
-    def _decode_equally_long(messages: Messages, which: IntArray, found: Fields) -> None:
-        """The first message not yet read is the next template; one that is none is left."""
+    def _decode_equally_long(messages: Messages, which: IntArray, fields: Fields) -> None:
+        """Use the first message not read yet as a template for others; one that makes no template is left."""
         rows = messages.rows(which)
         left: IntArray = np.arange(len(which))
         for _ in range(_TEMPLATES):
@@ -113,19 +113,19 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
                 continue
             part = rows if len(left) == len(rows) else rows[left]
             read = template.read(part)
-            found.take(which[left[read.fits]], read, np.flatnonzero(read.fits))
+            fields.take(which[left[read.fits]], read, np.flatnonzero(read.fits))
             left = left[~read.fits]
 
     return Decoder(one, many)
 
 
 def _layout(descriptor: Descriptor, content: str) -> _Layout:
-    """ValueError that names the field which the schema lacks, or holds as another type."""
-    stamp = _first_known(descriptor, STAMPS)
-    seconds = _first_known(descriptor, tuple((*stamp, name) for name in SECONDS))
-    nanoseconds = _first_known(descriptor, tuple((*stamp, name) for name in NANOSECONDS))
+    """The paths of the needed fields. Raises ValueError that names one which is missing or of another type."""
+    stamp = _first_present(descriptor, STAMPS)
+    seconds = _first_present(descriptor, tuple((*stamp, name) for name in SECONDS))
+    nanoseconds = _first_present(descriptor, tuple((*stamp, name) for name in NANOSECONDS))
     if content == "position":
-        point = _first_known(descriptor, POINTS)
+        point = _first_present(descriptor, POINTS)
         vectors = [(point, "xyz")]
     else:
         vectors = [((FORCE,), "xyz"), ((RATE,), "xyz"), ((TURN,), "xyzw")]
@@ -138,7 +138,7 @@ def _layout(descriptor: Descriptor, content: str) -> _Layout:
     return _Layout((seconds, nanoseconds), tuple(figures), needed)
 
 
-def _first_known(descriptor: Descriptor, paths: Any) -> Path:
+def _first_present(descriptor: Descriptor, paths: Any) -> Path:
     for path in paths:
         if _field(descriptor, path) is not None:
             return tuple(path)
@@ -168,7 +168,7 @@ def _check_type(descriptor: Descriptor, path: Path, kinds: frozenset[int]) -> No
 
 
 def _check_whole(message: Message, layout: _Layout) -> None:
-    """ValueError where something is missing, or there is what the schema does not know: protobuf would pass over it."""
+    """Raise ValueError for a missing needed message, or for a field that the schema lacks, which protobuf ignores."""
     for path in layout.parents:
         part, there = message, True
         for depth, name in enumerate(path):
@@ -181,7 +181,7 @@ def _check_whole(message: Message, layout: _Layout) -> None:
 
 
 def _value(message: Any, path: Path) -> Any:
-    """A field's value, of a list its first; what is not sent is zero in protobuf."""
+    """A field's value, the first one of a list; a field that is not sent is zero in protobuf."""
     for name in path:
         message = getattr(message, name)
     return next(chain(message, (0.0,))) if path == (COVARIANCE,) else message

@@ -48,7 +48,7 @@ _WIRE = {
 
 
 class Declined(Exception):  # noqa: N818
-    """This message makes no template; it may be sound all the same."""
+    """This message cannot serve as a template; it may be valid all the same."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class _Place:
 
 
 @dataclass
-class _Shape:
+class _Structure:
     """Which bits of a message are its shape (n,), and the places of its fields."""
 
     shape: Bytes
@@ -70,7 +70,10 @@ class _Shape:
 
 @dataclass(frozen=True)
 class Template:
-    """The places of the leaves, and what those hold that are not sent; `shape` is a mask, `bits` what is under it."""
+    """Where the leaves of a message are, and how to recognise messages of the same shape.
+
+    Bits under the mask `shape`, at the bytes `at`, must equal `bits`. `unsent` are the values of leaves not sent.
+    """
 
     at: IntArray
     shape: Bytes
@@ -82,23 +85,25 @@ class Template:
     def of(row: Bytes, descriptor: Descriptor, leaves: Sequence[Path], one: Callable[[bytes], Reading]) -> Template:
         """A template by this message: leaves are a stamp's seconds and nanoseconds, then figures.
 
-        Declined if it has anything unusual in it, or `one`, the stock decoder, finds other figures by it; what `one`
-        raises if it cannot read the message.
+        Raises Declined if the message holds anything unusual, or `one`, the stock decoder, reads other values; and
+        whatever `one` raises for a message that it cannot read.
         """
         data = row.tobytes()
         seconds, nanoseconds, values = one(data)
-        found = _Shape(np.zeros(len(row), np.uint8))
-        _take_apart(data, 0, len(data), descriptor, (), found)
-        at = np.flatnonzero(found.shape)
-        places = {index: found.places[path] for index, path in enumerate(leaves) if path in found.places}
+        structure = _Structure(np.zeros(len(row), np.uint8))
+        _parse_fields(data, 0, len(data), descriptor, (), structure)
+        at = np.flatnonzero(structure.shape)
+        places = {index: structure.places[path] for index, path in enumerate(leaves) if path in structure.places}
         if any(place.kind not in (_WHOLE if index < 2 else _FLOATS) for index, place in places.items()):
             raise Declined
-        template = Template(at, found.shape[at], row[at] & found.shape[at], places, (seconds, nanoseconds, *values))
+        template = Template(
+            at, structure.shape[at], row[at] & structure.shape[at], places, (seconds, nanoseconds, *values)
+        )
         template._check(row, one)
         return template
 
     def _check(self, row: Bytes, one: Callable[[bytes], Reading]) -> None:
-        """The same message with other figures, each different, so that none can be taken for another."""
+        """Compare with the stock decoder on the same message with other values, each different from all others."""
         probe = row.copy()
         for index, place in self.places.items():
             if place.kind in _FLOATS:
@@ -134,8 +139,8 @@ def _varints(cells: Bytes, kind: int) -> IntArray:
     return whole & 0xFFFFFFFF if kind == FieldDescriptor.TYPE_UINT32 else whole
 
 
-def _take_apart(data: bytes, begin: int, end: int, descriptor: Descriptor, path: Path, found: _Shape) -> None:
-    """Note the shape and places of the fields between two places; Declined at anything out of the ordinary.
+def _parse_fields(data: bytes, begin: int, end: int, descriptor: Descriptor, path: Path, structure: _Structure) -> None:
+    """Note the shape and places of the fields from `begin` to `end`. Raises Declined for anything unusual.
 
     Of a field that is sent twice the last counts, as in protobuf.
     """
@@ -145,37 +150,39 @@ def _take_apart(data: bytes, begin: int, end: int, descriptor: Descriptor, path:
         known = descriptor.fields_by_number.get(tag >> 3)
         if known is None or len(path) > _DEPTH_LIMIT:
             raise Declined
-        found.shape[at:value] = 0xFF
-        at = _take_field(data, value, end, known, tag & 7, (*path, known.name), found)
+        structure.shape[at:value] = 0xFF
+        at = _parse_field(data, value, end, known, tag & 7, (*path, known.name), structure)
 
 
-def _take_field(data: bytes, at: int, end: int, known: FieldDescriptor, wire: int, path: Path, found: _Shape) -> int:
+def _parse_field(
+    data: bytes, at: int, end: int, known: FieldDescriptor, wire: int, path: Path, structure: _Structure
+) -> int:
     """Note one field's value, which begins at `at`; where it ends."""
     packed = known.is_repeated and wire == _LENGTH and known.type in _FLOATS
     if not packed and (known.is_repeated or wire != _WIRE.get(known.type)):
         raise Declined
     if wire == _VARINT:
         _, after = _varint(data, at, end)
-        found.shape[at:after] = 0x80
-        found.places[path] = _Place(at, after - at, known.type)
+        structure.shape[at:after] = 0x80
+        structure.places[path] = _Place(at, after - at, known.type)
         return after
     if wire in _SIZES:
         after = at + _SIZES[wire]
         if after > end:
             raise Declined
-        found.places[path] = _Place(at, after - at, known.type)
+        structure.places[path] = _Place(at, after - at, known.type)
         return after
     length, inner = _varint(data, at, end)
     after = inner + length
     if after > end:
         raise Declined
-    found.shape[at:inner] = 0xFF
+    structure.shape[at:inner] = 0xFF
     if packed and length:
-        found.places[path] = _Place(inner, _FLOATS[known.type], known.type)
+        structure.places[path] = _Place(inner, _FLOATS[known.type], known.type)
     elif known.message_type is not None:
-        _take_apart(data, inner, after, known.message_type, path, found)
+        _parse_fields(data, inner, after, known.message_type, path, structure)
     elif known.type == FieldDescriptor.TYPE_STRING:
-        found.shape[inner:after] = 0xFF  # the same name, so it is text in each if it is in one
+        structure.shape[inner:after] = 0xFF  # the same name, so it is text in each if it is in one
     return after
 
 

@@ -1,4 +1,4 @@
-"""Where a damaged log can be read again: the next record that cannot be mistaken for other bytes."""
+"""Finds where reading can resume behind damage: at the next record that cannot be mistaken for other bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ROS 2 messages: the stock decoder, which follows the log's own definition, and CDR many at once where it can be."""
+"""ROS 2 messages in CDR: many at once, or one by one by the stock decoder, which follows the log's definition."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fiel
 from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 
-_DEFINITIONS_KEPT = 16
+_DEFINITIONS_CACHED = 16
 
 
 def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
-    """One of UNDECODABLE if the schema is not the content's, or cannot be followed."""
+    """The decoder of a channel. Raises one of `UNDECODABLE` if the schema is of another type or cannot be followed."""
     needed = SCHEMAS[content]
     if schema is None or schema.name != needed:
-        found = "no schema" if schema is None else schema.name
-        raise ValueError(f"it holds {found}, and a stream of kind {content} needs {needed}")
+        holds = "no schema" if schema is None else schema.name
+        raise ValueError(f"it holds {holds}, and a stream of kind {content} needs {needed}")
     if schema.encoding != "ros2msg":
         raise ValueError(f'its schema is written as "{schema.encoding}", not ros2msg')
     decode = _stock(channel.message_encoding, schema.name, schema.data)
@@ -37,14 +37,14 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         stamp = message.header.stamp
         seconds, nanoseconds = int(stamp.sec), int(stamp.nanosec)
         check_stamp(seconds, nanoseconds)
-        return seconds, nanoseconds, [float(value) for value in _kept(message, content)]
+        return seconds, nanoseconds, [float(value) for value in _used_values(message, content)]
 
-    def many(messages: Messages, which: IntArray, found: Fields) -> None:
+    def many(messages: Messages, which: IntArray, fields: Fields) -> None:
         for length in set(messages.length[which].tolist()):
-            _decode_equally_long(messages, which[messages.length[which] == length], found)
+            _decode_equally_long(messages, which[messages.length[which] == length], fields)
 
-    def _decode_equally_long(messages: Messages, which: IntArray, found: Fields) -> None:
-        """Fill in those that fit the layout, if it is what the stock decoder makes of the log's schema."""
+    def _decode_equally_long(messages: Messages, which: IntArray, fields: Fields) -> None:
+        """Fill in those that fit the layout, if the stock decoder reads a message of it in the same way."""
         rows = messages.rows(which)
         fast = cdr.fields(rows, content)
         for flag in (0, 1):
@@ -56,14 +56,14 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
             except UNDECODABLE:
                 continue
             if alike:
-                found.take(which[fits], fast, fits)
+                fields.take(which[fits], fast, fits)
 
     return Decoder(one, many)
 
 
-@lru_cache(maxsize=_DEFINITIONS_KEPT)
+@lru_cache(maxsize=_DEFINITIONS_CACHED)
 def _stock(encoding: str, name: str, definition: bytes) -> Callable[[bytes], Any]:
-    """The stock decoder of a definition, remembered: the logs of a study have the same few."""
+    """The stock decoder of a definition, cached because the logs of a study share a few of them."""
     schema = Schema(data=definition, encoding="ros2msg", id=1, name=name)
     check_definition(schema)
     decode = DecoderFactory().decoder_for(encoding, schema)
@@ -80,8 +80,8 @@ def _check_length(payload: bytes, numbers: int) -> None:
         raise ValueError(UNFIT)
 
 
-def _kept(message: object, content: str) -> list[float]:
-    """The figures of `cdr.COLUMNS`, in that order."""
+def _used_values(message: object, content: str) -> list[float]:
+    """The values of `cdr.COLUMNS`, in that order."""
     if content == "position":
         point = message.point  # type: ignore[attr-defined]
         return [point.x, point.y, point.z]

@@ -1,4 +1,4 @@
-"""Which message types hold what."""
+"""The message types that Steadyhand reads, and the content of each."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _CONTENTS: Mapping[str, Content] = {
 
 
 def content_of(encoding: str, schema: str) -> Content | None:
-    """What a type holds, by the encoding of its messages and its name; None where it is not one of ours."""
+    """The content of a message type, by encoding and name; None for a type that is not read."""
     if encoding == "cdr":
         return next((content for content in SAMPLED if SCHEMAS[content] == schema), None)
     content = _CONTENTS.get(re.split("[./]", schema)[-1])
-    ours = (
+    is_read = (
         encoding == "json" and schema == "steadyhand.Event" if content == "events" else encoding in ("json", "protobuf")
     )
-    return content if ours else None
+    return content if is_read else None
