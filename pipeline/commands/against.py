@@ -32,14 +32,14 @@ _COLUMNS = {"effect_size": "effect size", "ci_difference_low": "interval from", 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A row of `comparisons`, and what each call that computes it says."""
+    """A row of `comparisons`, and how each call of another program agrees with it."""
 
     row: Row
     agreements: Sequence[Agreement]
 
     @property
     def title(self) -> str:
-        """The row as study.yaml names what it is of."""
+        """Measure, test and contrast of the row, as study.yaml names them."""
         row = self.row
         contrast = f", {row['contrast']}" if row["contrast"] else ""
         logarithms = OF_LOGARITHMS if OF_LOGARITHMS in row["method"] else ""
@@ -75,7 +75,7 @@ def against(
         for line in lines:
             console.say(line)
         suites.append(Suite(result.name, list(_cases(result.name, outcomes)), result.seconds, "\n".join(lines)))
-        unexplained = any(one.unexplained for outcome in outcomes for one in outcome.agreements)
+        unexplained = any(agreement.unexplained for outcome in outcomes for agreement in outcome.agreements)
         return max(result.exit_code, UNEXPLAINED if unexplained else 0)
 
     def failed(folder: Path, error: PipelineError) -> None:
@@ -90,7 +90,7 @@ def against(
 
 
 def _rscript(names: Sequence[str]) -> str | None:
-    """The path of R where it is wanted and there, and a line that says which programs there are."""
+    """The path of R if it is asked for and installed; prints which programs are compared."""
     rscript = r_process.executable() if R in names else None
     versions = [LIBRARIES[name].version() for name in names if name in LIBRARIES]
     if rscript is not None:
@@ -105,32 +105,32 @@ def _rscript(names: Sequence[str]) -> str | None:
 
 
 def _outcomes(result: Result, names: Sequence[str], rscript: str | None) -> list[Outcome]:
-    """Every row of the study's comparisons, in order, with what the programs say."""
+    """Every row of the study's comparisons, in order, with the agreement of each program."""
     measured = result.entry("measure")
     measures, observations = (tables.read(name, measured) for name in ("measures", "observations"))
     answers = answered(result.study, measures, observations, people_of(result.study, result.folder))
-    problems = [problem for one in answers for problem in problems_of(one)]
+    problems = [problem for answer in answers for problem in problems_of(answer)]
     problems += families_of(answers)
     of_row: dict[int, list[Agreement]] = {}
     libraries = [LIBRARIES[name].calls for name in names if name in LIBRARIES]
-    for problem, in_r_too in zip(problems, _all_in_r(problems, rscript), strict=True):
-        theirs = [one for calls in libraries for one in ask(calls, problem)] + in_r_too
-        of_row.setdefault(id(problem.row), []).extend(held_against(problem, one) for one in theirs)
-    return [Outcome(row, of_row.get(id(row), [])) for one in answers for row in one.rows]
+    for problem, from_r in zip(problems, _all_in_r(problems, rscript), strict=True):
+        theirs = [figures for calls in libraries for figures in ask(calls, problem)] + from_r
+        of_row.setdefault(id(problem.row), []).extend(held_against(problem, figures) for figures in theirs)
+    return [Outcome(row, of_row.get(id(row), [])) for answer in answers for row in answer.rows]
 
 
 def _all_in_r(problems: Sequence[Problem], rscript: str | None) -> list[list[Theirs]]:
-    """What R says of each problem; a warning where it stopped before the end."""
-    asked = [place for place, problem in enumerate(problems) if in_r.knows(problem)]
-    if rscript is None or not asked:
+    """R's figures for each problem; a warning where R stopped before the end."""
+    for_r = [place for place, problem in enumerate(problems) if in_r.knows(problem)]
+    if rscript is None or not for_r:
         return [[] for _ in problems]
-    files = in_r.tables([problems[place] for place in asked])
+    files = in_r.tables([problems[place] for place in for_r])
     ran = r_process.run(rscript, in_r.SCRIPT, files, in_r.ANSWERS, _R_TIMEOUT_S)
-    found = in_r.read(ran.written)
-    by_place = {place: found.get(number, []) for number, place in enumerate(asked)}
+    figures = in_r.read(ran.written)
+    by_place = {place: figures.get(number, []) for number, place in enumerate(for_r)}
     if ran.failure:
         missing = sum(not answers for answers in by_place.values())
-        console.warn(f"could not compute {missing} of {len(asked)} in R: {ran.failure}")
+        console.warn(f"could not compute {missing} of {len(for_r)} in R: {ran.failure}")
     return [by_place.get(place, []) for place in range(len(problems))]
 
 
@@ -140,39 +140,41 @@ def _lines(outcomes: Sequence[Outcome]) -> Iterator[str]:
         if not outcome.agreements:
             continue
         yield f"\n{outcome.title}, n = {outcome.row['n']}"
-        for one in outcome.agreements:
-            if one.failure is not None:
-                yield f"  {one.call} could not: {one.failure}"
+        for agreement in outcome.agreements:
+            if agreement.failure is not None:
+                yield f"  {agreement.call} could not: {agreement.failure}"
                 continue
-            agree = ", ".join(_named(outcome.row, quantity) for quantity in one.agree)
-            yield f"  {one.call}" + (f" agrees: {agree}" if agree else "") + (", but" if agree and one.differ else "")
-            yield from (f"      {_difference(outcome.row, difference)}" for difference in one.differ)
+            agree = ", ".join(_figure_name(outcome.row, quantity) for quantity in agreement.agree)
+            but = ", but" if agree and agreement.differ else ""
+            yield f"  {agreement.call}" + (f" agrees: {agree}" if agree else "") + but
+            yield from (f"      {_difference_text(outcome.row, difference)}" for difference in agreement.differ)
 
 
-def _difference(row: Row, one: Difference) -> str:
-    own = "–" if one.ours is None else f"{one.ours:.6g}"
-    by = "" if one.ours is None else f" ({one.theirs - one.ours:+.3g})"
-    return f"{_named(row, one.quantity)}: ours {own}, theirs {one.theirs:.6g}{by}: {one.reason or 'NO KNOWN REASON'}"
+def _difference_text(row: Row, figure: Difference) -> str:
+    ours = "–" if figure.ours is None else f"{figure.ours:.6g}"
+    by = "" if figure.ours is None else f" ({figure.theirs - figure.ours:+.3g})"
+    reason = figure.reason or "NO KNOWN REASON"
+    return f"{_figure_name(row, figure.quantity)}: ours {ours}, theirs {figure.theirs:.6g}{by}: {reason}"
 
 
-def _named(row: Row, quantity: str) -> str:
+def _figure_name(row: Row, quantity: str) -> str:
     """A figure as the row's test prints it."""
     return str(row["statistic_name"]) if quantity == "statistic" else _COLUMNS.get(quantity, quantity)
 
 
 def _summary(study: str, outcomes: Sequence[Outcome]) -> str:
     """How many figures agree, differ, and why."""
-    agreements = [one for outcome in outcomes for one in outcome.agreements]
-    agree = sum(len(one.agree) for one in agreements)
-    unexplained = sum(len(one.unexplained) for one in agreements)
-    explained = sum(len(one.differ) for one in agreements) - unexplained
-    failed = sum(one.failure is not None for one in agreements)
+    agreements = [agreement for outcome in outcomes for agreement in outcome.agreements]
+    agree = sum(len(agreement.agree) for agreement in agreements)
+    unexplained = sum(len(agreement.unexplained) for agreement in agreements)
+    explained = sum(len(agreement.differ) for agreement in agreements) - unexplained
+    failed = sum(agreement.failure is not None for agreement in agreements)
     text = f"\n{study}: {agree} figures agree, {explained} differ for a known reason, {unexplained} without one"
     if failed:
         text += f"; {failed} calls could not"
-    alone = Counter(outcome.row["test"] for outcome in outcomes if not outcome.agreements)
-    if alone:
-        listed = ", ".join(f"{test} ({count})" for test, count in alone.items())
+    not_computed = Counter(outcome.row["test"] for outcome in outcomes if not outcome.agreements)
+    if not_computed:
+        listed = ", ".join(f"{test} ({count})" for test, count in not_computed.items())
         text += f"; rows that no other program computes here: {listed}"
     return text
 
@@ -180,7 +182,7 @@ def _summary(study: str, outcomes: Sequence[Outcome]) -> str:
 def _cases(study: str, outcomes: Sequence[Outcome]) -> Iterator[Case]:
     """A test case for each row and call; it fails where a figure differs for no known reason."""
     for outcome in outcomes:
-        for one in outcome.agreements:
-            lines = [_difference(outcome.row, difference) for difference in one.unexplained]
+        for agreement in outcome.agreements:
+            lines = [_difference_text(outcome.row, difference) for difference in agreement.unexplained]
             failure = (lines[0], "\n".join(lines)) if lines else None
-            yield Case(f"{study}.against", f"{outcome.title} | {one.call}", failure)
+            yield Case(f"{study}.against", f"{outcome.title} | {agreement.call}", failure)

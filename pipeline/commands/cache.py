@@ -1,4 +1,4 @@
-"""`cache`: show, prune and verify what is kept."""
+"""`cache`: show, prune and verify the cached entries."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ DAMAGED = 1  # the exit code
 
 
 def show(folder: Path | None) -> None:
-    """Print a line a stage: entries, size, and how long ago the least and the most recent were last used."""
+    """Print one line per stage: entries, size, and how long ago the first and the last of them were used."""
     cache = _existing(folder)
-    kept = list(items_in(cache))
+    items = list(items_in(cache))
     order = [stage.name for stage in STAGES]
-    stages = sorted({one.stage for one in kept}, key=lambda name: (not name, name not in order, order.index(name)))
-    console.say(f"{cache.root}: {_amount(kept)}")
+    stages = sorted({item.stage for item in items}, key=lambda name: (not name, name not in order, order.index(name)))
+    console.say(f"{cache.root}: {_amount(items)}")
     lines = []
     for stage in stages:
-        of_stage = [one for one in kept if one.stage == stage]
-        oldest, newest = (_days_ago(pick(one.used_s for one in of_stage)) for pick in (min, max))
+        of_stage = [item for item in items if item.stage == stage]
+        oldest, newest = (_days_ago(pick(item.used_s for item in of_stage)) for pick in (min, max))
         lines.append((stage or "(unfinished)", str(len(of_stage)), _megabytes(of_stage), oldest, newest))
     if lines:
         console.table(("stage", "entries", "MB", "longest unused, days", "last used, days ago"), lines)
 
 
 def prune_cache(folder: Path | None, older_than_days: float | None, studies: Sequence[Path]) -> None:
-    """Remove what was not used for some days, or what the studies as they are now do not use."""
+    """Remove entries not used for some days, and entries that the given studies, as they are now, do not use."""
     if older_than_days is None and not studies:
         raise PipelineError("cache prune: say what to remove: --older-than DAYS, --keep-current STUDY, or both")
     cache = _existing(folder)
@@ -48,14 +48,14 @@ def prune_cache(folder: Path | None, older_than_days: float | None, studies: Seq
 
 
 def verify_cache(folder: Path | None) -> None:
-    """Remove damaged entries, which are computed again when they are needed; exit with 1 where there was one."""
+    """Remove damaged entries, which are computed again when they are needed; exit with 1 if there were any."""
     cache = _existing(folder)
 
-    def say(one: Item, damage: str) -> None:
-        console.warn(f"{one.folder.relative_to(cache.root)}: damaged, removed: {damage}")
+    def say(item: Item, damage: str) -> None:
+        console.warn(f"{item.folder.relative_to(cache.root)}: damaged, removed: {damage}")
 
     verified = verify(cache, say)
-    intact = [one for one in verified.left if one.stage]
+    intact = [item for item in verified.left if item.stage]
     console.say(f"{_amount(intact)} intact, {len(verified.removed)} damaged and removed.")
     sys.exit(DAMAGED if verified.removed else 0)
 
@@ -72,7 +72,7 @@ def _amount(entries: Sequence[Item]) -> str:
 
 
 def _megabytes(entries: Sequence[Item]) -> str:
-    return f"{sum(one.size_bytes for one in entries) / _MB:.1f}"
+    return f"{sum(entry.size_bytes for entry in entries) / _MB:.1f}"
 
 
 def _days_ago(used_s: float) -> str:

@@ -55,7 +55,7 @@ def _results_in(path: Path) -> Path:
 
 
 def _warn(side: ResultsFile, identity: Mapping[str, Sequence[str]]) -> None:
-    """Say what of one of the two results is not compared."""
+    """Warn of what is not compared in one of the two results."""
     if side.unused_because is not None:
         console.warn(side.unused_because)
     strange = set(side.content) - {"schema_version", "study", "studies", *identity}
@@ -66,7 +66,9 @@ def _warn(side: ResultsFile, identity: Mapping[str, Sequence[str]]) -> None:
 
 
 def _changes(changed: Differences, of_number: bool) -> Iterator[tuple[Identified, Change]]:
-    return ((one.row, change) for one in changed.moved for change in one.changes if change.is_numeric == of_number)
+    return (
+        (moved.row, change) for moved in changed.moved for change in moved.changes if change.is_numeric == of_number
+    )
 
 
 def _show(changed: Differences) -> None:
@@ -74,7 +76,7 @@ def _show(changed: Differences) -> None:
     if not changed:
         console.say(f"None of {changed.compared} figures changed.")
         return
-    numbers, texts = ([*_changes(changed, one)] for one in (True, False))
+    numbers, texts = ([*_changes(changed, of_number)] for of_number in (True, False))
     moved = f"{counted(len(numbers), 'number')} moved and {counted(len(texts), 'text')} changed"
     only = f"{counted(len(changed.removed), 'row')} only in A, {counted(len(changed.added), 'row')} only in B"
     console.say(f"{moved}, of {changed.compared} figures in both; {only}")
@@ -92,17 +94,17 @@ def _show(changed: Differences) -> None:
 
 def _by_table(changes: Sequence[tuple[Identified, Change]]) -> Iterator[tuple[str, list[tuple[str, Change]]]]:
     """Each table's changes, with the names of row and figure."""
-    for table, group in groupby(changes, key=lambda one: one[0].table):
+    for table, group in groupby(changes, key=lambda row_and_change: row_and_change[0].table):
         yield table, [(" | ".join(filter(None, (row.name, change.name))), change) for row, change in group]
 
 
 def _explain(why: Explanation, moved: bool) -> None:
     """Print which settings, inputs, versions and code differ."""
     parts = (
-        ("setting", [(one.name, *map(_shortened, _setting(one))) for one in why.settings]),
-        ("input, SHA-256", [(one.name, *_digests(one)) for one in why.inputs]),
-        ("version", [(one.name, *one.cells[:2]) for one in why.versions]),
-        ("code and libraries of the stage, SHA-256", [(one.name, *_digests(one)) for one in why.code]),
+        ("setting", [(change.name, *map(_shortened, _setting(change))) for change in why.settings]),
+        ("input, SHA-256", [(change.name, *_digests(change)) for change in why.inputs]),
+        ("version", [(change.name, *change.cells[:2]) for change in why.versions]),
+        ("code and libraries of the stage, SHA-256", [(change.name, *_digests(change)) for change in why.code]),
     )
     if not any(rows for _, rows in parts):
         if why.complete:
@@ -119,7 +121,7 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int | Non
 
 
 def _setting(change: Change) -> tuple[str, str]:
-    """Both values as study.yaml states them; what it does not state is a default, or an entry less of a mapping."""
+    """Both values as study.yaml states them; a key that it does not state is "default", a missing entry "absent"."""
     absent = "absent" if isinstance(change.before, dict) or isinstance(change.now, dict) else "default"
     before, now = (absent if value is ABSENT else explanation.json_text(value) for value in (change.before, change.now))
     return before, now
@@ -136,7 +138,7 @@ def _shortened(text: str) -> str:
 def _as_object(
     old: ResultsFile, new: ResultsFile, tolerance: float, changed: Differences, why: Explanation
 ) -> dict[str, Any]:
-    """All of it for a program; what is absent on a side has no key for that side."""
+    """The whole comparison for `--json`; a value that is absent on one side has no key for that side."""
 
     def rows(listed: Sequence[Identified]) -> list[dict[str, Any]]:
         return [{"table": row.table, "row": dict(row.key)} for row in listed]
@@ -160,5 +162,5 @@ def _as_object(
         "only_in_a": rows(changed.removed),
         "only_in_b": rows(changed.added),
         "making_known": why.complete,
-        **{part: [{"name": one.name, **sides(one)} for one in changes] for part, changes in parts.items()},
+        **{part: [{"name": change.name, **sides(change)} for change in changes] for part, changes in parts.items()},
     }

@@ -1,4 +1,4 @@
-"""Why two sets of results differ: what of their settings, inputs, versions and code is not the same."""
+"""What may explain why two results differ: settings, inputs, versions and code that are not the same."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ResultsFile:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What is not the same. `complete` says that the provenance of both is known."""
+    """What differs. `complete` is true if the provenance of both results is known."""
 
     complete: bool
     settings: Sequence[Change]
@@ -64,17 +64,17 @@ def read_with_provenance(path: Path) -> ResultsFile:
 
 
 def explain(before: ResultsFile, now: ResultsFile) -> Explanation:
-    """What is not the same in the provenance of two results, as far as it is known of both."""
+    """What differs in the provenance of two results, as far as it is known of both."""
     old, new = before.provenance, now.provenance
     stated = (_stated(before.content), _stated(now.content))
     if old is None or new is None:
         return Explanation(False, tuple(_changed((), *stated)), (), (), ())
-    parts = [_parts_of(one) for one in (old, new)]
-    settings = [_over(known["settings"], own) for known, own in zip(parts, stated, strict=True)]
+    parts = [_parts_of(provenance) for provenance in (old, new)]
+    settings = [_with_stated(known["settings"], own) for known, own in zip(parts, stated, strict=True)]
     return Explanation(
         True,
         tuple(_changed((), *settings)),
-        *(tuple(_changed((), *(one[part] for one in parts))) for part in ("inputs", "versions", "code")),
+        *(tuple(_changed((), *(side[part] for side in parts))) for part in ("inputs", "versions", "code")),
     )
 
 
@@ -107,12 +107,12 @@ def _parts_of(provenance: Content) -> dict[str, Content]:
 
 
 def _mapping(content: Any, key: str) -> Content:
-    found = content.get(key) if isinstance(content, Mapping) else None
-    return found if isinstance(found, Mapping) else {}
+    value = content.get(key) if isinstance(content, Mapping) else None
+    return value if isinstance(value, Mapping) else {}
 
 
-def _over(settings: Content, stated: Content) -> Content:
-    """Settings, overridden by those that the results state themselves, defaults among them."""
+def _with_stated(settings: Content, stated: Content) -> Content:
+    """Settings, overridden by those that results.json states itself, which include defaults."""
     merged = dict(settings)
     for key, value in stated.items():
         below = settings.get(key)
@@ -140,20 +140,20 @@ def _changed(path: tuple[str, ...], before: Any, now: Any) -> Iterator[Change]:
 
 
 def _of_objects(value: Any) -> bool:
-    return value is ABSENT or (isinstance(value, list) and all(isinstance(one, Mapping) for one in value))
+    return value is ABSENT or (isinstance(value, list) and all(isinstance(entry, Mapping) for entry in value))
 
 
 def _without(listed: Any, other: Any) -> list[Content]:
     """The objects of a list that another one does not have."""
-    return [] if listed is ABSENT else [one for one in listed if other is ABSENT or one not in other]
+    return [] if listed is ABSENT else [entry for entry in listed if other is ABSENT or entry not in other]
 
 
 def _entries(listed: Sequence[Content], of: str) -> dict[str, Content]:
     """Objects by what identifies them in such a list; where that is not unique, by all they hold."""
-    names = [", ".join(str(one[key]) for key in _IDENTITY.get(of, ()) if one.get(key)) for one in listed]
+    names = [", ".join(str(entry[key]) for key in _IDENTITY.get(of, ()) if entry.get(key)) for entry in listed]
     return {
-        name if name and names.count(name) == 1 else f"{name} {json_text(one)}": one
-        for name, one in zip(names, listed, strict=True)
+        name if name and names.count(name) == 1 else f"{name} {json_text(entry)}": entry
+        for name, entry in zip(names, listed, strict=True)
     }
 
 

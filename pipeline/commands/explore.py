@@ -1,4 +1,4 @@
-"""`explore`: a study's simulated participants with better and worse trackers and other estimators, as one report."""
+"""`explore`: simulate a study's participants with better and worse trackers and other estimators; write one report."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Options:
 
 
 def explore(folder: Path, options: Options, out: Path | None, jobs: int | None, executor_name: str) -> None:
-    """Simulate every point and write the report; nothing is written before all is computed."""
+    """Simulate every point and write the report; nothing is written until everything is computed."""
     from pipeline.commands.publish import refuse_study
 
     study = _study(folder)
@@ -82,13 +82,13 @@ def _study(folder: Path) -> Study:
 
 
 def _grid(setting: Setting, options: Options) -> Grid:
-    """What the options say; else the study's own tracker, better and worse ones, and the estimators it shows."""
+    """The points to simulate: as the options say, or else the study's own tracker with better and worse ones."""
     from pipeline.simulation.exploration import Grid, shown_estimators, stated
 
     own = stated(setting)
-    late = (own.latency_s / 2, own.latency_s, min(2 * own.latency_s, 0.9)) if own.latency_s else (0.0, 0.05, 0.1)
+    latencies_s = (own.latency_s / 2, own.latency_s, min(2 * own.latency_s, 0.9)) if own.latency_s else (0.0, 0.05, 0.1)
     return Grid(
-        _numbers("--latency", options.latency) or late,
+        _numbers("--latency", options.latency) or latencies_s,
         _numbers("--noise", options.noise) or (own.noise_sd_mm / 4, own.noise_sd_mm / 2, own.noise_sd_mm),
         _numbers("--rate", options.rate) or (own.rate_hz / 2, own.rate_hz, 2 * own.rate_hz),
         _names("--estimators", options.estimators) or shown_estimators(setting.study),
@@ -134,13 +134,13 @@ def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]
     from pipeline.tables import table as tables
 
     people, own = tables.frame("explore_people", rows), grid.nearest(stated(setting))
-    found = {
+    result_tables = {
         "explore": tables.frame("explore", means(people)),
         "explore_differences": tables.frame("explore_differences", differences(people, setting.study.alpha)),
         "explore_people": people,
     }
     pays = tuple(what_pays(people, own, measure) for measure in MEASURES)
-    return Explored(name, setting.study, found, pays, own, grid.participants, grid.repeats)
+    return Explored(name, setting.study, result_tables, pays, own, grid.participants, grid.repeats)
 
 
 def _write(explored: Explored, grid: Grid, target: Path) -> None:
@@ -155,13 +155,15 @@ def _write(explored: Explored, grid: Grid, target: Path) -> None:
     settings: Mapping[str, Any] = {**study, "own_tracker": explored.own._asdict(), **asdict(grid)}
     with tempfile.TemporaryDirectory() as written, tempfile.TemporaryDirectory() as drawn:
         folder, pictures = Path(written), Path(drawn)
-        results.write_exploration(folder / _RESULTS, settings, explored.found, [one.record() for one in explored.pays])
-        for name, table in explored.found.items():
+        results.write_exploration(
+            folder / _RESULTS, settings, explored.tables, [pays.record() for pays in explored.pays]
+        )
+        for name, table in explored.tables.items():
             tables.write(name, table, folder)
             tables.write_csv(name, table, folder)
-        shown = document(explored, pictures)
-        html.render(shown, pictures, folder / _PAGE)
-        pdf.render(shown, pictures, folder / _PRINT)
+        pages = document(explored, pictures)
+        html.render(pages, pictures, folder / _PAGE)
+        pdf.render(pages, pictures, folder / _PRINT)
         for path in sorted(folder.iterdir()):
             copy(path, target / path.name)
     publish_exploration(explored.study, target, sys.argv)

@@ -1,4 +1,4 @@
-"""`fit`: print what a study's recordings say its parameters are, as a block to paste into study.yaml."""
+"""`fit`: estimate a study's parameters from its recordings, and print them as a block to paste into study.yaml."""
 
 from __future__ import annotations
 
@@ -75,20 +75,21 @@ def _lines(
 
 
 def _gravity(study: Study, stream: str, mean: FloatArray, half: float) -> Iterator[str]:
-    """Gravity by the mean specific force, and whether study.yaml has the same."""
+    """Gravity by the mean specific force, with its 95 % interval, compared with study.yaml."""
     stated = study.streams[stream]
     assert isinstance(stated, AccelerationStream)  # noqa: S101 - only phones have a gravity
     off = float(np.linalg.norm(mean - np.array(stated.gravity_mm_s2)))
-    values, has = (", ".join(f"{value:.0f}" for value in one) for one in (mean, stated.gravity_mm_s2))
-    yield f"# streams.{stream}.gravity_mm_s2 by the mean specific force: [{values}] ± {half:.0f}"
+    measured, in_settings = (", ".join(f"{value:.0f}" for value in vector) for vector in (mean, stated.gravity_mm_s2))
+    yield f"# streams.{stream}.gravity_mm_s2 by the mean specific force: [{measured}] ± {half:.0f}"
     if off <= max(_GRAVITY_OFF_MM_S2, 3 * half):
-        yield f"#   which agrees with [{has}] in study.yaml, {off:.0f} mm/s² off"
+        yield f"#   which agrees with [{in_settings}] in study.yaml, {off:.0f} mm/s² off"
     else:
-        yield f"#   and study.yaml has [{has}], {off:.0f} mm/s² off: gravity, orientation or accelerometer is wrong"
+        cause = "gravity, orientation or accelerometer is wrong"
+        yield f"#   and study.yaml has [{in_settings}], {off:.0f} mm/s² off: {cause}"
 
 
 def _of_checks(rows: Sequence[Row]) -> Iterator[str]:
-    """The lag of each session with what it means for either kind of stamp, and what contradicts what."""
+    """The lag of each session with what it means for either kind of stamp, and the checks that are not green."""
     lags = [row for row in rows if row["check"] == LAG]
     if lags:
         yield "# How much later the tracker's stamps are than the phone's, by their movement, with the 95 % interval."
@@ -127,7 +128,7 @@ def _mountings(recordings: dict[str, recording.Recording]) -> Iterator[str]:
                 continue
             learned = phone.calibration
             degrees, half = np.degrees(learned.mounting_rad), 1.96 * np.degrees(learned.mounting_sd_rad)
-            angles = ", ".join(f"{value:.2f} ± {one:.2f}" for value, one in zip(degrees, half, strict=True))
+            angles = ", ".join(f"{value:.2f} ± {margin:.2f}" for value, margin in zip(degrees, half, strict=True))
             pairs = zip(learned.lever_arm_mm, 1.96 * learned.lever_arm_sd_mm, strict=True)
-            arm = ", ".join(f"{value:.0f} ± {one:.0f}" for value, one in pairs)
+            arm = ", ".join(f"{value:.0f} ± {margin:.0f}" for value, margin in pairs)
             yield f"# {session}: {stream} is mounted at [{angles}] degrees, lever arm [{arm}] mm"

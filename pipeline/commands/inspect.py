@@ -1,4 +1,4 @@
-"""`inspect`: what a log holds and what of it can be read."""
+"""`inspect`: what a log holds, and how much of it can be read."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def inspect(files: Sequence[Path], as_json: bool) -> None:
             code = max(code, 1)
         if as_json:
             continue
-        seen = inspected(path, log)
-        _print(path, of_log, log.facts, {topic.name: topic for topic in seen.topics})
-        for line in (*_block(seen), *_checks(seen)):
+        inspection = inspected(path, log)
+        _print(path, of_log, log.facts, {topic.name: topic for topic in inspection.topics})
+        for line in (*_block(inspection), *_checks(inspection)):
             console.say(line)
-        if not seen.usable:
+        if not inspection.usable:
             console.warn(f"steadyhand: {path}: no topic is usable as position, acceleration or events")
             code = max(code, 1)
     if as_json:
@@ -79,18 +79,18 @@ def _described(topic: Topic) -> str:
     return f"{topic.type.name or 'no type'} ({topic.type.encoding or 'no encoding'}){frames}; {use}"
 
 
-def _block(seen: Inspection) -> Iterator[str]:
-    """What study.yaml would say of this log, to be pasted and looked over."""
-    if not seen.usable:
+def _block(inspection: Inspection) -> Iterator[str]:
+    """A block for study.yaml that fits this log, to be pasted and reviewed."""
+    if not inspection.usable:
         return
     yield "For study.yaml, as this log has it:"
-    if seen.streams:
+    if inspection.streams:
         yield "streams:"
-    for name, stream in seen.streams.items():
-        remark = f"  # {_GUESSED}" if name in seen.guessed else ""
+    for name, stream in inspection.streams.items():
+        remark = f"  # {_GUESSED}" if name in inspection.guessed else ""
         yield f"  {name}: {{{', '.join(f'{key}: {_yaml(value)}' for key, value in stream.items())}}}{remark}"
-    if seen.events is not None:
-        yield f"events: {{topic: {_yaml(seen.events)}}}"
+    if inspection.events is not None:
+        yield f"events: {{topic: {_yaml(inspection.events)}}}"
 
 
 def _yaml(value: object) -> str:
@@ -99,13 +99,14 @@ def _yaml(value: object) -> str:
     return str(value) if plain else json.dumps(value, ensure_ascii=False)
 
 
-def _checks(seen: Inspection) -> Iterator[str]:
-    """What contradicts what; the lag in any case."""
-    contradicted = [one for one in seen.findings if one.status != "green"]
-    if seen.findings:
-        yield f"Checks: {counted(len(contradicted), 'contradiction')} in {len(seen.findings)}"
-    for one in seen.findings:
-        if one.check == LAG:
-            yield f"  lag of the tracker's stamps behind the phone's, by their movement: {one.found}"
-    for one in contradicted:
-        yield f"  {one.status}, {one.check}: found {one.found}, expected {one.expected}; {one.message}"
+def _checks(inspection: Inspection) -> Iterator[str]:
+    """The checks that are not green, and the lag in any case."""
+    contradicted = [finding for finding in inspection.findings if finding.status != "green"]
+    if inspection.findings:
+        yield f"Checks: {counted(len(contradicted), 'contradiction')} in {len(inspection.findings)}"
+    for finding in inspection.findings:
+        if finding.check == LAG:
+            yield f"  lag of the tracker's stamps behind the phone's, by their movement: {finding.found}"
+    for finding in contradicted:
+        figures = f"found {finding.found}, expected {finding.expected}"
+        yield f"  {finding.status}, {finding.check}: {figures}; {finding.message}"

@@ -75,5 +75,5 @@ def _counts(cases: Sequence[Case]) -> dict[str, str]:
 
 
 def _text(text: str) -> str:
-    """Without what XML 1.0 cannot hold at all; the rest is escaped when it is written."""
+    """The text without characters that XML 1.0 cannot hold at all; others are escaped when it is written."""
     return _NOT_IN_XML.sub(STAND_IN, text)

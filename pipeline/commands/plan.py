@@ -1,4 +1,4 @@
-"""`plan`: who is in which group and does the conditions in which order, as a participants table; and every block."""
+"""`plan`: a participants table with everybody's group and order of the conditions, and a schedule of every block."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TARGETS_MAX = 100
 
 
 @dataclass(frozen=True)
-class Asked:
+class Options:
     """The options of `plan`, as the command line states them."""
 
     names: Sequence[str]
@@ -37,15 +37,18 @@ class Asked:
     targets: str | None
 
 
-def plan(asked: Asked, out: Path | None, schedule_file: Path | None) -> None:
-    """Print the table, or write it to `out`; beside it, print how balanced it is. Write every block to the schedule."""
-    design = _design(asked)
-    require_printable("--prefix", asked.prefix)
+def plan(options: Options, out: Path | None, schedule_file: Path | None) -> None:
+    """Print the table or write it to `out`, write the schedule, and print how balanced the plan is.
+
+    Raises PipelineError for options that contradict each other and for files that exist already.
+    """
+    design = _design(options)
+    require_printable("--prefix", options.prefix)
     if (design.blocks > 1 or design.targets) and schedule_file is None:
         raise PipelineError("--blocks and --targets go into a table of their own; name it, as in --schedule blocks.csv")
     planned = people(design)
     width = max(2, len(str(design.participants)))
-    ids = [f"{asked.prefix}{number:0{width}d}" for number in range(1, design.participants + 1)]
+    ids = [f"{options.prefix}{number:0{width}d}" for number in range(1, design.participants + 1)]
     text = _as_csv(_rows(design, planned, ids))
     for path, option in ((out, "--out"), (schedule_file, "--schedule")):
         _refuse_existing(path, option)
@@ -62,25 +65,33 @@ def plan(asked: Asked, out: Path | None, schedule_file: Path | None) -> None:
         console.warn(line)
 
 
-def _design(asked: Asked) -> Design:
-    within = None if asked.cross is None else factor("--cross", asked.cross)
-    between = None if asked.between is None else factor("--between", asked.between)
-    for option, one in (("--cross", within), ("--between", between)):
-        own = _RESERVED if option == "--cross" else [name for name in _RESERVED if name != "condition"]
-        if one is not None and (one.name in own or one.name.startswith("period_")):
-            raise PipelineError(f'{option}: a factor cannot be called "{one.name}", the plan has such a column already')
+def _design(options: Options) -> Design:
+    within = None if options.cross is None else factor("--cross", options.cross)
+    between = None if options.between is None else factor("--between", options.between)
+    for option, stated in (("--cross", within), ("--between", between)):
+        reserved = _RESERVED if option == "--cross" else [name for name in _RESERVED if name != "condition"]
+        if stated is not None and (stated.name in reserved or stated.name.startswith("period_")):
+            raise PipelineError(
+                f'{option}: a factor cannot be called "{stated.name}", the plan has such a column already'
+            )
     if within is not None and between is not None and within.name == between.name:
         raise PipelineError(f'--cross and --between are both called "{within.name}"; each factor needs its own name')
-    alone = between is not None and between.name == "condition"
-    if alone and (asked.names or asked.study or within):
+    one_condition_each = between is not None and between.name == "condition"
+    if one_condition_each and (options.names or options.study or within):
         raise PipelineError("--between condition=… is for participants who meet one condition each; name no others")
-    if alone and (asked.blocks > 1 or asked.targets):
+    if one_condition_each and (options.blocks > 1 or options.targets):
         raise PipelineError("--between condition=…: blocks and targets need conditions that participants meet in turn")
-    conditions = [] if alone else _conditions(asked.names, asked.study)
-    if asked.participants is None:
+    conditions = [] if one_condition_each else _conditions(options.names, options.study)
+    if options.participants is None:
         raise PipelineError("plan: how many participants? Give --participants, as in -n 12")
     return Design(
-        tuple(conditions), asked.participants, asked.seed, within, between, asked.blocks, _targets(asked.targets)
+        tuple(conditions),
+        options.participants,
+        options.seed,
+        within,
+        between,
+        options.blocks,
+        _targets(options.targets),
     )
 
 
@@ -100,18 +111,18 @@ def _conditions(names: Sequence[str], study: Path | None) -> list[str]:
 
 
 def _targets(text: str | None) -> tuple[str, ...]:
-    """A number of targets, or their names."""
+    """The names of the targets: as listed, or 1, 2, … of a number."""
     if text is None:
         return ()
-    named = tuple(str(place) for place in range(1, int(text) + 1)) if text.isdecimal() else tuple(text.split(","))
-    named = tuple(name.strip() for name in named)
-    if not 2 <= len(named) <= _TARGETS_MAX or len(set(named)) < len(named) or not all(named):
+    names = tuple(str(place) for place in range(1, int(text) + 1)) if text.isdecimal() else tuple(text.split(","))
+    names = tuple(name.strip() for name in names)
+    if not 2 <= len(names) <= _TARGETS_MAX or len(set(names)) < len(names) or not all(names):
         raise PipelineError(
             f"--targets {text}: needs 2 to {_TARGETS_MAX} targets, each once: a number, or names as in --targets a,b,c"
         )
-    for name in named:
+    for name in names:
         require_printable("--targets", name)
-    return named
+    return names
 
 
 def _rows(design: Design, planned: Sequence[Person], ids: Sequence[str]) -> Iterator[list[str]]:
@@ -126,10 +137,10 @@ def _rows(design: Design, planned: Sequence[Person], ids: Sequence[str]) -> Iter
     yield [*header, *(f"{design.within.name}_{period}" for period in periods if design.within)]
     for person, name in zip(planned, ids, strict=True):
         row = [name, *([_group(design, person)] if design.between else [])]
-        run = [design.conditions[at] for at in person.order]
-        row += [" > ".join(run)] if run else []
+        conditions = [design.conditions[at] for at in person.order]
+        row += [" > ".join(conditions)] if conditions else []
         levels = design.within.levels if design.within else ()
-        yield [*row, *run, *(_in_order(levels, person.levels[at]) for at in person.order if levels)]
+        yield [*row, *conditions, *(_in_order(levels, person.levels[at]) for at in person.order if levels)]
 
 
 def _blocks(design: Design, planned: Sequence[Person], ids: Sequence[str]) -> Iterator[list[str]]:
@@ -171,20 +182,20 @@ def _write(path: Path, text: str) -> None:
 
 
 def _balance_lines(design: Design, planned: Sequence[Person]) -> Iterator[str]:
-    """Group sizes, and within each group how balanced the orders are, counted from them."""
+    """Group sizes, and how balanced the orders are within each group, counted from the plan itself."""
     if design.between is None:
-        yield from _orders_balanced(design, planned)
+        yield from _balance_of_orders(design, planned)
         return
     sizes = Counter(_group(design, person) for person in planned)
     yield f"{design.between.name}: {listing([f'{sizes[level]} {level}' for level in design.between.levels])}."
     for level in design.between.levels:
-        mine = [person for person in planned if _group(design, person) == level]
-        if mine and design.conditions:
+        members = [person for person in planned if _group(design, person) == level]
+        if members and design.conditions:
             yield f"{level}:"
-            yield from (f"  {line}" for line in _orders_balanced(design, mine))
+            yield from (f"  {line}" for line in _balance_of_orders(design, members))
 
 
-def _orders_balanced(design: Design, planned: Sequence[Person]) -> Iterator[str]:
+def _balance_of_orders(design: Design, planned: Sequence[Person]) -> Iterator[str]:
     """How often each condition is in each period and follows each other one, and where each level comes first."""
     conditions, orders = design.conditions, [person.order for person in planned]
     counts = balance(orders)
@@ -197,21 +208,21 @@ def _orders_balanced(design: Design, planned: Sequence[Person]) -> Iterator[str]
             (at, period, person.levels[at][0]) for person in planned for period, at in enumerate(person.order)
         )
         places = range(len(conditions))
-        each = [
+        first_counts = [
             first[at, period, level] for at in places for period in places for level in range(len(design.within.levels))
         ]
         yield (
             f"In each condition and period each level of {design.within.name} comes first"
-            f" {_times((min(each), max(each)))}."
+            f" {_times((min(first_counts), max(first_counts)))}."
         )
     if counts.complete:
         yield "Counterbalancing is complete."
         return
     size, n = len(williams_design(len(conditions))), len(orders)
-    fitting = [str(many) for many in (n // size * size, (n // size + 1) * size) if many]
+    multiples = [str(number) for number in (n // size * size, (n // size + 1) * size) if number]
     yield (
         f"Counterbalancing is incomplete: {len(conditions)} conditions take {size} sequences, which"
-        f" {counted(n, 'participant')} cannot share evenly; {' or '.join(fitting)} participants could."
+        f" {counted(n, 'participant')} cannot share evenly; {' or '.join(multiples)} participants could."
     )
 
 

@@ -1,4 +1,4 @@
-"""The design that `plan` was asked for, and who does what in it: plain data, nothing printed or written."""
+"""The design of a plan, and what each participant does in it: plain data, nothing printed or written."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.statistics.counterbalancing import Order, allocated, assigned, nes
 from pipeline.study.fields import identifier
 
 # Each part of the design draws from a stream of its own, so that adding one leaves the others as they were.
-_OF_GROUPS, _OF_ORDERS, _OF_LEVELS, _OF_TARGETS = range(1, 5)
+_GROUPS, _ORDERS, _LEVELS, _TARGETS = range(1, 5)
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Design:
-    """What was asked for. `within` is crossed with the conditions, `between` tells groups of participants apart."""
+    """The design that the options state. `within` is crossed with the conditions, `between` divides participants."""
 
     conditions: tuple[str, ...]
     participants: int
@@ -57,7 +57,7 @@ class Block:
 
 
 def factor(option: str, text: str) -> Factor:
-    """The factor that an option states. PipelineError where it is none."""
+    """The factor that an option states, such as `task=easy,hard`. Raises PipelineError for anything else."""
     name, equals, levels = text.partition("=")
     listed = [str(identifier(level.strip())) for level in levels.split(",")]
     if not equals or not name.strip() or len(listed) < 2 or not all(listed):
@@ -70,7 +70,7 @@ def factor(option: str, text: str) -> Factor:
 
 
 def require_printable(what: str, text: str) -> None:
-    """Refuse control characters: a line break or an escape in an id is a slip of the keyboard or worse."""
+    """Refuse control characters: a line break or an escape sequence in an id is a mistake, or worse."""
     if any(unicodedata.category(character) in ("Cc", "Cs") for character in text):
         raise PipelineError(f"plan: {what} {text!r} contains a character that cannot be printed; leave it out")
 
@@ -79,22 +79,22 @@ def people(design: Design) -> list[Person]:
     """Every participant; orders are balanced within each group, as if it were a study of its own."""
     groups: list[int | None] = [None] * design.participants
     if design.between is not None:
-        groups = list(allocated(len(design.between.levels), design.participants, _seed(design, _OF_GROUPS)))
-    by_group = {group: _of_group(design, group, groups.count(group)) for group in dict.fromkeys(groups)}
+        groups = list(allocated(len(design.between.levels), design.participants, _seed(design, _GROUPS)))
+    by_group = {group: _people_of_group(design, group, groups.count(group)) for group in dict.fromkeys(groups)}
     return [next(by_group[group]) for group in groups]
 
 
-def _of_group(design: Design, group: int | None, count: int) -> Iterator[Person]:
+def _people_of_group(design: Design, group: int | None, count: int) -> Iterator[Person]:
     conditions = len(design.conditions)
     if conditions < 2:
         yield from [Person(group, (), ())] * count
         return
     # Without groups the orders are drawn from the seed itself, as they were before there were groups.
-    seed = design.seed if group is None else _seed(design, _OF_ORDERS, group)
+    seed = design.seed if group is None else _seed(design, _ORDERS, group)
     orders = assigned(conditions, count, seed)
     levels: Sequence[tuple[Order, ...]] = [()] * count
     if design.within is not None:
-        levels = nested(conditions, len(design.within.levels), count, _seed(design, _OF_LEVELS, group or 0))
+        levels = nested(conditions, len(design.within.levels), count, _seed(design, _LEVELS, group or 0))
     for order, of_person in zip(orders, levels, strict=True):
         yield Person(group, order, of_person)
 
@@ -104,12 +104,12 @@ def _seed(design: Design, *stream: int) -> tuple[int, ...] | None:
 
 
 def schedule(design: Design, planned: Sequence[Person]) -> Iterator[Block]:
-    """Every block in the order in which it is run; over all of them each target comes equally often in each place."""
+    """Every block in the order in which it is run. Over all blocks each target comes equally often in each place."""
     levels_in_each = len(design.within.levels) if design.within is not None else 1
     blocks = len(planned) * len(design.conditions) * levels_in_each * design.blocks
     orders: Iterator[Order] = iter(())
     if design.targets:
-        orders = iter(assigned(len(design.targets), blocks, _seed(design, _OF_TARGETS)))
+        orders = iter(assigned(len(design.targets), blocks, _seed(design, _TARGETS)))
     for index, person in enumerate(planned):
         for period, condition in enumerate(person.order, start=1):
             for level in person.levels[condition] if design.within is not None else (None,):

@@ -1,4 +1,7 @@
-"""The options of `power` and `plan`, the two commands for before a study. Imports nothing heavy, for --help's sake."""
+"""The options of `power` and `plan`, the two commands for before a study.
+
+It imports nothing heavy, so that --help stays fast.
+"""
 
 from __future__ import annotations
 
@@ -173,11 +176,11 @@ def plan(
 ) -> None:
     """Give each participant a group and an order of the conditions: balanced Latin squares, as a participants.csv."""
     if preregister:
-        from pipeline.commands import preregister as registering
+        from pipeline.commands import preregister as preregister_command
 
-        registering.preregister(conditions or [])
+        preregister_command.preregister(conditions or [])
         return
     from pipeline.commands import plan as command
 
-    asked = command.Asked(conditions or [], study, participants, prefix, seed, cross, between, blocks, targets)
-    command.plan(asked, out, schedule)
+    options = command.Options(conditions or [], study, participants, prefix, seed, cross, between, blocks, targets)
+    command.plan(options, out, schedule)

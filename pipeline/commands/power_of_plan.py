@@ -31,14 +31,14 @@ _TAKEN_BY: dict[str, tuple[str, ...]] = {
     "bound": ("tost",),
     "correlation": (*_PAIRS, *_FACTORS, "tost"),
 }
-"""Which tests take which option; stated for another one it would be ignored, so it is an error."""
+"""Which tests take which option. For any other test it would be ignored, so it is an error there."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked: the effects of the planned design, and the size that is stated of them, if one is.
+    """The planned design: its effects, and their size where one is stated.
 
-    `size_name` is what the size is: d, d_z, f, or the bound of an equivalence. `assumed` are lines for people.
+    `size_name` says what the size is: d, d_z, f, or the bound of an equivalence. `assumed` are lines that explain it.
     """
 
     expected: Expected
@@ -51,7 +51,7 @@ class Plan:
 
 
 def power(expected: Expected, search: Search, out: Path | None) -> None:
-    """Print the answer to whichever of effect, participants and power was left out; write the files into `out`."""
+    """Print whichever of effect, participants and power the options leave open; write the files into `out`."""
     plan = planned(expected, search)
     require_between("--power", search.power, expected.alpha, 1)
     if out is not None:
@@ -71,7 +71,7 @@ def power(expected: Expected, search: Search, out: Path | None) -> None:
 
 
 def planned(expected: Expected, search: Search) -> Plan:
-    """The plan that the options describe. Raises PipelineError where there can be none."""
+    """The plan that the options describe. Raises PipelineError for options that describe none."""
     if expected.test not in TESTS:
         raise PipelineError(f'--test: "{expected.test}" is not known{did_you_mean(expected.test, TESTS)}')
     _require_options(expected)
@@ -79,14 +79,14 @@ def planned(expected: Expected, search: Search) -> Plan:
     if expected.sd is not None:
         require_between("--sd", expected.sd, 0, math.inf)
     if expected.test in _PAIRS:
-        return _of_pairs(expected, search)
+        return _plan_of_pairs(expected, search)
     if expected.test in _FACTORS:
-        return _of_factors(expected)
-    return _of_equivalence(expected) if expected.test == "tost" else _of_groups(expected, search)
+        return _plan_of_factors(expected)
+    return _plan_of_equivalence(expected) if expected.test == "tost" else _plan_of_groups(expected, search)
 
 
 def _require_options(expected: Expected) -> None:
-    """Refuse options that the test has no use for, and a size that is stated twice or by half."""
+    """Refuse options that the test does not take, and a size that is stated twice or incompletely."""
     for option, tests in _TAKEN_BY.items():
         stated = getattr(expected, option) not in (None, 1.0)
         if stated and expected.test not in tests:
@@ -94,8 +94,8 @@ def _require_options(expected: Expected) -> None:
             raise PipelineError(f"--{name} is not for {expected.test}, but for {', '.join(tests)}; leave it out")
     if expected.conditions != 2 and (expected.test not in _FACTORS or expected.levels is not None):
         raise PipelineError(
-            f"--conditions {expected.conditions}: is for rm_anova and mixed_anova, and not beside --levels; for groups"
-            " take --groups"
+            f"--conditions {expected.conditions}: is for rm_anova and mixed_anova, and not together with --levels; for"
+            " groups take --groups"
         )
     if expected.effect is not None and (
         expected.difference is not None or (expected.sd is not None and not _tost(expected))
@@ -127,14 +127,14 @@ def _correlation(expected: Expected, groups_of_values: int) -> tuple[float, str]
 
 
 def _standardised(expected: Expected) -> float | None:
-    """The stated effect: as it is, or as the difference over the SD; None where none is stated."""
+    """The stated effect, or the stated difference over its SD; None where neither is stated."""
     if expected.difference is not None:
         sds = _numbers("--sds", expected.sds) if expected.sds else (expected.sd or 0.0,)
         return require_size("--difference over --sd", expected.difference / math.hypot(*sds) * math.sqrt(len(sds)))
     return None if expected.effect is None else require_size("--effect", expected.effect)
 
 
-def _of_pairs(expected: Expected, search: Search) -> Plan:
+def _plan_of_pairs(expected: Expected, search: Search) -> Plan:
     size, lines = _standardised(expected), []
     if size is not None and (expected.difference is not None or expected.correlation is not None):
         r, line = _correlation(expected, 2)
@@ -145,18 +145,18 @@ def _of_pairs(expected: Expected, search: Search) -> Plan:
     return Plan(expected, (effect,), "d_z", size, (2,), 1, tuple(lines))
 
 
-def _of_factors(expected: Expected) -> Plan:
+def _plan_of_factors(expected: Expected) -> Plan:
     levels = _whole_numbers("--levels", expected.levels) if expected.levels else (expected.conditions,)
     if len(levels) > _MOST_FACTORS:
         raise PipelineError(f"--levels {expected.levels}: three factors are the most that a test takes")
     groups = 1 if expected.test == "rm_anova" else expected.groups or 2
     cells = math.prod(levels)
     r, line = _correlation(expected, cells)
-    least = 1 / max(contrasts(levels, [place]) for place in range(len(levels)))
-    least = min(least, 1 / contrasts(levels, range(len(levels))))
-    if not least <= expected.epsilon <= 1:
+    lowest = 1 / max(contrasts(levels, [place]) for place in range(len(levels)))
+    lowest = min(lowest, 1 / contrasts(levels, range(len(levels))))
+    if not lowest <= expected.epsilon <= 1:
         raise PipelineError(
-            f"--epsilon {expected.epsilon:g}: should lie between {least:.3g}, the lowest that {cells} cells can have,"
+            f"--epsilon {expected.epsilon:g}: should lie between {lowest:.3g}, the lowest that {cells} cells can have,"
             " and 1"
         )
     size = _standardised(expected)
@@ -178,7 +178,7 @@ def _of_factors(expected: Expected) -> Plan:
     return Plan(expected, tuple(effects), "f", size, levels, groups, tuple(lines))
 
 
-def _of_groups(expected: Expected, search: Search) -> Plan:
+def _plan_of_groups(expected: Expected, search: Search) -> Plan:
     two = expected.test in _TWO_GROUPS
     sds = _numbers("--sds", expected.sds) if expected.sds else (1.0,) * (expected.groups or (2 if two else 3))
     if expected.groups is not None and len(sds) != expected.groups:
@@ -205,8 +205,8 @@ def _of_groups(expected: Expected, search: Search) -> Plan:
     return Plan(expected, (effect,), "d" if two else "f", size, (), len(sds), tuple(lines))
 
 
-def _of_equivalence(expected: Expected) -> Plan:
-    """The size asked for is the bound; the true difference is an assumption, none where it is not stated."""
+def _plan_of_equivalence(expected: Expected) -> Plan:
+    """An equivalence test. The size is the bound; the true difference is assumed to be 0 where it is not stated."""
     between = expected.groups is not None
     if expected.groups not in (None, 2):
         raise PipelineError(f"--groups {expected.groups}: tost compares two conditions, or with --groups 2 two groups")
@@ -222,7 +222,7 @@ def _of_equivalence(expected: Expected) -> Plan:
             scale /= math.sqrt(2 * (1 - r))
             lines.append(line)
     elif expected.correlation is not None:
-        raise PipelineError("--correlation: for tost it is needed beside --sd only; the bound is in SDs of differences")
+        raise PipelineError("--correlation: tost takes it together with --sd only; the bound is in SDs of differences")
     bound = None if expected.bound is None else require_size("--bound", expected.bound * scale)
     stated = expected.difference if expected.difference is not None else expected.effect or 0.0
     truth = abs(stated) * scale if expected.sd is not None else abs(stated)
@@ -268,7 +268,7 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 
 def _require_enough(plan: Plan, search: Search) -> None:
-    """Refuse a plan of which some effect takes more participants than --max-n, with the power that these have."""
+    """Refuse a plan with an effect that takes more than --max-n participants; the error names the power of so many."""
     size = plan.size or 0.0
     for effect in plan.effects:
         if participants_for(effect, size, search.power, search.most).judged_by is None:

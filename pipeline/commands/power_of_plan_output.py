@@ -1,4 +1,4 @@
-"""What `power` prints and writes of groups, several factors, mixed designs, equivalence, and a stated n."""
+"""What `power` prints and writes for groups, several factors, mixed designs, equivalence, and a stated n."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Answer:
-    """A table for people, and what is to be said below it."""
+    """A table to print, and the lines below it."""
 
     header: list[str] = field(default_factory=list)
     rows: list[list[str]] = field(default_factory=list)
@@ -42,9 +42,9 @@ class Answer:
 
 
 def heading(plan: Plan, search: Search) -> Iterator[str]:
-    """What is planned, what was stated of the effect, and what is taken for granted."""
-    asked = plan.expected.n is None or plan.size is None
-    tail = f", for a power of {search.power:g}" if asked else ""
+    """The test, the stated effect, and what is assumed."""
+    solves_for_power = plan.expected.n is None or plan.size is None
+    tail = f", for a power of {search.power:g}" if solves_for_power else ""
     yield f"{_titled(plan)}, alpha = {plan.expected.alpha:g}{tail}"
     if plan.size is not None:
         yield f"{plan.size_name} = {number(plan.size)}"
@@ -62,7 +62,7 @@ def _titled(plan: Plan) -> str:
 
 
 def answer(plan: Plan, search: Search) -> Answer:
-    """Whichever of effect, participants and power was left out."""
+    """Whichever of effect, participants and power the options leave open."""
     if plan.expected.n is None:
         return _participants(plan, search)
     return _smallest(plan, search) if plan.size is None else _power(plan, search)
@@ -71,13 +71,13 @@ def answer(plan: Plan, search: Search) -> Answer:
 def _participants(plan: Plan, search: Search) -> Answer:
     rows, lines = [], []
     for effect in plan.effects:
-        found = participants_for(effect, plan.size or 0.0, search.power, search.most)
-        sizes = effect.group_sizes(found.judged_by or search.most)
+        needed = participants_for(effect, plan.size or 0.0, search.power, search.most)
+        sizes = effect.group_sizes(needed.judged_by or search.most)
         closed, _ = power_of(effect, plan.size or 0.0, sizes[0]) if effect.closed_form else (None, None)
         rows.append([effect.name, *_sizes(plan, sizes), fraction(closed)])
-        if found.simulated is not None:
+        if needed.simulated is not None:
             lines.append(
-                f"Simulation ({search.simulations} studies per row, seed {search.seed}): {_bounds(found.simulated)}"
+                f"Simulation ({search.simulations} studies per row, seed {search.seed}): {_bounds(needed.simulated)}"
             )
     header = ["Effect", *_size_titles(plan), "power"]
     if plan.effects[0].closed_form is None:
@@ -107,20 +107,20 @@ def _smallest(plan: Plan, search: Search) -> Answer:
     n = plan.expected.n or 0
     rows, lines = [], []
     for effect in plan.effects:
-        found = effect_for(effect, n, search.power)
-        size = found.closed_form if found.closed_form is not None else found.simulated and found.simulated[0]
+        smallest = effect_for(effect, n, search.power)
+        size = smallest.size
         if size is None:
             rows.append([effect.name, "none, however large"])
             continue
         rows.append([effect.name, number(size, 3)])
-        if found.simulated is not None:
-            _, low, high = found.simulated
+        if smallest.simulated is not None:
+            _, low, high = smallest.simulated
             lines.append(
                 f"By simulation ({search.simulations} studies at each effect, seed {search.seed}):"
                 f" {number(low, 3)} to {number(high, 3)} within its error."
             )
     what = "narrowest bound ±" if plan.size_name == "bound" else f"smallest {plan.size_name}"
-    return Answer(["Effect", what], rows, [_whose(plan, n), *lines, *_methods(plan), *_means(plan)])
+    return Answer(["Effect", what], rows, [_participants_text(plan, n), *lines, *_methods(plan), *_means(plan)])
 
 
 def _power(plan: Plan, search: Search) -> Answer:
@@ -135,10 +135,10 @@ def _power(plan: Plan, search: Search) -> Answer:
         rows.append(row)
     header = ["Effect", *(["power"] if plan.effects[0].closed_form else [])]
     header += [f"simulated [95 % interval], {search.simulations} studies"] if plan.effects[0].shares else []
-    return Answer(header, rows, [_whose(plan, n), *_methods(plan), *_means(plan)])
+    return Answer(header, rows, [_participants_text(plan, n), *_methods(plan), *_means(plan)])
 
 
-def _whose(plan: Plan, n: int) -> str:
+def _participants_text(plan: Plan, n: int) -> str:
     sizes = plan.effects[0].group_sizes(n)
     if plan.groups == 1:
         return f"With {counted(n, 'complete participant')}."
@@ -146,8 +146,8 @@ def _whose(plan: Plan, n: int) -> str:
 
 
 def _methods(plan: Plan) -> Iterator[str]:
-    """How power was computed, each way once."""
-    for method in dict.fromkeys(one.closed_form.method for one in plan.effects if one.closed_form is not None):
+    """How power was computed, each method once."""
+    for method in dict.fromkeys(effect.closed_form.method for effect in plan.effects if effect.closed_form is not None):
         yield f"Computed in {method}." if method.startswith("closed") else f"Computed: {method}."
 
 
@@ -175,16 +175,16 @@ def _assumed(plan: Plan) -> str:
 
 
 def write(folder: Path, plan: Plan, search: Search, settings: Mapping[str, Any]) -> None:
-    """Power over the number of participants, of the effect that is stated or found, as CSV, JSON and SVG."""
+    """Power by the number of participants, for the stated or the smallest effect, as CSV, JSON and SVG."""
     needed: dict[str, Any] = {}
     sizes: dict[str, float] = {}
     numbers: set[int] = {plan.expected.n} if plan.expected.n else set()
     for effect in plan.effects:
         size = plan.size
         if size is None:
-            found = effect_for(effect, plan.expected.n or 0, search.power)
-            size = found.closed_form if found.closed_form is not None else found.simulated and found.simulated[0]
-            needed[effect.name] = {"smallest_effect": size, "simulated": found.simulated}
+            smallest = effect_for(effect, plan.expected.n or 0, search.power)
+            size = smallest.size
+            needed[effect.name] = {"smallest_effect": size, "simulated": smallest.simulated}
         else:
             fewest = participants_for(effect, size, search.power, search.most)
             simulated = fewest.simulated and vars(fewest.simulated)

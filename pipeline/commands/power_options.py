@@ -1,4 +1,4 @@
-"""What the options of `power` state, and how an option that makes no sense is refused."""
+"""What the options of `power` state, and the checks that refuse an impossible one."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class Expected:
 
     @property
     def is_one_factor(self) -> bool:
-        """Is it a test of one factor within people, for which the number of participants is asked?"""
+        """Whether it is a test of one factor within participants, with their number as the question."""
         stated = (self.n, self.levels, self.groups, self.bound, self.sds)
         return self.test in TESTS and stated == (None,) * 5 and self.epsilon == self.size_ratio == 1
 
 
 @dataclass(frozen=True)
 class Search:
-    """The power wanted, how many studies to simulate from which seed, and the most participants to look at."""
+    """The power wanted, how many studies to simulate from which seed, and the most participants to consider."""
 
     power: float
     simulations: int

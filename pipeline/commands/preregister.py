@@ -23,7 +23,10 @@ _POWER, _STUDIES, _SEED, _CORRELATION = 0.8, 10_000, 1, 0.5
 
 
 def preregister(names: Sequence[str]) -> None:
-    """Write both files into the study's folder, and say what is not stated. Neither is ever written over."""
+    """Write both files into the study's folder, and print what study.yaml leaves open.
+
+    Raises PipelineError where either file exists already: a preregistration is never overwritten.
+    """
     if len(names) != 1:
         raise PipelineError(
             f"plan --preregister: needs one study folder, found {len(names)} names, as in:"
@@ -34,7 +37,7 @@ def preregister(names: Sequence[str]) -> None:
     for name in (PREREGISTERED, PAGE):
         if (folder / name).exists() or (folder / name).is_symlink():
             raise PipelineError(
-                f"{folder / name}: is there already, and a preregistration is not written over. Later changes of"
+                f"{folder / name}: already exists, and a preregistration is never overwritten. Later changes of"
                 f" {SETTINGS_FILE} are listed as deviations by the report; to plan another study, copy {SETTINGS_FILE}"
                 " into a folder of its own"
             )
@@ -45,7 +48,7 @@ def preregister(names: Sequence[str]) -> None:
         )
     text, digest = frozen_text(registered_of(study))
     version = versions(["steadyhand"]).get("steadyhand", "")
-    circumstances = Circumstances(digest, version, tuple(_data_there(folder, study)), tuple(_power_lines(study)))
+    circumstances = Circumstances(digest, version, tuple(_existing_data(folder, study)), tuple(_power_lines(study)))
     content = page(study, circumstances)
     _write(folder / PAGE, content)
     _write(folder / PREREGISTERED, text)
@@ -55,20 +58,20 @@ def preregister(names: Sequence[str]) -> None:
     if missing:
         console.warn("Not stated, and left so on the page (to state it, remove both files before they are registered,")
         console.warn(f"and add to {SETTINGS_FILE}):")
-        for each in missing:
-            console.warn(f"  {each}")
+        for what in missing:
+            console.warn(f"  {what}")
 
 
 def _write(path: Path, text: str) -> None:
-    """A new file; one that appeared meanwhile is not written over either."""
+    """Write a new file; one that appeared in the meantime is not overwritten either."""
     try:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        raise PipelineError(f"{path}: is there already, and a preregistration is not written over") from None
+        raise PipelineError(f"{path}: already exists, and a preregistration is never overwritten") from None
 
 
-def _data_there(folder: Path, study: Study) -> Iterator[str]:
+def _existing_data(folder: Path, study: Study) -> Iterator[str]:
     """The tables and logs of the study that exist already; a participants table holds a plan, not data."""
     for field in TABLE_FIELDS:
         name = getattr(study, field)
@@ -90,7 +93,7 @@ def _power_lines(study: Study) -> Iterator[str]:
     if n is None:
         yield "Power: not stated, for the number of participants is not."
         return
-    known = {entry.test: found for entry in study.comparisons if (found := _smallest(entry, study, n)) is not None}
+    known = {entry.test: text for entry in study.comparisons if (text := _smallest(entry, study, n)) is not None}
     for test, text in known.items():
         yield f"Power: {n} participants find {text} with a power of {_POWER:g} ({TESTS[test].long_name}, unadjusted p)."
     unknown = dict.fromkeys(entry.test for entry in study.comparisons if entry.test not in known)
@@ -99,12 +102,11 @@ def _power_lines(study: Study) -> Iterator[str]:
 
 
 def _smallest(entry: Comparison, study: Study, n: int) -> str | None:
-    """`d_z ≥ 0.60`, of a design that study.yaml says in full; None for others."""
+    """`d_z ≥ 0.60`, of a design that study.yaml states completely; None of any other."""
     planned, size, name, assumed = _planned(entry, study, n)
     if planned is None or size < 2:
         return None
-    found = effect_for(planned, size, _POWER)
-    smallest = found.closed_form if found.closed_form is not None else found.simulated and found.simulated[0]
+    smallest = effect_for(planned, size, _POWER).size
     return None if smallest is None else f"{name} ≥ {number(smallest)}{assumed}"
 
 

@@ -1,4 +1,4 @@
-"""From the cache to the user's folder: a study's report, and where it came from."""
+"""Copies a study's report from the cache to the user's folder, with its provenance."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ FORMATS: Mapping[str, tuple[str, ...]] = {
     "bib": ("references.bib",),
     "zip": (_ARCHIVE,),
 }
-"""What `--format` takes: the files, and the folders of files, of each format. The ZIP holds the others asked for."""
+"""What `--format` takes: each format's files and folders. The ZIP holds the files of the other formats asked for."""
 
 
 def publish(result: Result, folder: Path, command: Sequence[str], formats: Iterable[str] = FORMATS) -> None:
-    """Bring the report's files into `folder`, and remove those of an earlier report that this one does not have."""
+    """Copy the report's files into `folder`, and remove those of an earlier report that this one does not have."""
     available = {}
     if "report" in result.entries:
         entry = result.entry("report")
         available = {path.relative_to(entry).as_posix(): path for path in sorted(entry.rglob("*")) if path.is_file()}
     available[_RESULTS] = result.entry("compare") / _RESULTS
-    wanted = [one for name in formats for one in FORMATS[name]]
+    wanted = [file for name in formats for file in FORMATS[name]]
     files = {name: path for name, path in available.items() if _is_of(name, wanted)}
     archive = [_ARCHIVE] if _ARCHIVE in wanted else []
     refuse_inputs(result, folder, [*files, *archive, PROVENANCE])
@@ -56,25 +56,30 @@ def publish(result: Result, folder: Path, command: Sequence[str], formats: Itera
 
 
 def _is_of(name: str, wanted: Iterable[str]) -> bool:
-    """Whether it is one of these files, or in one of these folders."""
-    return any(name == one or (one.endswith("/") and name.startswith(one)) for one in wanted)
+    """Whether it is one of these files, or in one of these folders, which end in a slash."""
+    return any(name == entry or (entry.endswith("/") and name.startswith(entry)) for entry in wanted)
 
 
 def _write_archive(files: Mapping[str, Path], study: str, path: Path) -> None:
-    """One file to mail: everything in a folder of the study's name; the same files give the same bytes."""
-    with _whole(path) as beside, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as archive:
+    """Everything in one file to send, in a folder of the study's name; the same files give the same bytes."""
+    with _replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, source in sorted(files.items()):
             archive.writestr(zipfile.ZipInfo(f"{study}/{name}"), source.read_bytes(), zipfile.ZIP_DEFLATED)
 
 
 def _publish_provenance(result: Result, folder: Path, command: Sequence[str], files: Iterable[str]) -> bool:
-    content = {"study": result.name, **_program(command, COMPARE), **_read(result), "files": sorted(files)}
+    content = {
+        "study": result.name,
+        **_program(command, COMPARE),
+        **_settings_and_inputs(result),
+        "files": sorted(files),
+    }
     return _write_provenance(content, result.entry("compare") / _RESULTS, folder)
 
 
 def publish_provenance(results: Iterable[Result], folder: Path, command: Sequence[str]) -> None:
     """provenance.json of a replay of several studies."""
-    studies = {result.name: _read(result) for result in results}
+    studies = {result.name: _settings_and_inputs(result) for result in results}
     _write_provenance({**_program(command, (*INGEST, REPLAY)), "studies": studies}, folder / _RESULTS, folder)
 
 
@@ -87,7 +92,7 @@ def publish_exploration(study: Study, folder: Path, command: Sequence[str]) -> N
 
 
 def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
-    """What ran; the digest of a stage's code is one of the versions of its libraries too."""
+    """What ran: the command, versions, and each stage's digest, which covers its code and the versions of libraries."""
     return {
         "command": [Path(command[0]).name, *command[1:]],
         "python": platform.python_version(),
@@ -96,21 +101,21 @@ def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
     }
 
 
-def _read(result: Result) -> dict[str, Any]:
-    """What it read."""
+def _settings_and_inputs(result: Result) -> dict[str, Any]:
+    """What was read: the settings that study.yaml states, and the digests of the input files."""
     settings = json.loads(result.study.model_dump_json(exclude_defaults=True))
     return {"settings": settings, "inputs_sha256": result.inputs}
 
 
 def _write_provenance(provenance: dict[str, Any], results: Path, folder: Path) -> bool:
-    """Write it; whether it differs from the one that was there."""
+    """Write provenance.json unless the same is there already; whether it was written."""
     provenance["results_sha256"] = file_digest(results)
     text = (json.dumps(provenance, indent=1, ensure_ascii=False) + "\n").encode()
     path = folder / PROVENANCE
     if path.is_file() and path.read_bytes() == text:
         return False
-    with _whole(path) as beside:
-        beside.write_bytes(text)
+    with _replacing(path) as temporary:
+        temporary.write_bytes(text)
     return True
 
 
@@ -129,40 +134,46 @@ def refuse_inputs(result: Result, folder: Path, files: Iterable[str]) -> None:
 
 
 def publish_results(result: Result, folder: Path, command: Sequence[str]) -> None:
-    """Write results.json and its provenance; that lists an earlier report's files too, for the next one to remove."""
+    """Write results.json and its provenance.
+
+    The provenance keeps listing the files of an earlier report, so that the next report can remove them.
+    """
     refuse_inputs(result, folder, [_RESULTS, PROVENANCE])
     copy(result.entry("compare") / _RESULTS, folder / _RESULTS)
     _publish_provenance(result, folder, command, {*_published(folder), _RESULTS})
 
 
 def _published(folder: Path) -> list[str]:
-    """The files an earlier report put there, inside the folder only."""
+    """The files that an earlier report wrote into the folder, as its provenance lists them.
+
+    The list may have been edited: only names that a report writes, and only below the folder, are believed.
+    """
     try:
         listed = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError, KeyError, TypeError):
         return []
     root = folder.resolve()
-    known = [one for files in FORMATS.values() for one in files]
+    known = [file for files in FORMATS.values() for file in files]
     ours = [name for name in listed if isinstance(name, str) and _is_of(name, known)]
     return [name for name in ours if (root / name).resolve().is_relative_to(root)]
 
 
 def copy(source: Path, target: Path) -> bool:
-    """Copy a file, whole or not at all, unless the target is the same already; whether it was copied."""
+    """Copy a file, completely or not at all, unless the target is the same already; whether it was copied."""
     if target.is_file() and target.read_bytes() == source.read_bytes():
         return False
-    with _whole(target) as beside:
-        shutil.copyfile(source, beside)
+    with _replacing(target) as temporary:
+        shutil.copyfile(source, temporary)
     return True
 
 
 @contextmanager
-def _whole(target: Path) -> Iterator[Path]:
-    """A file to fill, which then replaces the target at once: an interrupted run leaves what was there before."""
+def _replacing(target: Path) -> Iterator[Path]:
+    """A temporary file to fill, which then replaces the target at once: a stopped run leaves the old one intact."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    temporary = target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        yield beside
-        beside.replace(target)
+        yield temporary
+        temporary.replace(target)
     finally:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)

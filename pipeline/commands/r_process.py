@@ -1,4 +1,4 @@
-"""Running a script in R: files in, one file out, and an end to it when it takes too long."""
+"""Runs a script in R: files in, one file out, with a time limit."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class RunInR:
-    """What the script wrote, whole or up to where it stopped, and why it stopped if it did."""
+    """What the script wrote, completely or up to where it stopped, and why it stopped if it did."""
 
     written: str
     failure: str | None = None
 
 
 def executable() -> str | None:
-    """The path of Rscript, if there is one."""
+    """The path of Rscript; None where R is not installed."""
     return shutil.which("Rscript")
 
 

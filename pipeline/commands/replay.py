@@ -63,20 +63,20 @@ def replay(
     refuse_same_names(studies)
     folder = out or reports_folder() / "replay"
     refuse_study(folder)
-    wanted, further = read_changes(changes), read_estimators(estimators)
+    settings_to_try, further_estimators = read_changes(changes), read_estimators(estimators)
     gathered = _Gathered()
 
     def bring(study: Path, stages: Sequence[Stage], resources: Resources) -> Result:
         try:
-            listed = variants(load_study(study), wanted, further, estimators)
+            listed = variants(load_study(study), settings_to_try, further_estimators, estimators)
         except PipelineError as error:
             raise PipelineError(_in_study(study, str(error))) from None
         result = bring_up_to_date(study, stages, resources)
-        kept, excluded = _without_excluded(result)
-        if not kept:
+        sessions, excluded = _without_excluded(result)
+        if not sessions:
             raise PipelineError(f"{study}: there is no session to replay")
-        entries = run_variants(result, REPLAY, [variant.study for variant in listed], kept, resources)
-        _gather(gathered, result, listed, list(zip(kept, entries, strict=True)), excluded)
+        entries = run_variants(result, REPLAY, [variant.study for variant in listed], sessions, resources)
+        _gather(gathered, result, listed, list(zip(sessions, entries, strict=True)), excluded)
         return result
 
     def then(_folder: Path, result: Result) -> int:
@@ -97,14 +97,14 @@ def _in_study(study: Path, message: str) -> str:
 
 def _without_excluded(result: Result) -> tuple[list[Session], list[Row]]:
     """The sessions to replay, and a row of exclusions for each that study.yaml excludes."""
-    kept, rows = [], []
+    sessions, rows = [], []
     for session in result.sessions:
         decision = result.study.exclusion_of(session)
         if decision is None:
-            kept.append(session)
+            sessions.append(session)
         else:
             rows.append({**session.ids, "what": "excluded in study.yaml", "reason": decision.reason})
-    return kept, rows
+    return sessions, rows
 
 
 def _gather(
@@ -114,7 +114,7 @@ def _gather(
     entries: Sequence[tuple[Session, list[Entry]]],
     excluded: list[Row],
 ) -> None:
-    """Add a study's tables; a session that failed with one variant is set aside there, and said."""
+    """Add a study's tables, with a row of exclusions for each session that failed with a variant."""
     rows: list[Row] = [
         *({**session.ids, "what": "session set aside", "reason": why} for session, why in result.set_aside),
         *({**session.ids, "what": "session read in part", "reason": why} for session, why in result.in_part),
@@ -177,7 +177,7 @@ def _of_variants(name: str, listed: Sequence[Variant], entries: Sequence[tuple[S
 
 
 def _settings(variant: Variant) -> Row:
-    """A variant with all that was set for it."""
+    """A variant with all settings that were stated for it."""
     settings = variant.study.estimators[variant.estimator].model_dump(mode="json", exclude_unset=True)
     return {"estimator": variant.estimator, "variant": variant.label, "settings": settings}
 
@@ -185,7 +185,7 @@ def _settings(variant: Variant) -> Row:
 def _write(gathered: _Gathered, folder: Path) -> None:
     """Write replay.html, replay.pdf, results.json and the tables as Parquet, and print the ranking."""
     accuracy, trials = pd.concat(gathered.accuracy), pd.concat(gathered.trials)
-    written = {
+    frames = {
         "accuracy": accuracy,
         "replay_trials": trials,
         "replay_means": tables.frame("replay_means", ranked(accuracy, trials)),
@@ -195,11 +195,11 @@ def _write(gathered: _Gathered, folder: Path) -> None:
     for result in gathered.results:
         refuse_inputs(result, folder, files)
     with tempfile.TemporaryDirectory() as filled, tempfile.TemporaryDirectory() as drawn:
-        _fill(gathered.studies, written, Path(drawn), Path(filled))
+        _fill(gathered.studies, frames, Path(drawn), Path(filled))
         for name in files:
             copy(Path(filled) / name, folder / name)
     publish_provenance(gathered.results, folder, sys.argv)
-    _say(list(tables.records("replay_means", written["replay_means"])), reference_phrase(accuracy["reference"]))
+    _say(list(tables.records("replay_means", frames["replay_means"])), reference_phrase(accuracy["reference"]))
     for caution in in_doubt(gathered.studies):
         console.say(caution)
     console.say(f"Report: {console.short_path(folder / _PAGE)}  {console.short_path(folder / _PRINT)}")
@@ -210,13 +210,13 @@ def _fill(studies: Sequence[Row], frames: Mapping[str, pd.DataFrame], drawn: Pat
     results.write_replay(folder / _RESULTS, studies, {name: frames[name] for name in _IN_RESULTS})
     for name in _TABLES:
         tables.write(name, frames[name], folder)
-    shown = document(studies, frames, drawn)
-    html.render(shown, drawn, folder / _PAGE)
-    pdf.render(shown, drawn, folder / _PRINT)
+    pages = document(studies, frames, drawn)
+    html.render(pages, drawn, folder / _PAGE)
+    pdf.render(pages, drawn, folder / _PRINT)
 
 
 def _say(rows: Sequence[Row], standard: str) -> None:
-    """Print the means: of all studies where there are several, else of the one; ranked if there is a reference."""
+    """Print the means over all studies, or of the only one; ranked if there is a reference."""
     first = [row for row in rows if row["study"] == rows[0]["study"]]
     error = f"mm from {standard}" if SMOOTHED in standard else "RMSE mm"
     header = ("variant", "sessions", error, "95 % interval", "lag ms", "jitter mm")

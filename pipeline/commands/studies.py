@@ -1,4 +1,4 @@
-"""What commands over one or many studies have in common."""
+"""What commands over one or more studies have in common."""
 
 from __future__ import annotations
 

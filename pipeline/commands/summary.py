@@ -1,4 +1,4 @@
-"""The few lines a terminal shows of a study's results."""
+"""The few lines that the console shows of a study's results."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.analysis.audit.finding import CONTRADICTION
 from pipeline.commands import console
 from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
-from pipeline.report.prose.answer import HEADER, answer, not_answered, notes
+from pipeline.report.prose.answer import HEADER, answer, notes, rows_beside_the_answer
 from pipeline.words.names import measure_label
 from pipeline.words.numbers import number
 from pipeline.words.phrases import counted
@@ -18,7 +18,7 @@ _CHECKS_MAX = 5  # printed; the report has them all
 
 
 def say_results(results: Mapping[str, Any]) -> None:
-    """Print title and origin, the table of pairs that the report's first page has, and what else is to be said."""
+    """Print title and origin, the table of pairs as on the report's first page, and the lines of `summary`."""
     study = results["study"]
     console.say(f"{study['title']} (data: {study['data_origin']})")
     lines = answer(results)
@@ -31,8 +31,8 @@ def say_results(results: Mapping[str, Any]) -> None:
 
 
 def summary(results: Mapping[str, Any]) -> Iterator[str]:
-    """Tests of all conditions or of other factors, and each estimator's mean error."""
-    for row in not_answered(results):
+    """The lines below the table of pairs: other tests, checks, accuracy, and printed figures."""
+    for row in rows_beside_the_answer(results):
         yield f"  {measure_label(row['measure'])}: {brief_sentence(row)}"
     yield from _checks(results)
     yield from _accuracy(results)

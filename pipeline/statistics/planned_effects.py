@@ -53,10 +53,20 @@ class PlannedEffect:
 
 @dataclass(frozen=True)
 class SmallestEffect:
-    """The smallest effect that is found: in closed form, else by simulation; None where even the largest is not."""
+    """The smallest effect that is detected: in closed form, or else by simulation with its error, low and high.
+
+    Both are None where even the largest effect is not detected.
+    """
 
     closed_form: float | None
     simulated: tuple[float, float, float] | None
+
+    @property
+    def size(self) -> float | None:
+        """Its size, by whichever way computed it."""
+        if self.closed_form is not None or self.simulated is None:
+            return self.closed_form
+        return self.simulated[0]
 
 
 @dataclass(frozen=True)

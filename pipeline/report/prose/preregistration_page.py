@@ -23,11 +23,14 @@ NOT_STATED = "not stated"
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What the page says beside study.yaml: the frozen file's digest, what data were there, and the power of n."""
+    """What the page says in addition to study.yaml.
+
+    The digest of the frozen file, Steadyhand's version, the data files that existed already, and the power of n.
+    """
 
     digest: str
     version: str
-    data_there: tuple[str, ...]
+    existing_data: tuple[str, ...]
     power: tuple[str, ...]
 
 
@@ -47,11 +50,11 @@ def page(study: Study, now: Circumstances) -> str:
 
 
 def unanswered(study: Study) -> list[str]:
-    """The keys of `preregistration:` that are not stated, and the comparisons without a hypothesis."""
+    """What study.yaml leaves open: keys of `preregistration:`, and comparisons without a hypothesis."""
     answers = study.preregistration
     missing = [f"preregistration.{name}" for name in type(answers).model_fields if getattr(answers, name) is None]
-    lacking = [entry.title for entry in study.comparisons if hypothesis(entry, study.conditions) is None]
-    return [*missing, *(f"hypothesis or direction of {title}" for title in lacking)]
+    without_hypothesis = [entry.title for entry in study.comparisons if hypothesis(entry, study.conditions) is None]
+    return [*missing, *(f"hypothesis or direction of {title}" for title in without_hypothesis)]
 
 
 _Questions = Iterator[tuple[str, Sequence[str]]]
@@ -116,7 +119,7 @@ def _stated(what: str, answer: str | None) -> str:
 
 
 def _data(study: Study, now: Circumstances) -> list[str]:
-    there = listing([f"`{name}`" for name in now.data_there]) if now.data_there else "none"
+    there = listing([f"`{name}`" for name in now.existing_data]) if now.existing_data else "none"
     fact = f"Of the data that study.yaml names, there was when this page was written: {there}."
     return [study.preregistration.data_collected or NOT_STATED, fact]
 
@@ -126,11 +129,11 @@ def _hypotheses(study: Study) -> list[str]:
     lines = [_stated("Question", study.preregistration.question)]
     for entry in study.comparisons:
         expected = hypothesis(entry, study.conditions)
-        lines.append(f"{_of(entry)}: {expected or f'hypothesis and direction {NOT_STATED}'}")
+        lines.append(f"{_entry_measures(entry)}: {expected or f'hypothesis and direction {NOT_STATED}'}")
     return lines
 
 
-def _of(entry: Comparison) -> str:
+def _entry_measures(entry: Comparison) -> str:
     """An entry's measures for people, with the name that the data have."""
     return listing([f"`{name}`" if "*" in name else f"{measure_label(name)} (`{name}`)" for name in entry.measures])
 
@@ -170,7 +173,7 @@ def _conditions(study: Study) -> list[str]:
 def _tests(study: Study) -> Iterator[str]:
     """Each entry's test with all its settings, and its family."""
     for entry in study.comparisons:
-        text = f"{_of(entry)}: {test_in_words(entry, [])}"
+        text = f"{_entry_measures(entry)}: {test_in_words(entry, [])}"
         if "follow_up" in entry.options and entry.follow_up != "none":
             text += f"; pairs follow, {adjustment_label(entry.follow_up)}-adjusted, where there are more than two"
         if "zeros" in entry.options:
@@ -189,7 +192,7 @@ def _inference(study: Study) -> Iterator[str]:
         if entry.adjust != "none":
             key = entry.family or f" {place}"
             families.setdefault(f"{key}\n{adjustment_label(entry.adjust)}", []).extend(
-                f"`{one}`" for one in entry.measures
+                f"`{name}`" for name in entry.measures
             )
     for key, measures in families.items():
         name, _, method = key.partition("\n")
@@ -206,29 +209,29 @@ def _outliers(study: Study) -> Iterator[str]:
 
 def _exclusions(study: Study) -> Iterator[str]:
     yield _stated("Exclusions", study.preregistration.exclusion_rules)
-    for one in study.exclusions:
-        named = [f"{key} {value}" for key, value in one.model_dump().items() if value and key != "reason"]
-        yield f"Excluded already: {', '.join(named)} ({one.reason})"
+    for exclusion in study.exclusions:
+        named = [f"{key} {value}" for key, value in exclusion.model_dump().items() if value and key != "reason"]
+        yield f"Excluded already: {', '.join(named)} ({exclusion.reason})"
 
 
 def _missing(study: Study) -> Iterator[str]:
-    """What happens to who lacks a value, by entry where it differs."""
-    available = [_of(entry) for entry in study.comparisons if entry.missing == "available"]
+    """How missing values are treated, entry by entry where it differs."""
+    available = [_entry_measures(entry) for entry in study.comparisons if entry.missing == "available"]
     yield "Missing data: participants who lack a value of a test's conditions are left out of it (listwise)."
     if available:
         yield f"Of {listing(available)}: averages over what is there."
-    models = [_of(entry) for entry in study.comparisons if not TESTS[entry.test].complete_cases]
+    models = [_entry_measures(entry) for entry in study.comparisons if not TESTS[entry.test].complete_cases]
     if models:
         yield f"Of {listing(models)}: the model takes incomplete participants too."
 
 
 def _transformations(study: Study) -> list[str]:
     stated = [(entry, entry.model_dump(exclude_defaults=True).get("transform")) for entry in study.comparisons]
-    return [f"{_of(entry)}: {transform}" for entry, transform in stated if transform] or ["None is stated."]
+    return [f"{_entry_measures(entry)}: {transform}" for entry, transform in stated if transform] or ["None is stated."]
 
 
 def _sample_size(study: Study, now: Circumstances) -> list[str]:
-    """How many, why, and what these find."""
+    """How many participants, why so many, and the power that they give."""
     answers = study.preregistration
     return [
         _stated("Participants", str(answers.participants) if answers.participants else None),

@@ -197,7 +197,7 @@ def test_the_files_hold_every_effect(power: Power, tmp_path: Path) -> None:
         (("--test", "tost"), "--bound is missing: differences within ± this count as none, such as --bound 0.5"),
         (("--test", "tost", "--bound", "0.3", "--effect", "0.4"), "lies outside the bounds of ±0.3"),
         (("--test", "tost", "--bound", "0.3", "--groups", "3"), "with --groups 2 two groups"),
-        (("--test", "tost", "--bound", "0.3", "--correlation", "0.3"), "it is needed beside --sd only"),
+        (("--test", "tost", "--bound", "0.3", "--correlation", "0.3"), "tost takes it together with --sd only"),
         (("--test", "t_welch", "--difference", "3"), "--difference needs --sd"),
         (("--test", "t_welch", "--effect", "3", "--sd", "2"), "give only one of them"),
         (("--test", "t_welch", "--sd", "2", "--n", "9"), "--sd needs --difference"),

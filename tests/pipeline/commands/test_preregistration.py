@@ -142,7 +142,7 @@ def test_it_is_never_written_over(registered: Path, plan: Plan) -> None:
         (registered / missing).unlink()
         ran = plan(registered, "--preregister")
         assert ran.code == 2
-        assert "is there already, and a preregistration is not written over" in ran.err
+        assert "already exists, and a preregistration is never overwritten" in ran.err
         (registered / missing).write_bytes(before[registered / missing])
     assert {path: path.read_bytes() for path in registered.iterdir()} == before
 
