@@ -15,7 +15,7 @@ import pandas as pd
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
-from pipeline.study.scoring import RULES
+from pipeline.study.scoring_rules import RULES
 from pipeline.study.scoring_settings import ScoringEntry
 from pipeline.tables.table import Row
 from pipeline.words.phrases import listing

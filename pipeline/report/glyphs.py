@@ -1,4 +1,7 @@
-"""What the bundled fonts can show. A character without a glyph would stop the PDF and leave a hole in a figure."""
+"""Characters that the bundled fonts can show.
+
+A character without a glyph would stop the PDF and leave a hole in a figure; a box stands for it.
+"""
 
 from __future__ import annotations
 

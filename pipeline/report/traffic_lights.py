@@ -1,4 +1,4 @@
-"""Traffic lights for sessions: each figure of their quality against the limits of study.yaml."""
+"""Why a session is green, amber or red: each of its quality figures compared with the limits of study.yaml."""
 
 from __future__ import annotations
 
@@ -15,16 +15,19 @@ from pipeline.words.numbers import number, percent
 Light = Literal["not judged", "green", "amber", "red"]
 
 LIGHTS: tuple[Light, ...] = ("not judged", "green", "amber", "red")
-"""From the least to the worst."""
+"""From the best to the worst; of what is not judged nothing is known."""
 SYMBOLS: Mapping[Light, str] = {"not judged": "–", "green": "✓", "amber": "▲", "red": "✗"}
 FACTS = ("Rate", "Longest gap", "Delay", "Clock", "Lost", "Replay", "Checks")
 """The figures of a session that are judged, in the order of the report."""
-_TO_COMPARE = 3  # sessions: with fewer the usual rate cannot be told from an unusual one
+_TO_COMPARE = 3  # sessions: with fewer nobody can say which rate is the usual one
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A figure of a session, judged: what it is of, as people read it, and its light."""
+    """A quality figure of a session and its light.
+
+    `fact` is one of `FACTS`, `of` the stream, estimator or check that it belongs to, `shown` the figure as text.
+    """
 
     session: str
     fact: str
@@ -34,43 +37,43 @@ class Judged:
 
     @property
     def text(self) -> str:
-        """`▲ amber: 0.35 s (imu)`; a figure that is as it should be needs no more than its light."""
+        """`▲ amber: 0.35 s (imu)`; of a green figure the light alone."""
         head = f"{SYMBOLS[self.light]} {self.light}"
         return f"{head}: {self.shown} ({self.of})" if self.light in ("amber", "red") else head
 
 
 def judged(study: Study, quality: Sequence[Row], agreement: Sequence[Row], checks: Sequence[Row] = ()) -> list[Judged]:
-    """Every figure of every session; rows of the tables `quality`, `replay_agreement` and `checks`."""
+    """Every figure of every session, from rows of the tables `quality`, `replay_agreement` and `checks`."""
     limits, usual = study.quality_limits, _usual_rates(study, quality)
-    found = [one for row in quality for one in _stream(study, row, usual.get(row["stream"]))]
-    there = {(row["session"], row["stream"]) for row in quality}
+    figures = [figure for row in quality for figure in _stream_figures(study, row, usual.get(row["stream"]))]
+    with_samples = {(row["session"], row["stream"]) for row in quality}
     for session in dict.fromkeys(row["session"] for row in quality):
-        lacking = [name for name in study.streams if (session, name) not in there]
-        found += [Judged(session, "Lost", name, "no samples", "amber") for name in lacking]
+        empty = [name for name in study.streams if (session, name) not in with_samples]
+        figures += [Judged(session, "Lost", name, "no samples", "amber") for name in empty]
     for row in agreement:
         apart = row["max_mm"]
         light: Light = "not judged" if apart is None else _above(apart, limits.agreement_mm)
-        found.append(Judged(row["session"], "Replay", row["estimator"], f"{number(apart, 3)} mm apart", light))
-    found += [
+        figures.append(Judged(row["session"], "Replay", row["estimator"], f"{number(apart, 3)} mm apart", light))
+    figures += [
         Judged(row["session"], "Checks", row["check"], row["found"], row["status"]) for row in checks if row["session"]
     ]
-    return found
+    return figures
 
 
 def worst(figures: Sequence[Judged]) -> Judged | None:
     """The figure with the worst light, the first of several."""
-    return max(figures, key=lambda one: LIGHTS.index(one.light), default=None)
+    return max(figures, key=lambda figure: LIGHTS.index(figure.light), default=None)
 
 
 def light_of(figures: Sequence[Judged]) -> Light:
     """A session's light: that of the worst of its figures."""
-    found = worst(figures)
-    return "not judged" if found is None else found.light
+    decisive = worst(figures)
+    return "not judged" if decisive is None else decisive.light
 
 
 def limits_text(limits: QualityLimits) -> str:
     """The limits in words, once for the whole report."""
-    told = (
+    rows = (
         ("rate below", limits.rate_share, "%"),
         ("longest gap over", limits.gap_s, "s"),
         ("delay over", limits.latency_s, "s"),
@@ -79,7 +82,7 @@ def limits_text(limits: QualityLimits) -> str:
         ("messages lost over", limits.lost_share, "%"),
         ("replay apart by over", limits.agreement_mm, "mm"),
     )
-    return "; ".join(f"{what} {_plain(amber, unit)} ({_plain(red, unit)})" for what, (amber, red), unit in told)
+    return "; ".join(f"{what} {_plain(amber, unit)} ({_plain(red, unit)})" for what, (amber, red), unit in rows)
 
 
 def _plain(value: float, unit: str) -> str:
@@ -100,32 +103,34 @@ def _usual_rates(study: Study, quality: Sequence[Row]) -> dict[str, float]:
     return usual
 
 
-def _stream(study: Study, row: Row, usual_hz: float | None) -> Iterator[Judged]:
-    """What is judged of a stream. Events have no rate, so only their losses are judged."""
+def _stream_figures(study: Study, row: Row, usual_hz: float | None) -> Iterator[Judged]:
+    """The figures of a stream. Events have no rate, so only their losses are judged."""
     limits, stream = study.quality_limits, study.streams.get(row["stream"])
 
-    def one(fact: str, shown: str, light: Light) -> Judged:
+    def figure(fact: str, shown: str, light: Light) -> Judged:
         return Judged(row["session"], fact, row["stream"], shown, light)
 
     if stream is not None:
         if row["rate_hz"] is not None and usual_hz is not None:
             shown = f"{number(row['rate_hz'], 1)} Hz for {number(usual_hz, 1)}"
-            yield one("Rate", shown, _below(row["rate_hz"] / usual_hz, limits.rate_share))
+            yield figure("Rate", shown, _below(row["rate_hz"] / usual_hz, limits.rate_share))
         if row["gap_max_s"] is not None:
-            yield one("Longest gap", f"{number(row['gap_max_s'])} s", _above(row["gap_max_s"], limits.gap_s))
+            yield figure("Longest gap", f"{number(row['gap_max_s'])} s", _above(row["gap_max_s"], limits.gap_s))
         if row["latency_s"] is not None:
             delay_s = row["latency_s"] + (stream.latency_s if stream.stamp == "arrival" else 0.0)
-            yield one("Delay", f"{number(delay_s)} s", _above(abs(delay_s), limits.latency_s))
+            yield figure("Delay", f"{number(delay_s)} s", _above(abs(delay_s), limits.latency_s))
         if row["jitter_ms"] is not None:
-            yield one("Clock", f"{number(row['jitter_ms'], 1)} ms jitter", _above(row["jitter_ms"], limits.jitter_ms))
+            yield figure(
+                "Clock", f"{number(row['jitter_ms'], 1)} ms jitter", _above(row["jitter_ms"], limits.jitter_ms)
+            )
         if row["out_of_order"] is not None and row["messages_read"]:
             share = row["out_of_order"] / row["messages_read"]
-            yield one("Clock", f"{percent(share)} out of order", _above(share, limits.out_of_order_share))
+            yield figure("Clock", f"{percent(share)} out of order", _above(share, limits.out_of_order_share))
     if row["messages_lost"] is None:
-        yield one("Lost", "number not known", "amber")
+        yield figure("Lost", "number not known", "amber")
     elif row["messages_read"] + row["messages_lost"]:
         share = row["messages_lost"] / (row["messages_read"] + row["messages_lost"])
-        yield one("Lost", f"{row['messages_lost']}, {percent(share)}", _above(share, limits.lost_share))
+        yield figure("Lost", f"{row['messages_lost']}, {percent(share)}", _above(share, limits.lost_share))
 
 
 def _above(value: float, limits: tuple[float, float]) -> Light:

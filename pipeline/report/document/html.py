@@ -1,4 +1,4 @@
-"""A document as one self-contained HTML file, which is complete without its script and fetches nothing."""
+"""Renders a document as one HTML file, which works without its script and loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from markupsafe import Markup, escape
 from pipeline.report.document.model import CrossReference, Document, Link, Strong, numbered
 from pipeline.report.document.typography import Run, Style, typeset, typeset_heading
 
-_DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))  # they would reverse the text and numbers that follow
+# Direction controls would reverse the text and numbers that follow.
+_DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
 _UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may break there
 _HERE = Path(__file__).parent
@@ -51,7 +52,7 @@ def write_page(template: str, script: str, path: Path, origin: str, **values: An
 
 
 def _quoted(text: str) -> str:
-    """A string for CSS, in which everything but letters and spaces is escaped by its code."""
+    """A string for CSS; everything but letters and spaces is escaped by its code."""
     return '"' + "".join(c if c.isalpha() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
 
 

@@ -16,7 +16,7 @@ class Strong:
 
 @dataclass(frozen=True)
 class Link:
-    """Words that link to another file of the report, by a name the program gave it. In print they are plain words."""
+    """A link to another file of the report; in print, plain words. `href` is made by the program, never from data."""
 
     text: str
     href: str

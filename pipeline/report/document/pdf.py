@@ -33,28 +33,30 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
     import typst
 
-    content = _over(_content(document), lambda text: text.replace("\u2009", "\u202f"))  # no line breaks within a number
-    shown = _over(content, showable)
-    shown |= {"lacking": shown != content, "unbroken": _UNBROKEN}
+    content = _map_texts(
+        _content(document), lambda text: text.replace("\u2009", "\u202f")
+    )  # no line breaks within a number
+    printed = _map_texts(content, showable)
+    printed |= {"lacking": printed != content, "unbroken": _UNBROKEN}
     compiler = typst.Compiler(
         (_HERE / "report.typ").read_bytes(),
         root=figures.resolve(),
         font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
         ignore_system_fonts=True,
-        sys_inputs={"document": json.dumps(shown, ensure_ascii=False)},
+        sys_inputs={"document": json.dumps(printed, ensure_ascii=False)},
     )
     pdf = compiler.compile(format="pdf", pdf_standards=[*_STANDARDS], timestamp=0)
     assert isinstance(pdf, bytes)  # noqa: S101 - one document gives one PDF
     path.write_bytes(pdf)
 
 
-def _over(value: Any, change: Callable[[str], str]) -> Any:
+def _map_texts(value: Any, change: Callable[[str], str]) -> Any:
     """The same data with every text changed."""
     if isinstance(value, str):
         return change(value)
     if isinstance(value, list):
-        return [_over(item, change) for item in value]
-    return {key: _over(item, change) for key, item in value.items()} if isinstance(value, dict) else value
+        return [_map_texts(item, change) for item in value]
+    return {key: _map_texts(item, change) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def _content(document: Document) -> dict[str, Any]:
@@ -136,15 +138,15 @@ def _runs(runs: Iterable[Run]) -> list[list[str]]:
 
 def _shares(table: Table) -> list[float]:
     """Relative widths of the columns, from their longest cells: text may wrap, but not within numbers or words."""
-    wanted = []
+    widths = []
     for index, column in enumerate(table.columns):
         texts = [row[index] for row in table.rows]
         cells = [len(text) for text in texts]
         longest, heading = max(cells, default=1), _longest_word([column.title])
         typical = sum(cells) / max(len(cells), 1)
         width = longest if column.numeric else min(longest, max(12, 1.6 * typical))
-        wanted.append(float(max(width, heading, min(_longest_word(texts), _UNBROKEN)) + 3))
-    return wanted
+        widths.append(float(max(width, heading, min(_longest_word(texts), _UNBROKEN)) + 3))
+    return widths
 
 
 def _longest_word(texts: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""The sessions' traces on a page of their own: the one page that needs a script. It fetches nothing."""
+"""The page of the sessions' traces, the only one that needs its script. It loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Traces:
 
 def render(title: str, origin: str, sessions: Iterable[Traces], count: int, path: Path) -> None:
     """Write the page of `count` sessions, each in steps of time as fine as its share of the page allows."""
-    packed = [_fitting(traces, BUDGET_BYTES // max(count, 1)) for traces in sessions]
+    packed = [_packed_within(traces, BUDGET_BYTES // max(count, 1)) for traces in sessions]
     data = json.dumps(packed, ensure_ascii=False, separators=(",", ":"))
     for character, escaped in _SCRIPT_ENDS.items():
         data = data.replace(character, escaped)
@@ -58,7 +58,7 @@ def render(title: str, origin: str, sessions: Iterable[Traces], count: int, path
     write_page("traces.html.jinja", "traces.js", path, origin, title=title, data=data, back=back)
 
 
-def _fitting(traces: Traces, budget: int) -> dict[str, Any]:
+def _packed_within(traces: Traces, budget: int) -> dict[str, Any]:
     """A session packed, and thinned until it fits; if none fits, the coarsest step is taken."""
     packed = _packed(traces, 0.0)
     if len(packed["data"]) <= budget:
@@ -85,10 +85,10 @@ def _packed(traces: Traces, step_s: float) -> dict[str, Any]:
     """
     listed, parts, left_out = [], [], 0
     for series in traces.series:
-        kept = _storable(series)
-        left_out += len(kept) - int(kept.sum())
-        time_s, value_mm = series.time_s[kept], series.value_mm[kept]
-        thin = _apart(time_s, step_s)
+        storable = _storable(series)
+        left_out += len(storable) - int(storable.sum())
+        time_s, value_mm = series.time_s[storable], series.value_mm[storable]
+        thin = _first_of_each_step(time_s, step_s)
         parts += [_bytes(time_s[thin] * 1e3), *(_bytes(column) for column in value_mm[thin].T)]
         listed.append({"name": series.name, "kind": series.kind, "axes": series.axes, "n": int(thin.sum())})
     return {
@@ -109,7 +109,7 @@ def _storable(series: Series) -> npt.NDArray[np.bool_]:
     return np.asarray(inside, dtype=np.bool_)
 
 
-def _apart(time_s: FloatArray, step_s: float) -> npt.NDArray[np.bool_]:
+def _first_of_each_step(time_s: FloatArray, step_s: float) -> npt.NDArray[np.bool_]:
     """Which readings are the first of their step of time."""
     if step_s == 0:
         return np.ones(len(time_s), dtype=np.bool_)

@@ -1,7 +1,7 @@
-"""Tables to figures: one drawing a figure, one look for all.
+"""Figures of the report and for notebooks.
 
-Each takes tables, whose columns docs/tables.md explains, and gives a matplotlib Figure; its `words` take the same and
-give a caption and a text alternative. `save` writes a figure as SVG.
+Each is a `Drawing`: called with tables, whose columns docs/tables.md explains, it gives a matplotlib Figure. Its
+`words` take the same tables and give a caption and a text alternative. `save` writes a figure as SVG.
 """
 
 from __future__ import annotations

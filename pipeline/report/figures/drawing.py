@@ -1,4 +1,4 @@
-"""A figure and what people read about it, registered together."""
+"""A figure and its words, registered together."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Tables = ParamSpec("Tables")
 
 
 class Words(NamedTuple):
-    """What to see in a figure, and what it shows, for people who cannot see it."""
+    """A figure's caption, and its text alternative for people who cannot see it."""
 
     caption: str
     alt: str

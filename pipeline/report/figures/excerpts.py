@@ -1,4 +1,4 @@
-"""What sensors delivered in a few seconds of a session, and what estimators made of it: the paper's Figures 6 to 8."""
+"""A few seconds of a session: what the sensors delivered and what the estimators made of it (paper, Figs. 6 to 8)."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def estimates(excerpts: pd.DataFrame, contradicted: str = "") -> Figure:
             _error(row[1], excerpts, estimator, COLOURS[index % _SHADES])
     if reference is not None and names:
         every[0, 1].set_ylim(*_errors_range(excerpts, names))
-    _around(every[0, 0], finite(excerpts.loc[excerpts["kind"] != "acceleration", "value"]))
+    _set_range_around(every[0, 0], finite(excerpts.loc[excerpts["kind"] != "acceleration", "value"]))
     legend(figure, [every[0, 0]], 4)
     for axes in every[-1]:
         axes.set_xlabel(_TIME)
@@ -135,15 +135,15 @@ def _span(excerpts: pd.DataFrame) -> str:
 
 
 def _errors_range(excerpts: pd.DataFrame, names: Sequence[str]) -> tuple[float, float]:
-    """Limits with room for all errors and the usual band; the wide band of an estimator that has just begun is cut."""
+    """Limits with room for all errors and the usual band; the wide band of an estimator that just started is cut."""
     reach = 1.0
-    for one in names:
-        _, error, sd = errors_in(excerpts, one)
+    for name in names:
+        _, error, sd = errors_in(excerpts, name)
         reach = max(reach, np.abs(finite(error)).max(initial=0.0), 2 * float(np.median(finite(sd))) if len(sd) else 0.0)
     return -1.15 * reach, 1.15 * reach
 
 
-def _around(axes: Axes, values: FloatArray) -> None:
+def _set_range_around(axes: Axes, values: FloatArray) -> None:
     if len(values):
         margin = 0.15 * float(np.ptp(values)) + 1
         axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)

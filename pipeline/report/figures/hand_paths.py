@@ -1,4 +1,4 @@
-"""The hand's path past its targets, of one session and of all."""
+"""The path of the hand past the targets, of one session and of all."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _path_words(
     """How large an area each line covers, and how many selections there are."""
     sessions = [*tracks["session"].iloc[:1], *positions["session"].iloc[:1]]
     where = f" in session {sessions[0]}" if sessions else ""
-    spans = listed((f"{line} {_size_words(way(tracks, positions, line, plane))}" for line in lines), ", ")
+    spans = listed((f"{line} {_size_words(points_of(tracks, positions, line, plane))}" for line in lines), ", ")
     summary = f"Extent of each line: {spans}; {counted(int((events['type'] == 'selection').sum()), 'selection')}."
     return Words(
         f"The hand's path{where} in {plane[0]} and {plane[1]}; it starts at the arrow. {summary} Look where the lines"
@@ -54,8 +54,8 @@ def path(
     tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
 ) -> Figure:
     """One session's path past its targets: a line for each stream or estimator in `lines`."""
-    drawn = [(line, way(tracks, positions, line, plane)) for line in lines]
-    extent = _extent([*(points for _, points in drawn), _targets(events, plane)])
+    drawn = [(line, points_of(tracks, positions, line, plane)) for line in lines]
+    extent = _extent([*(points for _, points in drawn), _target_points(events, plane)])
     figure, (axes,) = panels(height=0.9 + 6.0 * float(np.clip(extent[1] / extent[0], 0.25, 0.8)))
     for index, (line, points) in enumerate(drawn):
         if len(points):
@@ -63,7 +63,7 @@ def path(
             look: dict[str, Any] = {"linewidth": 1.1, "alpha": 0.85, "color": colour(index)}
             axes.plot(*points.T, label=as_label(line), **look)
             axes.scatter(begin[:, 0], begin[:, 1], s=30, marker=">", color=colour(index), edgecolor="white", zorder=4)
-    _marked(axes, events, plane)
+    _draw_targets(axes, events, plane)
     square(axes, plane)
     legend(figure, figure.axes, 5)
     return figure
@@ -78,22 +78,21 @@ def _paths_words(
     plane: Plane = XY,
 ) -> Words:
     """How many sessions there are of each condition, and which covers the largest area."""
-    whose = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
+    listed_sessions = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
     counts, furthest = [], ("", 0.0, "")
     for condition, line in shown.items():
-        mine = list(whose.loc[whose["condition"] == condition, "session"])
-        if mine:
-            counts.append(f"{condition} ({line}), n = {len(mine)}")
-        for session in mine:
-            own = (rows[rows["session"] == session] for rows in (tracks, positions))
-            tracks_of_one, positions_of_one = own
-            points = way(tracks_of_one, positions_of_one, line, plane)
+        of_condition = list(listed_sessions.loc[listed_sessions["condition"] == condition, "session"])
+        if of_condition:
+            counts.append(f"{condition} ({line}), n = {len(of_condition)}")
+        for session in of_condition:
+            own_tracks, own_positions = (rows[rows["session"] == session] for rows in (tracks, positions))
+            points = points_of(own_tracks, own_positions, line, plane)
             reach = float(np.hypot(*_span_of(points)))
             if reach > furthest[1]:
                 furthest = (str(session), reach, _size_words(points))
     summary = f"{listed(counts)}."
     summary += f" The widest is session {furthest[0]}, {furthest[2]}." if furthest[0] else ""
-    people = counted(whose["participant"].nunique(), "participant")
+    people = counted(listed_sessions["participant"].nunique(), "participant")
     return Words(
         f"The hand's path in each session, one panel per participant ({people}): {summary} Look for paths unlike the"
         " others.",
@@ -116,22 +115,21 @@ def paths(
     `sessions` is any table with the columns participant, condition and session; `shown` names the stream or estimator
     that is drawn for each condition, in the study's order.
     """
-    whose = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
-    people = sorted(set(whose["participant"]))
+    listed_sessions = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
+    people = sorted(set(listed_sessions["participant"]))
     columns = [f"{axis}_mm" for axis in plane]
     extent = _extent([rows[columns].to_numpy(np.float64) for rows in (tracks, positions, events)])
     row_height = 0.35 + 1.5 * float(np.clip(extent[1] / extent[0], 0.3, 1.2))
     figure, every, across = multiples(len(people), row_height)
     for index, (axes, person) in enumerate(zip(every, people, strict=True)):
-        mine = whose[whose["participant"] == person]
+        of_person = listed_sessions[listed_sessions["participant"] == person]
         zorder = as_pixels(axes, len(tracks) + len(positions))
         for place, (condition, line) in enumerate(shown.items()):
-            for session in mine.loc[mine["condition"] == condition, "session"]:
-                own = (rows[rows["session"] == session] for rows in (tracks, positions))
-                tracks_of_one, positions_of_one = own
-                points = way(tracks_of_one, positions_of_one, line, plane)
+            for session in of_person.loc[of_person["condition"] == condition, "session"]:
+                own_tracks, own_positions = (rows[rows["session"] == session] for rows in (tracks, positions))
+                points = points_of(own_tracks, own_positions, line, plane)
                 axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(place), zorder=zorder)
-        _marked(axes, events[events["session"].isin(mine["session"])], plane, small=True)
+        _draw_targets(axes, events[events["session"].isin(of_person["session"])], plane, small=True)
         axes.set_aspect("equal", adjustable="box")
         axes.set_title(as_label(person, 18), fontsize=8.5)
         if index % across == 0:
@@ -155,7 +153,7 @@ def _size_words(points: FloatArray) -> str:
     return f"{number(across, 0)} × {number(up, 0)} mm"
 
 
-def way(tracks: pd.DataFrame, positions: pd.DataFrame, line: str, plane: Plane) -> FloatArray:
+def points_of(tracks: pd.DataFrame, positions: pd.DataFrame, line: str, plane: Plane) -> FloatArray:
     """Points (n, 2) in mm of a stream, or of an estimator where no stream has that name, in the order of time."""
     rows = positions[positions["stream"] == line]
     if rows.empty:
@@ -165,15 +163,15 @@ def way(tracks: pd.DataFrame, positions: pd.DataFrame, line: str, plane: Plane) 
     return points
 
 
-def _targets(events: pd.DataFrame, plane: Plane) -> FloatArray:
+def _target_points(events: pd.DataFrame, plane: Plane) -> FloatArray:
     """Where targets were (n, 2), each place once."""
     places: FloatArray = events[[f"target_{axis}_mm" for axis in plane]].dropna().drop_duplicates().to_numpy(np.float64)
     return places
 
 
-def _marked(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False) -> None:
+def _draw_targets(axes: Axes, events: pd.DataFrame, plane: Plane, small: bool = False) -> None:
     """Draw targets and selections."""
-    targets = _targets(events, plane)
+    targets = _target_points(events, plane)
     chosen = events.loc[events["type"] == "selection", [f"{axis}_mm" for axis in plane]].dropna().to_numpy(np.float64)
     size = 9 if small else 60
     many: dict[str, Any] = {"rasterized": len(targets) + len(chosen) > MARKS_MAX}

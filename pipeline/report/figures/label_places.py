@@ -54,7 +54,7 @@ def place_labels(
         taken = np.array([label.box for label in labels]).reshape(-1, 4)
         free = _inside(places, frame) & ~_touching(places, taken)
         if not free.any() and len(groups) > 1:
-            groups, labels = _joined(groups, len(labels), marks), []
+            groups, labels = _merged(groups, len(labels), marks), []
             continue
         others = np.delete(marks, group, axis=0)
         clear = [free & ~_touching(places, _around(others, reach)) for reach in (2 * radius, radius)]
@@ -91,7 +91,7 @@ def _largest_first(groups: Sequence[list[int]]) -> list[list[int]]:
     return sorted(groups, key=len, reverse=True)
 
 
-def _joined(groups: Sequence[list[int]], which: int, marks: FloatArray) -> list[list[int]]:
+def _merged(groups: Sequence[list[int]], which: int, marks: FloatArray) -> list[list[int]]:
     """Merge one group into the nearest other."""
     first = marks[[group[0] for group in groups]]
     distance = np.hypot(*(first - first[which]).T)

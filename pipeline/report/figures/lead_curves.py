@@ -1,4 +1,4 @@
-"""How far each estimator is ahead of the tracker: the paper's Figure 9."""
+"""How far each estimator is ahead of the tracker (paper, Fig. 9)."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ def _paired_words(wide: pd.DataFrame, measure: str, shares: bool = False) -> Wor
         f"{name} {mean_with_interval(finite(wide[name]), method)}{unit} (n = {wide[name].count()})"
         for name in wide.columns
     )
-    between = met_one_each(wide)
-    who = f"{counted(len(wide), 'participant')}, one condition each" if between else _complete_of(complete)
+    between = one_condition_each(wide)
+    who = f"{counted(len(wide), 'participant')}, one condition each" if between else _complete_count(complete)
     head = f"{label} by condition, {who}. Means with 95 % intervals: {means}."
     alt = f"{label}: one raincloud per condition. {means}."
     if len(wide.columns) > 1 and len(complete) > 1:
@@ -79,13 +79,13 @@ def interval_words(wide: pd.DataFrame, measure: str, shares: bool = False) -> st
     return f"{_INTERVALS.get(method, '')}{thick}"
 
 
-def met_one_each(wide: pd.DataFrame) -> bool:
-    """Does every participant have a value in only one of several conditions? Then nobody counts as incomplete."""
+def one_condition_each(wide: pd.DataFrame) -> bool:
+    """Whether every participant has a value in only one of several conditions, so that nobody is incomplete."""
     return len(wide.columns) > 1 and int(wide.notna().sum(axis=1).max()) <= 1
 
 
 def draws_within(wide: pd.DataFrame, method: str) -> bool:
-    """Are there participants who met every condition, so that intervals within participants exist?
+    """Whether some participants met every condition, so that intervals within participants exist.
 
     Differences of single answers 0 or 1 are no measurements, and have none.
     """
@@ -99,7 +99,7 @@ def method_of(wide: pd.DataFrame, measure: str, shares: bool = False) -> str:
     return interval_method(finite(wide), shares, unit_of(measure) != "")
 
 
-def _complete_of(complete: pd.DataFrame) -> str:
+def _complete_count(complete: pd.DataFrame) -> str:
     return f"{counted(len(complete), 'complete participant')}"
 
 
@@ -132,7 +132,7 @@ def paired(wide: pd.DataFrame, measure: str, shares: bool = False) -> Figure:
     _rainclouds(axes[0], wide, method_of(wide, measure, shares))
     _from_zero(axes[0], [wide])
     axes[0].set_ylabel(as_label(measure_label(measure)))
-    axes[0].set_title(f"Participants (n = {len(wide) if met_one_each(wide) else f'{len(complete)} complete'})")
+    axes[0].set_title(f"Participants (n = {len(wide) if one_condition_each(wide) else f'{len(complete)} complete'})")
     if compared:
         _differences(axes[1], complete)
         unit = unit_of(measure)

@@ -1,4 +1,4 @@
-"""The axis of the error and the name of the other one, which the figures of accuracy share."""
+"""The RMSE axis and the label of the lag axis, which the figures of accuracy share."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _WIDE = 100.0  # ratio of the axis' ends above which only powers of ten have roo
 
 
 def lag_label(standard: str = RECORDED) -> str:
-    """What an axis of lags says; `standard` is what estimates are held against."""
+    """The label of an axis of lags; `standard` is what estimates are compared with."""
     return f"Lag behind {standard} (ms)"
 
 
 def along_rmse(axes: Axes, rmse_mm: pd.Series, standard: str = RECORDED) -> None:
     """Put RMSE along x, on a logarithmic scale if the largest is more than 15 times the smallest.
 
-    `standard` is what estimates are held against, as in `reference_phrase`.
+    `standard` is what estimates are compared with, as `reference_phrase` words it.
     """
     if rmse_mm.max() > 15 * rmse_mm.min() > 0:
         axes.set_xscale("log")

@@ -95,8 +95,8 @@ def offsets_mm(selections: pd.DataFrame, plane: Plane) -> FloatArray:
     """Selected minus target (n, 2) in mm, of the selections that have both in this plane."""
     parts = [selections[f"{axis}_mm"].to_numpy(np.float64) - selections[f"target_{axis}_mm"] for axis in plane]
     offsets = np.column_stack(parts).astype(np.float64)
-    kept: FloatArray = offsets[np.isfinite(offsets).all(axis=1)]
-    return kept
+    known: FloatArray = offsets[np.isfinite(offsets).all(axis=1)]
+    return known
 
 
 def _scatter(axes: Axes, offsets: FloatArray, look: tuple[str, str]) -> float:

@@ -1,4 +1,4 @@
-"""Does the standard deviation that an estimator states fit its errors?"""
+"""Calibration: whether the standard deviation that an estimator states fits its errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The look that all figures share: colours that colour-blind readers tell apart, labels, panels, means, and saving."""
+"""The style that all figures share: colours that colour-blind readers can distinguish, labels, panels, and saving."""
 
 from __future__ import annotations
 
@@ -151,8 +151,8 @@ def mean_and_interval(values: FloatArray, method: str = T) -> tuple[float, float
 def finite(values: Any) -> FloatArray:
     """The finite values, as an array (n,)."""
     array = np.asarray(values, dtype=np.float64)
-    kept: FloatArray = array[np.isfinite(array)]
-    return kept
+    known: FloatArray = array[np.isfinite(array)]
+    return known
 
 
 def draw_mean(

@@ -1,4 +1,4 @@
-"""What arrived when: every session's streams, silences and events on one page."""
+"""Timeline: every session's streams, silences and events on one page."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ def timeline(stream_rates: pd.DataFrame, events: pd.DataFrame, exclusions: pd.Da
     at, place = {}, 0.0
     labels = []
     for session in sessions:
-        mine = [stream for whose, stream in rows if whose == session]
-        for stream in mine:
+        streams = [stream for owner, stream in rows if owner == session]
+        for stream in streams:
             at[session, stream] = place
-            heading = f"{as_label(session, 22)}  " if stream == mine[0] else ""
+            heading = f"{as_label(session, 22)}  " if stream == streams[0] else ""
             labels.append((place, heading + as_label(stream, 12)))
             place += 1
-        _events(axes, stream_rates, events, session, (place - len(mine) - 0.5, place - 0.5))
+        _events(axes, stream_rates, events, session, (place - len(streams) - 0.5, place - 0.5))
         place += 0.6
     shares = _shares(stream_rates)
     _cells(axes, shares, at)
@@ -137,11 +137,11 @@ def _events(
     axes: Axes, stream_rates: pd.DataFrame, events: pd.DataFrame, session: str, rows: tuple[float, float]
 ) -> None:
     """Draw the starts of trials as lines across the session's rows, and selections as marks above them."""
-    mine = events[events["session"] == session]
+    of_session = events[events["session"] == session]
     first = stream_rates.loc[stream_rates["session"] == session, "time_ns"].min()
-    time = (mine["time_ns"] - first).astype("float64") * S_PER_NS
+    time = (of_session["time_ns"] - first).astype("float64") * S_PER_NS
     many: dict[str, Any] = {"rasterized": len(events) > MARKS_MAX}
-    starts, chosen = time[mine["type"] == "trial_start"], time[mine["type"] == "selection"]
+    starts, chosen = time[of_session["type"] == "trial_start"], time[of_session["type"] == "selection"]
     axes.vlines(starts, rows[0], rows[1], color=BLACK, linewidth=0.7, zorder=2, **many)
     axes.scatter(chosen, np.full(len(chosen), rows[0] - 0.1), s=9, marker="v", color=BLACK, linewidth=0, **many)
 

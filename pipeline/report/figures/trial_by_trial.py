@@ -50,9 +50,9 @@ def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
     figure, every, across = multiples(len(people), 1.35)
     for index, (axes, person) in enumerate(zip(every, people, strict=True)):
         zorder = as_pixels(axes, len(recorded))
-        mine = recorded[recorded["participant"] == person]
+        own = recorded[recorded["participant"] == person]
         for place, condition in enumerate(conditions):
-            rows = mine[mine["condition"] == condition].sort_values("trial", kind="stable")
+            rows = own[own["condition"] == condition].sort_values("trial", kind="stable")
             look: dict[str, Any] = {"color": colour(place), "marker": marker(place), "zorder": zorder}
             where = rows["trial"].to_numpy(np.float64), rows["position_error_mm"].to_numpy(np.float64)
             axes.plot(
@@ -63,7 +63,7 @@ def trials(table: pd.DataFrame, conditions: Sequence[str]) -> Figure:
                 label=as_label(condition),
                 **look,
             )
-        axes.set_title(f"{as_label(person, 18)} (n = {len(mine)})", fontsize=8.5)
+        axes.set_title(f"{as_label(person, 18)} (n = {len(own)})", fontsize=8.5)
         if index % across == 0:
             axes.set_ylabel("Error (mm)")
     every[0].set_ylim(bottom=0)

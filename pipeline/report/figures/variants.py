@@ -82,9 +82,9 @@ def _ranks(figure: Figure, axes: Axes, means: pd.DataFrame, values: pd.Series) -
     look: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "in_layout": False}
 
     def size(text: str) -> tuple[float, float]:
-        tried = axes.annotate(text, (0, 0), (0, 0), **look)
-        box = tried.get_window_extent()
-        tried.remove()
+        trial = axes.annotate(text, (0, 0), (0, 0), **look)
+        box = trial.get_window_extent()
+        trial.remove()
         return box.width + _LABEL_GAP * point, box.height
 
     ranks = means["rank"].to_numpy()[known].tolist()

@@ -22,7 +22,7 @@ def mean_with_interval(values: FloatArray, method: str = T, digits: int = 2) -> 
 
 
 def listed(parts: Iterable[str], joint: str = "; ") -> str:
-    """The first eight parts, and how many there are if there are more."""
+    """The parts in a row; of more than eight the first eight, and how many there are."""
     every = list(parts)
     more = f"{joint}… ({len(every)} in all)" if len(every) > _LISTED_MAX else ""
     return joint.join(every[:_LISTED_MAX]) + more
@@ -34,7 +34,7 @@ def spaced(unit: str) -> str:
 
 
 def complete_counts(wide: Mapping[str, pd.DataFrame]) -> str:
-    """How many participants are complete, from the fewest to the most where measures differ."""
+    """`n = 12 complete`, or `n = 10 to 12 complete` where the measures differ in how many are complete."""
     complete = [len(table.dropna()) for table in wide.values()]
     low, high = min(complete), max(complete)
     return f"n = {low} complete" if low == high else f"n = {low} to {high} complete"

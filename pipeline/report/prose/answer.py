@@ -1,4 +1,4 @@
-"""The answer of a study: for each pair of conditions that is asked about, by how much a measure differs.
+"""The answer of a study: by how much each measure differs between the pairs of conditions in question.
 
 The first page and the console print these lines, so that both say the same. A line is a row of `comparisons`, and of
 `descriptives` for its means; nothing is computed here but the root of a mean squared error.
@@ -51,7 +51,7 @@ class Line:
 
 
 def answer(results: Mapping[str, Any]) -> list[Line]:
-    """The lines of all measures but questionnaires, the well-known first, then those of questionnaires.
+    """The lines of the answer: the well-known measures first, then others, then questionnaires.
 
     `results` is the content of results.json. Pairs are those of `question` in study.yaml, or else the baseline with
     each other condition; of groups of participants, all pairs. A measure that several entries test has lines for each,
@@ -59,7 +59,7 @@ def answer(results: Mapping[str, Any]) -> list[Line]:
     """
     study = results["study"]
     described = {(row["measure"], row["condition"]): row for row in results["descriptives"]}
-    rows = list(_asked_about(results["comparisons"], study["conditions"], study["question"]))
+    rows = list(_pairs_in_question(results["comparisons"], study["conditions"], study["question"]))
     tests: dict[str, set[str]] = {}
     for row, _ in rows:
         tests.setdefault(row["measure"], set()).add(test_label(row))
@@ -69,33 +69,39 @@ def answer(results: Mapping[str, Any]) -> list[Line]:
     ]
 
 
-def not_answered(results: Mapping[str, Any]) -> list[Row]:
-    """Rows without a line: of all conditions, of other factors, TOST, Bayes; not pairs that nobody asked about."""
+def rows_beside_the_answer(results: Mapping[str, Any]) -> list[Row]:
+    """The rows of `comparisons` that say something and have no line in the answer.
+
+    Tests of all conditions at once and of other factors, of equivalence, Bayes factors; not the pairs that `question`
+    leaves out.
+    """
     study = results["study"]
-    asked = [id(row) for row, _ in _asked_about(results["comparisons"], study["conditions"], study["question"])]
-    pairs = [row for row in results["comparisons"] if row["contrast"] is None or not _of_difference(row)]
-    return [row for row in pairs if id(row) not in asked]
+    answering = {
+        id(row) for row, _ in _pairs_in_question(results["comparisons"], study["conditions"], study["question"])
+    }
+    candidates = [row for row in results["comparisons"] if row["contrast"] is None or not _tests_difference(row)]
+    return [row for row in candidates if id(row) not in answering]
 
 
-def _of_difference(row: Row) -> bool:
+def _tests_difference(row: Row) -> bool:
     return TESTS[row["test"]].tests_difference
 
 
-def shown(lines: Sequence[Line], most: int = LINES_MAX) -> list[Line]:
-    """The lines for a first page: all, or where they are too many, whole measures from the top, at least one."""
+def lines_for_first_page(lines: Sequence[Line], most: int = LINES_MAX) -> list[Line]:
+    """All lines, or where they are more than `most`, whole measures from the top, at least one measure."""
     if len(lines) <= most:
         return list(lines)
-    kept: list[Line] = []
+    on_page: list[Line] = []
     for name in dict.fromkeys(line.measure for line in lines):
         of_measure = [line for line in lines if line.measure == name]
-        if kept and len(kept) + len(of_measure) > most:
+        if on_page and len(on_page) + len(of_measure) > most:
             break
-        kept += of_measure
-    return kept
+        on_page += of_measure
+    return on_page
 
 
 def notes(results: Mapping[str, Any]) -> str:
-    """What the columns mean: the side of the differences, how many people they are of, which p is shown, its level."""
+    """The note below the table: which way differences go, how many participants, which p is shown, and its level."""
     rows = [row for row in results["comparisons"] if row["status"] == OK]
     counts = sorted({row["n"] for row in rows})
     people = "" if not counts else f" n = {counts[0]}" + (f" to {counts[-1]}" if len(counts) > 1 else "") + "."
@@ -105,14 +111,14 @@ def notes(results: Mapping[str, Any]) -> str:
     return f"Differences and effect sizes: the first named minus the other.{people} {kind}; {level}."
 
 
-def _asked_about(
+def _pairs_in_question(
     rows: Sequence[Row], conditions: Sequence[str], question: Sequence[Sequence[str]]
 ) -> Iterator[tuple[Row, tuple[str, str]]]:
-    """The rows whose p is evidence of a difference between one of the pairs, over all else, each with its pair."""
+    """The rows that test the difference of a pair in `question`, averaged over everything else, each with its pair."""
     pairs = {f"{one} - {other}": (str(one), str(other)) for one, other in question}
     only = next(iter(pairs.values())) if len(conditions) == 2 else None
     for row in rows:
-        if not _of_difference(row):
+        if not _tests_difference(row):
             continue
         if row["effect"] in EFFECTS_OF_CONDITION:
             pair = only if row["contrast"] is None else pairs.get(row["contrast"])
@@ -124,12 +130,12 @@ def _asked_about(
 
 
 def _rank(rows: Sequence[tuple[Row, tuple[str, str]]]) -> Any:
-    """A sort key: headlines in their order, other measures, then questionnaires; rows keep their order otherwise."""
+    """A sort key: headlines in their order, other measures, then questionnaires; rows of a measure keep their order."""
     names = list(dict.fromkeys(row["measure"] for row, _ in rows))
     known = headlines(names)
     others = [name for name in names if name not in known]
     order = [*known, *sorted(others, key=lambda name: bool(measure(name).questionnaire))]
-    return lambda found: order.index(found[0]["measure"])
+    return lambda row_and_pair: order.index(row_and_pair[0]["measure"])
 
 
 def _line(
@@ -138,13 +144,13 @@ def _line(
     first, second = pair
     name = measure_label(row["measure"]) + (f", {test_label(row)}" if names_test else "")
     compared = f"{second} {MINUS} {first}"
-    both = _means(row, described.get((row["measure"], first)), described.get((row["measure"], second)))
+    means = _means(row, described.get((row["measure"], first)), described.get((row["measure"], second)))
     if row["status"] != OK:
-        return Line(name, compared, both, f"{test_label(row)}: {row['status']}", NO_VALUE, NO_VALUE, None)
+        return Line(name, compared, means, f"{test_label(row)}: {row['status']}", NO_VALUE, NO_VALUE, None)
     p = decisive_p(row)
     size = NO_VALUE if row["effect_size_name"] in (RATIO, "estimate") else effect_size(_of_second_minus_first(row))
     significant = None if p is None else p < alpha
-    return Line(name, compared, both, _difference(row, bool(significant)), size, p_value(p), significant)
+    return Line(name, compared, means, _difference(row, bool(significant)), size, p_value(p), significant)
 
 
 def _of_second_minus_first(row: Row) -> Row:
@@ -158,8 +164,8 @@ def _of_second_minus_first(row: Row) -> Row:
 def _means(row: Row, one: Row | None, other: Row | None) -> str:
     """`43.2 → 31.4 s`; of squared errors the roots, in millimetres or pixels: `104 → 79 px (root)`.
 
-    Nothing where they are of other people than the test, or a model estimates the difference from rows of unequal
-    number: they could contradict the difference beside them.
+    No means where they are of other people than the test, or where a model estimates the difference from unequal
+    numbers of rows: they could contradict the difference beside them.
     """
     if one is None or other is None or not one["n"] == other["n"] == row["n"] or row["effect_size_name"] == "estimate":
         return NO_VALUE
@@ -170,9 +176,9 @@ def _means(row: Row, one: Row | None, other: Row | None) -> str:
 
 
 def _difference(row: Row, significant: bool) -> str:
-    """`−11.80 s [−19.28, −4.32], 26.7 % lower (better)`, or by what factor geometric means differ.
+    """`−11.80 s [−19.28, −4.32], 26.7 % lower (better)`, or `× 0.81` where geometric means are compared.
 
-    Whether that is better is said of a significant difference only.
+    "Better" and "worse" are said of significant differences only.
     """
     details, unit = row["details"] or {}, measure(row["measure"]).unit
     if details.get("ratio_to_first") is not None:

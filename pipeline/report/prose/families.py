@@ -1,4 +1,4 @@
-"""Over which tests p values were adjusted, in words; from the rows themselves, so that it cannot say anything else."""
+"""Over which tests p values were adjusted, in words, from the rows themselves."""
 
 from __future__ import annotations
 

@@ -26,7 +26,10 @@ _ORIGINS = {
 
 
 def methods(study: Study, results: Mapping[str, Any], versions: Mapping[str, str]) -> str:
-    """Design, n, conditions, measures, estimators and their settings, tests, corrections, exclusions, software."""
+    """The whole paragraph: design, measures, estimators with their settings, tests, exclusions, software.
+
+    `results` is the content of results.json, `versions` those of the packages that made the report.
+    """
     sentences = [
         *_design(study, results),
         *_measures(study, results),
@@ -44,7 +47,7 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     if study.data_origin in _ORIGINS:
         yield _ORIGINS[study.data_origin]
     facts, conditions = results["study"]["participants"], list(study.conditions)
-    people = participants_counted(facts, _who(facts))
+    people = participants_counted(facts, _sex_and_age(facts))
     if len(conditions) == 1:
         yield f"There were {people} and one condition, {conditions[0]}."
         return
@@ -59,20 +62,20 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
         )
     else:
         how = "not compared"
-    told = f"{counted(len(conditions), 'condition')}, {how}: {listing(conditions)}"
-    yield f"There were {people} and {told}; {conditions[0]} was the baseline."
+    comparison = f"{counted(len(conditions), 'condition')}, {how}: {listing(conditions)}"
+    yield f"There were {people} and {comparison}; {conditions[0]} was the baseline."
     groups = [factor for factor in study.factors if factor != "condition"]
     if groups and designs - {"within"}:
         yield f"Participants were in groups by {listing(groups)}, compared between participants."
 
 
-def _who(facts: Mapping[str, Any]) -> str:
+def _sex_and_age(facts: Mapping[str, Any]) -> str:
     """Sex and age as far as they are known."""
-    told = [f"{count} {name}" for name, count in (facts.get("sex") or {}).items()]
+    known = [f"{count} {name}" for name, count in (facts.get("sex") or {}).items()]
     age = facts.get("age")
     if age:
-        told.append(f"aged {number(age['min'], 0)} to {number(age['max'], 0)} years, M = {number(age['mean'], 1)}")
-    return f" ({', '.join(told)})" if told else ""
+        known.append(f"aged {number(age['min'], 0)} to {number(age['max'], 0)} years, M = {number(age['mean'], 1)}")
+    return f" ({', '.join(known)})" if known else ""
 
 
 def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
@@ -97,7 +100,7 @@ def _estimators(study: Study) -> Iterator[str]:
         return
     sensors = [f"{name} ({', '.join(_stated(stream))})" for name, stream in study.sensor_streams.items()]
     yield f"Sensors, as stated to the estimators: {'; '.join(sensors)}."
-    told = []
+    estimators = []
     for name, settings in study.estimators.items():
         built = build_estimator(study, name)
         values = [
@@ -107,8 +110,8 @@ def _estimators(study: Study) -> Iterator[str]:
         ]
         kind = settings.type if settings.type == name else f"{name} is {settings.type}"
         streams = [f"streams {listing(list(settings.use))}"] if settings.use else []
-        told.append(f"{kind} ({', '.join([*streams, *values])})" if streams or values else kind)
-    yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(told)}."
+        estimators.append(f"{kind} ({', '.join([*streams, *values])})" if streams or values else kind)
+    yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(estimators)}."
     for condition, name in study.shown.items():
         yield f"Condition {condition} displayed {name}."
 
@@ -116,7 +119,7 @@ def _estimators(study: Study) -> Iterator[str]:
 def _without_reference(results: Mapping[str, Any]) -> Iterator[str]:
     if any(row["reference"] == SMOOTHED for row in results["accuracy"]):
         yield (
-            "No reference was recorded, so absolute errors and lags are not known; estimates were held against the"
+            "No reference was recorded, so absolute errors and lags are not known; estimates were compared with the"
             " readings of all sensors, smoothed."
         )
 
@@ -137,12 +140,12 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     """Each entry's test and its measures, and how families of p values were adjusted."""
     if not rows:
         return
-    said: dict[str, list[str]] = {}
+    measures_by_test: dict[str, list[str]] = {}
     for entry in study.comparisons:
-        of = listing([_named(pattern) for pattern in entry.measures])
-        mine = [row for row in rows if row["test"] == entry.test]
-        said.setdefault(test_in_words(entry, mine) + _followed_up(entry, mine), []).append(of)
-    for test, measures in said.items():
+        measures_text = listing([_measures_named(pattern) for pattern in entry.measures])
+        tested = [row for row in rows if row["test"] == entry.test]
+        measures_by_test.setdefault(test_in_words(entry, tested) + _follow_up(entry, tested), []).append(measures_text)
+    for test, measures in measures_by_test.items():
         yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
         yield "With more than two conditions, p was corrected for sphericity (Greenhouse-Geisser)."
@@ -167,8 +170,8 @@ def _intervals(rows: Sequence[Row]) -> Iterator[str]:
         yield f"The t interval of {of(T_BEYOND)} reaches beyond 0 to 1, where all values are."
 
 
-def _named(pattern: str) -> str:
-    """The measures that an entry's name or pattern stands for."""
+def _measures_named(pattern: str) -> str:
+    """`Completion time`, or of a pattern such as `nasa_tlx/*` the scales together, `NASA-TLX scales`."""
     return measure_as_subject(pattern).replace(" *", " scales") if "*" in pattern else measure_as_subject(pattern)
 
 
@@ -204,7 +207,7 @@ def test_in_words(entry: Comparison, rows: Sequence[Row]) -> str:
 
 
 def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
-    """What is computed beside a test: bootstrap intervals and permutation p values, and by which chance."""
+    """What is computed in addition to a test: bootstrap intervals and permutation p values, with their seed."""
     seed = f", seed {entry.seed}"
     of = "ratio of geometric means" if entry.transform == "log" else "mean difference"
     if entry.bootstrap:
@@ -215,18 +218,18 @@ def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
         yield f"permutation p values of the {of} (conditions exchanged within participants, {how})"
 
 
-def _followed_up(entry: Comparison, rows: Sequence[Row]) -> str:
-    """How the pairs after an entry's test were adjusted, if there are any; rows are of its test."""
+def _follow_up(entry: Comparison, rows: Sequence[Row]) -> str:
+    """How the pairs after an entry's test were tested and adjusted, if there are any; rows are of its test."""
     pairs = [row for row in rows if row["contrast"] is not None]
-    followed = "follow_up" in TESTS[entry.test].options and any(row["adjust"] == entry.follow_up for row in pairs)
-    if not followed or entry.follow_up == "none":
+    has_follow_up = "follow_up" in TESTS[entry.test].options and any(row["adjust"] == entry.follow_up for row in pairs)
+    if not has_follow_up or entry.follow_up == "none":
         return ""
     adjusted = f"{adjustment_label(entry.follow_up)}-adjusted"
     return f", followed up pair by pair with {adjusted} {TESTS[entry.test].followed_up_by}"
 
 
 def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:
-    """Who was left out by decision and why, and how much else is missing."""
+    """Who was excluded and why, and how much else is missing."""
     for exclusion in study.exclusions:
         named = [f"{key} {value}" for key, value in exclusion.model_dump().items() if value and key != "reason"]
         yield f"Excluded: {', '.join(named)} ({exclusion.reason.strip().rstrip('.')})."

@@ -1,4 +1,4 @@
-"""What a study's report rests on, as BibTeX and as text: only what was used. The entries stand in references.bib."""
+"""The references of a report, as BibTeX and as text: only what was used, from the entries of references.bib."""
 
 from __future__ import annotations
 
@@ -72,16 +72,16 @@ class Reference:
     @property
     def text(self) -> str:
         """The entry for people: authors, year, title, where, DOI."""
-        told = {name: _read(value) for name, value in self.fields.items()}
-        authors = told.get("author", "").replace(" and others", ", et al.").replace(" and ", ", ")
-        issue = f"({told['number']})" if "number" in told else ""
-        where = " ".join(filter(None, (told.get("journal", told.get("booktitle")), told.get("volume", "") + issue)))
-        edition = f"{told['edition']} ed." if "edition" in told else ""
-        source = ", ".join(filter(None, (where, told.get("pages"), edition, told.get("publisher"))))
-        head = " ".join(filter(None, (authors, f"({told['year']})." if "year" in told else "")))
-        doi = f"doi {told['doi']}" if "doi" in told else ""
-        title = ", version ".join(filter(None, (told.get("title"), told.get("version"))))
-        sentences = (f"{part.rstrip('.')}." for part in (title, source, told.get("note")) if part)
+        field = {name: _unescaped(value) for name, value in self.fields.items()}
+        authors = field.get("author", "").replace(" and others", ", et al.").replace(" and ", ", ")
+        issue = f"({field['number']})" if "number" in field else ""
+        where = " ".join(filter(None, (field.get("journal", field.get("booktitle")), field.get("volume", "") + issue)))
+        edition = f"{field['edition']} ed." if "edition" in field else ""
+        source = ", ".join(filter(None, (where, field.get("pages"), edition, field.get("publisher"))))
+        head = " ".join(filter(None, (authors, f"({field['year']})." if "year" in field else "")))
+        doi = f"doi {field['doi']}" if "doi" in field else ""
+        title = ", version ".join(filter(None, (field.get("title"), field.get("version"))))
+        sentences = (f"{part.rstrip('.')}." for part in (title, source, field.get("note")) if part)
         return " ".join(filter(None, (head, *sentences, doi)))
 
 
@@ -94,19 +94,18 @@ def used(
 ) -> list[Reference]:
     """What the study rests on: its source, the paper, tests, questionnaires, estimators, packages; each once.
 
-    `rows` are its comparisons, `versions` those of the packages that made the report, `shown` what else the report
-    shows: a reference's key and what it is used for.
+    `rows` are its comparisons, `versions` those of the packages that made the report. `shown` are the references of
+    what else the report shows, each a key of references.bib and what it is used for.
     """
-    found: dict[str, list[str]] = {}
+    uses: dict[str, list[str]] = {}
     for key, used_for in (*_of_methods(rows), *_of_measures(measures), *shown, *_of_estimators(study)):
-        if used_for not in found.setdefault(key, []):
-            found[key].append(used_for)
-    known = entries()
+        if used_for not in uses.setdefault(key, []):
+            uses[key].append(used_for)
     source = _source(study)
     listed = [source] if source else []
-    found = {PAPER: ["the method that Steadyhand implements", *found.pop(PAPER, [])], **found}
-    listed += [_with(known[key], "; ".join(used_for)) for key, used_for in found.items()]
-    return listed + [_package(name, version, found) for name, version in versions.items()]
+    uses = {PAPER: ["the method that Steadyhand implements", *uses.pop(PAPER, [])], **uses}
+    listed += [_with(entries()[key], "; ".join(used_for)) for key, used_for in uses.items()]
+    return listed + [_package(name, version, uses) for name, version in versions.items()]
 
 
 def bibliography(references: Iterable[Reference]) -> str:
@@ -142,11 +141,11 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
         if details.get("shapiro_w") is not None or details.get("residual_shapiro_w") is not None:
             yield "shapiro1965", "normality of differences"
         if "outlier_rule" in details:
-            yield "iglewicz1993", "participants far out"
+            yield "iglewicz1993", "outliers"
 
 
 def _of_measures(measures: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """What measures and questionnaires rest on."""
+    """The publications that measures and questionnaires rest on."""
     for name in measures:
         used_for = "questionnaire" if measure(name).questionnaire else measure(name).label.lower()
         for key in measure(name).cite:
@@ -171,21 +170,21 @@ def _source(study: Study) -> Reference | None:
     return Reference("misc", "study", fields, "the study's source")
 
 
-def _package(name: str, version: str, found: Mapping[str, object]) -> Reference:
-    """A package by its paper, where it has one, with its version; one that is listed already is a mere program."""
+def _package(name: str, version: str, listed: Mapping[str, object]) -> Reference:
+    """A package with its version: by its paper, or as a program where it has none or the paper is `listed` already."""
     key = _OF_PACKAGE.get(name)
-    if key is not None and key not in found:
+    if key is not None and key not in listed:
         return _with(entries()[key], name, note=f"{name}, version {version}")
     return Reference("software", f"package_{name}", {"title": name, "version": version}, "software")
 
 
 def escaped(text: str) -> str:
-    """A user's text as BibTeX takes it: no mark of it ends a field or means something to LaTeX."""
+    """A user's text for BibTeX: no character of it ends a field or is a command of LaTeX."""
     return text.translate(_LATEX)
 
 
-def _read(value: str) -> str:
-    """A field as people read it; what was escaped is as it was."""
+def _unescaped(value: str) -> str:
+    """A field as people read it, the inverse of `escaped`."""
     for mark, code in _LATEX.items():
         if isinstance(code, str) and code.startswith("\\text"):
             value = value.replace(code, f"\0{mark}\0") if isinstance(mark, int) else value

@@ -45,7 +45,7 @@ def section(material: Material) -> Section | None:
         blocks.append(Paragraph((Strong("No accuracy: "), f"errors cannot be given, for {_why_none(material)}.")))
     blocks += _session_figures(material)
     if rows and len(material.sessions) > 1:
-        blocks.append(_session_table(rows, _alone(material)))
+        blocks.append(_session_table(rows, _without_accelerations(material)))
     smoothed = any(row["reference"] == SMOOTHED for row in rows)
     return Section("accuracy", f"Fusion beside {SMOOTHED}" if smoothed else "Fusion accuracy", tuple(blocks))
 
@@ -53,14 +53,14 @@ def section(material: Material) -> Section | None:
 def _why_none(material: Material) -> str:
     """Why no session has accuracy."""
     reasons = [row["reason"] for row in material.rows("exclusions") if row["what"] == "no accuracy" and row["reason"]]
-    told = list(dict.fromkeys(reasons))
-    if told:
-        return "; ".join(f"{reason} ({counted(reasons.count(reason), 'session')})" for reason in told)
+    distinct = list(dict.fromkeys(reasons))
+    if distinct:
+        return "; ".join(f"{reason} ({counted(reasons.count(reason), 'session')})" for reason in distinct)
     reference = material.study.stream_of_kind("reference")
     return f'no log has a usable "{reference}"' if reference is not None else "no log could be used"
 
 
-def _alone(material: Material) -> dict[str, list[str]]:
+def _without_accelerations(material: Material) -> dict[str, list[str]]:
     """The sessions in which a fusing estimator could use no acceleration, by its name."""
     unused = [row for row in material.rows("checks") if row["status"] == "red" and row["check"].startswith(USED)]
     return {
@@ -95,7 +95,7 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         "Lead, paper's (ms)",
         "Jitter at rest (mm)",
     )
-    alone = {name: len(sessions) for name, sessions in _alone(material).items() if sessions}
+    alone = {name: len(sessions) for name, sessions in _without_accelerations(material).items() if sessions}
     cells = tuple(
         (
             row["estimator"]
@@ -115,20 +115,22 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
     )
     n, axes = len({row["session"] for row in rows}), len(material.study.axes)
     standard = reference_phrase(row["reference"] for row in rows)
-    known = SMOOTHED not in standard
+    has_reference = SMOOTHED not in standard
     caption = (
-        f"Accuracy of each estimator against {standard}" if known else f"Distance of each estimator from {standard}"
+        f"Accuracy of each estimator against {standard}"
+        if has_reference
+        else f"Distance of each estimator from {standard}"
     )
-    judged = (
+    reading_help = (
         "Lower is better in all columns but the third, which should be near 95 %."
-        if known
+        if has_reference
         else "No column says which estimator is best."
     )
-    unsure = contradicted(material) if known else ""
+    unsure = contradicted(material) if has_reference else ""
     where = f"{axes} axes together" if axes > 1 else f"along {material.study.axes[0]}"
     return Table(
         "table-accuracy",
-        f"{caption}, means over {counted(n, 'session')} ({where}). {judged}{unsure and f' {unsure}'}",
+        f"{caption}, means over {counted(n, 'session')} ({where}). {reading_help}{unsure and f' {unsure}'}",
         columns(titles, 1),
         cells,
         f"RMSE: root mean square distance to {standard}. Stated SD: the error the estimator says it makes. In 95 %"

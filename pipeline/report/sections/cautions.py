@@ -1,4 +1,4 @@
-"""What a reader of the results has to be careful about, one line each."""
+"""What a reader of the results should be careful about, one line each: the notice of the first page."""
 
 from __future__ import annotations
 
@@ -20,47 +20,47 @@ from pipeline.words.phrases import counted, listing
 
 _REMARKS_MAX = 3
 _FEW = 8  # participants
-NOT_KNOWN = "Absolute error and lag cannot be known: no reference was recorded."
+NO_REFERENCE = "Absolute error and lag cannot be known: no reference was recorded."
 
 
 def contradicted(material: Material) -> str:
-    """Why no estimator is called the best although there is a reference: sessions with a red check; else nothing."""
-    named, rated = sessions_in_doubt(material.results)
-    if not named:
+    """Why no estimator is called best although there is a reference: sessions with a red check. Empty without any."""
+    in_doubt, rated = sessions_in_doubt(material.results)
+    if not in_doubt:
         return ""
-    verb = "contradicts" if len(named) == 1 else "contradict"
-    shown = ", ".join(named[:_REMARKS_MAX]) + (", …" if len(named) > _REMARKS_MAX else "")
+    verb = "contradicts" if len(in_doubt) == 1 else "contradict"
+    shown = ", ".join(in_doubt[:_REMARKS_MAX]) + (", …" if len(in_doubt) > _REMARKS_MAX else "")
     return (
-        f"Which estimator is best is not said: {len(named)} of {counted(rated, 'session')} {verb} what"
+        f"Which estimator is best is not said: {len(in_doubt)} of {counted(rated, 'session')} {verb} what"
         f" study.yaml states or their own readings ({shown}); see “Data quality and exclusions”."
     )
 
 
 def cautions(material: Material) -> list[Text]:
-    """From what the data contradict and where they come from, through assumptions and design, to what is missing."""
+    """All cautions, the gravest first: what contradicts the data, where they come from, assumptions, design, gaps."""
     return [
-        *_of_reference(material),
+        *_no_reference(material),
         *preregistration.caution(material),
         *checks.caution(material),
         *checks.worse_than_tracker(material),
-        *checks.of_tables(material),
-        *_of_data(material),
-        *_of_assumptions(material),
-        *_of_design(material),
-        *_of_gaps(material),
+        *checks.suspicious_values(material),
+        *_origin_and_size(material),
+        *_assumptions(material),
+        *_design_remarks(material),
+        *_gaps(material),
     ]
 
 
-def _of_reference(material: Material) -> Iterator[Text]:
+def _no_reference(material: Material) -> Iterator[Text]:
     if without_reference(material.results):
         text = (
             " Figures of accuracy are distances from the smoothed readings of the study's own sensors: what these have"
             " wrong together, such as a latency, does not show, and no estimator can be called the best."
         )
-        yield (Strong(NOT_KNOWN), text)
+        yield (Strong(NO_REFERENCE), text)
 
 
-def _of_data(material: Material) -> Iterator[Text]:
+def _origin_and_size(material: Material) -> Iterator[Text]:
     origin, n = material.study.data_origin, material.results["study"]["participants"]["n"]
     if origin == "reconstructed":
         yield (Strong("The data are reconstructed: "), "they fit printed figures and were not measured with anybody.")
@@ -71,53 +71,61 @@ def _of_data(material: Material) -> Iterator[Text]:
         yield (Strong("Few participants: "), text)
 
 
-def _details(row: Row, *names: str) -> float | None:
-    """The first of these figures that a row has."""
+def _first_detail(row: Row, *names: str) -> float | None:
+    """The first of these entries of the row's details that it has."""
     details = row["details"] or {}
     return next((details[name] for name in names if details.get(name) is not None), None)
 
 
-def _named(rows: list[Row]) -> str:
-    """Their measures, each once."""
+def _measures_of(rows: list[Row]) -> str:
+    """The measures of these rows, each once."""
     return listing(list(dict.fromkeys(measure_label(row["measure"]) for row in rows)))
 
 
-def _of_assumptions(material: Material) -> Iterator[Text]:
+def _assumptions(material: Material) -> Iterator[Text]:
     alpha, rows = material.study.alpha, material.rows("comparisons")
 
     def below(row: Row, *names: str) -> bool:
-        found = _details(row, *names)
-        return found is not None and found < alpha
+        p = _first_detail(row, *names)
+        return p is not None and p < alpha
 
     beyond = [row for row in material.rows("descriptives") if row["interval"] == T_BEYOND]
     if beyond:
         text = (
-            f"for {_named(beyond)}, although all values lie between: a share cannot be there. State each answer as 0 or"
+            f"for {_measures_of(beyond)}, although all values lie between: a share cannot be there. State each answer"
+            " as 0 or"
         )
         yield (Strong("A t interval reaches beyond 0 to 1 "), f"{text} 1, with its trial, or read it as approximate.")
     violated = [row for row in rows if TESTS[row["test"]].assumes_sphericity and below(row, "mauchly_p")]
     if violated:
-        text = f"(the differences between conditions vary unequally) for {_named(violated)}: use the"
+        text = f"(the differences between conditions vary unequally) for {_measures_of(violated)}: use the"
         yield (Strong("Sphericity is violated "), f"{text} Greenhouse-Geisser p.")
-    resting = [row for row in rows if TESTS[row["test"]].assumes_normality]
-    skewed = [row for row in resting if below(row, "shapiro_p", "residual_shapiro_p")]
+    assuming_normality = [row for row in rows if TESTS[row["test"]].assumes_normality]
+    skewed = [row for row in assuming_normality if below(row, "shapiro_p", "residual_shapiro_p")]
     if skewed:
-        text = f"(Shapiro-Wilk test) for {_named(skewed)}: check whether a rank test gives the same result."
+        text = f"(Shapiro-Wilk test) for {_measures_of(skewed)}: check whether a rank test gives the same result."
         yield (Strong("Differences are not normally distributed "), text)
     shaped = [row for row in material.rows("design_check") if row["what"] == SHAPE]
     if shaped:
-        text = f"in {_named(shaped)}: transform: log in study.yaml tests the logarithms and says by what factor the"
+        text = (
+            f"in {_measures_of(shaped)}: transform: log in study.yaml tests the logarithms and says by what factor the"
+        )
         yield (Strong("Skewed values "), f"{text} geometric means differ; see whether it gives the same result.")
-    yield from _far_out(resting)
+    yield from _outliers(assuming_normality)
     yield from _aligned_ranks(rows)
     singular = [row for row in rows if no_variance_between_participants(row)]
     if singular:
-        text = f"of the mixed model for {_named(singular)}: it finds no variance between participants, so it"
+        text = f"of the mixed model for {_measures_of(singular)}: it finds no variance between participants, so it"
         yield (Strong("Singular fit "), f"{text} treats all rows as if they came from different people.")
     yield from _left_out_intercepts(rows)
     undefined = sum(row["status"] != "ok" for row in rows)
     if undefined:
         yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
+    yield from _narrow_intervals(material)
+
+
+def _narrow_intervals(material: Material) -> Iterator[Text]:
+    """Estimators whose stated uncertainty is too small."""
     narrow = [
         row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
     ]
@@ -128,55 +136,57 @@ def _of_assumptions(material: Material) -> Iterator[Text]:
 
 
 def _left_out_intercepts(rows: list[Row]) -> Iterator[Text]:
-    """Random intercepts beside the participants' that a mixed model does without, since it finds no variance there."""
+    """Random intercepts other than the participants' whose variance a mixed model estimates as zero and leaves out."""
     without: dict[str, list[Row]] = {}
     for row in rows:
         for name, variance in ((row["details"] or {}).get("variances") or {}).items():
             if variance == 0 and name != "participant":
                 without.setdefault(name, []).append(row)
     for name, concerned in without.items():
-        text = f"of each {name.replace(':', ' × ')}, in the mixed model for {_named(concerned)}: it finds no variance"
-        yield (Strong("A random intercept is left out, that "), f"{text} between them.")
+        text = f"of each {name.replace(':', ' × ')}, in the mixed model for {_measures_of(concerned)}: it finds no"
+        yield (Strong("A random intercept is left out, that "), f"{text} variance between them.")
 
 
-def _misshapen(row: Row) -> bool:
-    """Are its values skewed, or do its cells spread unequally?"""
+def _skewed_or_unequal(row: Row) -> bool:
+    """Whether the row's values are skewed, or its cells spread unequally."""
     details = row["details"] or {}
     return bool(details.get("skewed") or details.get("spreads_differ"))
 
 
 def _aligned_ranks(rows: list[Row]) -> Iterator[Text]:
-    """Aligned ranks of skewed data: an effect leaks into the others, and there are far too many false alarms."""
-    concerned = [row for row in rows if TESTS[row["test"]].ranks_aligned and _misshapen(row)]
+    """Aligned ranks of skewed data: one effect leaks into the others, with far too many false positives."""
+    concerned = [row for row in rows if TESTS[row["test"]].ranks_aligned and _skewed_or_unequal(row)]
     if concerned:
-        named = _named(concerned)
-        text = f"of data that are skewed or spread unequally ({named}) can find effects that do not exist where another"
+        measures = _measures_of(concerned)
+        text = (
+            f"of data that are skewed or spread unequally ({measures}) can find effects that do not exist where another"
+        )
         yield (
             Strong("Aligned ranks "),
             f"{text} factor has a strong one; an ANOVA of the logarithms does not have this problem.",
         )
 
 
-def _far_out(rows: list[Row]) -> Iterator[Text]:
-    """Participants whose difference lies far from the others'."""
+def _outliers(rows: list[Row]) -> Iterator[Text]:
+    """Participants whose difference lies far from those of the others."""
     concerned = [row for row in rows if (row["details"] or {}).get("outliers")]
     people = list(dict.fromkeys(person for row in concerned for person in row["details"]["outliers"]))
     if people:
         who = listing(people) if len(people) <= _REMARKS_MAX else counted(len(people), "participant")
-        text = f"in {_named(concerned)}: {who} (kept in all tests). Look at the figures."
+        text = f"in {_measures_of(concerned)}: {who} (kept in all tests). Look at the figures."
         yield (Strong("Outliers "), text)
 
 
-def _of_design(material: Material) -> Iterator[Text]:
+def _design_remarks(material: Material) -> Iterator[Text]:
     """The remarks of the design check: order of the conditions, period, carry-over, cells."""
     remarked = [row for row in material.rows("design_check") if row["remark"] and row["what"] != SHAPE]
-    told = [f"{row['what']}: {row['remark']}" for row in remarked]
-    if told:
-        more = f"; and {len(told) - _REMARKS_MAX} more" if len(told) > _REMARKS_MAX else ""
-        yield (Strong("Design: "), f"{'; '.join(told[:_REMARKS_MAX])}{more}. See “Design and participants”.")
+    remarks = [f"{row['what']}: {row['remark']}" for row in remarked]
+    if remarks:
+        more = f"; and {len(remarks) - _REMARKS_MAX} more" if len(remarks) > _REMARKS_MAX else ""
+        yield (Strong("Design: "), f"{'; '.join(remarks[:_REMARKS_MAX])}{more}. See “Design and participants”.")
 
 
-def _of_gaps(material: Material) -> Iterator[Text]:
+def _gaps(material: Material) -> Iterator[Text]:
     contradictions = sum(row["verdict"] == "contradiction" for row in material.rows("printed"))
     if contradictions:
         verb = "contradicts" if contradictions == 1 else "contradict"
@@ -184,5 +194,5 @@ def _of_gaps(material: Material) -> Iterator[Text]:
         yield (f"{figures}; see “Printed and computed”.",)
     kinds = Counter(row["what"] for row in material.rows("exclusions"))
     if kinds:
-        told = listing([f"{what} ({count})" for what, count in kinds.items()])
-        yield (Strong("Missing or excluded: "), f"{told}; see “Data quality and exclusions”.")
+        counts = listing([f"{what} ({count})" for what, count in kinds.items()])
+        yield (Strong("Missing or excluded: "), f"{counts}; see “Data quality and exclusions”.")

@@ -23,9 +23,9 @@ def blocks(material: Material) -> Iterator[Block]:
     if not rows:
         return
     contradicted = sorted(_contradicted(rows), key=lambda row: -LIGHTS.index(row["status"]))
-    found = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
-    text = f"{found} of logs and tables, against each other and study.yaml; docs/checks.md describes each." + _lags(
-        rows
+    counts = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
+    text = (
+        f"{counts} of logs and tables, against each other and study.yaml; docs/checks.md describes each.{_lags(rows)}"
     )
     yield Paragraph((Strong("Checks: "), text))
     if contradicted:
@@ -37,7 +37,7 @@ def _contradicted(rows: Sequence[Row]) -> list[Row]:
 
 
 def _lags(rows: Sequence[Row]) -> str:
-    """The lag of each session, as far as a paragraph takes them."""
+    """The lag of each session; of very many, the first ones."""
     lags = [f"{row['session']} {row['found']}" for row in rows if row["check"] == LAG]
     if not lags:
         return ""
@@ -71,7 +71,7 @@ def _table(rows: Sequence[Row]) -> Table:
 
 
 def caution(material: Material) -> Iterator[Text]:
-    """For the first page: what is red, and where; the figures of those sessions are not to be believed."""
+    """For the first page: which checks are red in which sessions, whose figures are not to be relied on."""
     red = [row for row in material.rows("checks") if row["status"] == "red" and row["session"]]
     if not red:
         return
@@ -102,8 +102,8 @@ def worse_than_tracker(material: Material) -> Iterator[Text]:
         yield (Strong("Fusion is worse than its tracker alone: "), f"{'; '.join(parts)}.")
 
 
-def of_tables(material: Material) -> Iterator[Text]:
-    """For the first page: values of the study's own tables that are probably not what they are taken for."""
+def suspicious_values(material: Material) -> Iterator[Text]:
+    """For the first page: values in the study's own tables that look wrong."""
     rows = [row for row in _contradicted(material.rows("checks")) if not row["session"]]
     for row in rows[:_NAMED_MAX]:
         yield (Strong("Look at the values: "), f"{row['message']}.")

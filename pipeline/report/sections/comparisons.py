@@ -26,61 +26,61 @@ def anchor(at: int) -> str:
 
 
 def section(material: Material) -> Section | None:
-    """Every comparison."""
+    """All comparisons; None where nothing was compared."""
     rows = material.rows("comparisons")
     if not rows:
         return None
     tests = list(dict.fromkeys(row["test"] for row in rows))
-    filled = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NO_VALUE, "") for row in rows)]
+    shown_columns = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NO_VALUE, "") for row in rows)]
     table = Table(
         "table-comparisons",
         f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
         f" if there were none; the study's level of significance is {100 * material.study.alpha:g} %.",
-        columns([title for title, _ in filled], 3),
-        tuple(tuple(cell(row) for _, cell in filled) for row in rows),
-        f"{_who_counts(tests)} Mean difference: first minus second condition. Reduction: relative to the first, for"
-        f" measures whose zero means none{_of_logarithms(rows)}.",
+        columns([title for title, _ in shown_columns], 3),
+        tuple(tuple(cell(row) for _, cell in shown_columns) for row in rows),
+        f"{_meaning_of_n(tests)} Mean difference: first minus second condition. Reduction: relative to the first, for"
+        f" measures whose zero means none{_reduction_of_logarithms(rows)}.",
         tuple(anchor(at) for at in range(len(rows))),
     )
-    where = "Every test of the study, one row each. The words and symbols are explained in the "
-    explained = Paragraph((where, CrossReference("glossary", "glossary"), "."))
-    blocks: list[Block] = [explained, table, Paragraph((Strong("Methods: "), _methods(rows)))]
+    text = "Every test of the study, one row each. The words and symbols are explained in the "
+    introduction = Paragraph((text, CrossReference("glossary", "glossary"), "."))
+    blocks: list[Block] = [introduction, table, Paragraph((Strong("Methods: "), _methods(rows)))]
     return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
 
 
-def _of_logarithms(rows: Sequence[Row]) -> str:
+def _reduction_of_logarithms(rows: Sequence[Row]) -> str:
     return "; of tests of logarithms, that of the geometric mean" if any(map(uses_logarithms, rows)) else ""
 
 
-def _who_counts(tests: Sequence[str]) -> str:
+def _meaning_of_n(tests: Sequence[str]) -> str:
     if {TESTS[name].design for name in tests} == {"between"}:
         return "n: every participant with a value."
-    every = "n: participants with a value in every condition"
-    of_all = [TESTS[name].label for name in tests if not TESTS[name].complete_cases]
-    return f"{every}; in the {listing(of_all)}, all participants." if of_all else f"{every}."
+    text = "n: participants with a value in every condition"
+    of_everybody = [TESTS[name].label for name in tests if not TESTS[name].complete_cases]
+    return f"{text}; in the {listing(of_everybody)}, all participants." if of_everybody else f"{text}."
 
 
 def _methods(rows: Sequence[Row]) -> str:
-    """Every method by name, and how families of p values were adjusted."""
-    named: dict[str, list[str]] = {}
+    """Each test with the methods that computed it, and how families of p values were adjusted."""
+    methods_of: dict[str, list[str]] = {}
     for row in rows:
-        named.setdefault(test_label(row), []).append(row["method"])
-    told = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in named.items()]
-    return f"{'; '.join(told)}. {capitalized(families(rows))}."
+        methods_of.setdefault(test_label(row), []).append(row["method"])
+    texts = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in methods_of.items()]
+    return f"{'; '.join(texts)}. {capitalized(families(rows))}."
 
 
 def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:
-    """Normality and outliers of the differences that tests of pairs rest on, once for each pair."""
-    found: dict[tuple[str, str], Row] = {}
+    """Normality and outliers of the differences that are tested, once for each measure and pair."""
+    tested: dict[tuple[str, str], Row] = {}
     for row in rows:
         details = row["details"] or {}
         if "shapiro_w" in details or "residual_shapiro_w" in details:
-            found.setdefault((row["measure"], _differences(row, conditions)), row)
-    if not found:
+            tested.setdefault((row["measure"], _differences(row, conditions)), row)
+    if not tested:
         return []
     cells = tuple(
         (measure_label(measure), compared, f"{row['n']}", *_normality(row["details"]), _outliers(row["details"]))
-        for (measure, compared), row in found.items()
+        for (measure, compared), row in tested.items()
     )
     table = Table(
         "table-diagnostics",
@@ -139,7 +139,7 @@ ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Bootstrap 95 % interval", _bootstrap),
     ("Permutation p", lambda row: p_value((row["details"] or {}).get("permutation_p"))),
 )
-"""Columns of what entries may ask for beside a test, of the mean difference."""
+"""Columns of the bootstrap and permutation estimates that an entry of study.yaml may ask for beside its test."""
 
 _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Measure", lambda row: measure_label(row["measure"])),

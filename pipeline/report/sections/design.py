@@ -23,9 +23,9 @@ def section(material: Material) -> Section:
             Paragraph((Strong("Sessions: "), f"{counted(len(material.sessions), 'log')} of raw sensor streams."))
         )
     if study.shown:
-        shown = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
-        blocks.append(Paragraph((Strong("Display: "), f"{listing(shown)}.")))
-    blocks += _checked(material)
+        displays = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
+        blocks.append(Paragraph((Strong("Display: "), f"{listing(displays)}.")))
+    blocks += _design_check(material)
     notes: list[Text] = [(ORIGINS[study.data_origin],)]
     if study.notes.strip():
         notes.append((study.notes.strip(),))
@@ -36,7 +36,7 @@ def section(material: Material) -> Section:
 
 
 def _participants(material: Material) -> Text:
-    """Number, sex and age, as far as participants.csv gives them."""
+    """Number, sex and age, as far as participants.csv states them."""
     facts = material.results["study"]["participants"]
     who = f" ({listing([f'{count} {name}' for name, count in facts['sex'].items()])})" if facts.get("sex") else ""
     if facts.get("age"):
@@ -48,7 +48,7 @@ def _participants(material: Material) -> Text:
     return (Strong("Participants: "), text + ".")
 
 
-def _checked(material: Material) -> list[Block]:
+def _design_check(material: Material) -> list[Block]:
     """The table of the design check, and a sentence on what needs attention."""
     rows = material.rows("design_check")
     if not rows:

@@ -15,8 +15,7 @@ from pipeline.report.sections.material import draw_now
 from pipeline.report.sections.provenance import libraries
 from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.study.settings import Study
-from pipeline.tables import table as tables
-from pipeline.tables.table import Row
+from pipeline.tables.table import Row, records
 from pipeline.words.change import reduction_phrase
 from pipeline.words.names import short_label
 from pipeline.words.numbers import NO_VALUE, interval, number, percent
@@ -29,11 +28,14 @@ _UNITS = dict(zip(MEASURES, ("mm", "s"), strict=True))
 
 @dataclass(frozen=True)
 class Explored:
-    """A study's exploration: its tables, what they say pays, the tracker it starts from, and who took part."""
+    """The results of an exploration: its tables, and what pays more for each measure.
+
+    `own` is the study's present tracker; `participants` people were simulated in each of `repeats` small studies.
+    """
 
     name: str
     study: Study
-    found: Mapping[str, pd.DataFrame]
+    tables: Mapping[str, pd.DataFrame]
     pays: tuple[Pays, ...]
     own: Tracker
     participants: int
@@ -41,7 +43,7 @@ class Explored:
 
     def rows(self, table: str) -> list[dict[str, Any]]:
         """A table as plain rows."""
-        return list(tables.records(table, self.found[table]))
+        return list(records(table, self.tables[table]))
 
 
 def document(explored: Explored, drawn: Path) -> Document:
@@ -50,7 +52,7 @@ def document(explored: Explored, drawn: Path) -> Document:
         Section("pays", "What pays more here?", tuple(_pays(explored))),
         Section("surfaces", "Error and time over trackers and estimators", tuple(_surfaces(explored, drawn))),
     ]
-    if len(explored.found["explore_differences"]):
+    if len(explored.tables["explore_differences"]):
         sections.append(Section("needed", "How many participants show a difference?", tuple(_needed(explored, drawn))))
     sections.append(Section("how", "How this was explored", (_how(explored), libraries())))
     return Document("A better tracker or a better filter?", f"Study “{explored.name}”", ORIGIN, tuple(sections))
@@ -75,7 +77,7 @@ def pays_sentence(pays: Pays, estimator: str) -> Sequence[str]:
         )
     if by_filter is not None and pays.enough is not None and pays.verdict != "filter":
         parts.append(f"one with {_better(pays.enough.tracker, now.tracker)} would already do as much as the filter")
-    start = f"from {_figure(pays, now)} with {estimator} at {_tracker(now.tracker)}"
+    start = f"from {_figure(pays, now)} with {estimator} at {_tracker_text(now.tracker)}"
     return head, f": {start}, {'; '.join(parts) or 'no other estimator and no better tracker was explored'}."
 
 
@@ -88,12 +90,12 @@ def _change(pays: Pays, way: Way) -> str:
     return f"makes it {_figure(pays, way)} ({reduction_phrase(1 - way.value / pays.now.value)})"
 
 
-def _tracker(tracker: Tracker) -> str:
+def _tracker_text(tracker: Tracker) -> str:
     return f"{1000 * tracker.latency_s:g} ms, {tracker.noise_sd_mm:g} mm and {tracker.rate_hz:g} Hz"
 
 
 def _better(tracker: Tracker, now: Tracker) -> str:
-    """`a latency of 50 ms`: a tracker by what is better about it."""
+    """`a latency of 50 ms`: what of a tracker is better than now."""
     words = (
         f"a latency of {1000 * tracker.latency_s:g} ms",
         f"a noise of {tracker.noise_sd_mm:g} mm",
@@ -124,23 +126,22 @@ def _pays(explored: Explored) -> Iterator[Block]:
 
 
 def _steps(explored: Explored) -> Table:
-    """Where the study is, each better value of the tracker for itself, each other filter, and both at their best."""
+    """The present state, each single improvement of the tracker, each other filter, and the best of all points."""
     own, rows = explored.own, explored.rows("explore")
     first = rows[0]["estimator"]
-    here = next(row for row in rows if _of(row) == own and row["estimator"] == first)
-    single = [row for row in rows if _of(row).at_least(own) and _respects(_of(row), own) == 1]
+    here = next(row for row in rows if _tracker_of(row) == own and row["estimator"] == first)
+    single = [row for row in rows if _tracker_of(row).at_least(own) and _differing_values(_tracker_of(row), own) == 1]
     shown = [
         ("as it is", here),
-        *((f"filter: {row['estimator']}", row) for row in rows if _of(row) == own and row is not here),
-        *((f"tracker: {_better(_of(row), own)}", row) for row in single if row["estimator"] == first),
+        *((f"filter: {row['estimator']}", row) for row in rows if _tracker_of(row) == own and row is not here),
+        *((f"tracker: {_better(_tracker_of(row), own)}", row) for row in single if row["estimator"] == first),
     ]
-    best = min(
-        (row for row in rows if _of(row).at_least(own)), key=lambda row: row["selection_rmse_mm"] or float("inf")
-    )
-    shown.append((f"least error of all: {best['estimator']} at {_tracker(_of(best))}", best))
+    no_worse = [row for row in rows if _tracker_of(row).at_least(own)]
+    best = min(no_worse, key=lambda row: row["selection_rmse_mm"] or float("inf"))
+    shown.append((f"least error of all: {best['estimator']} at {_tracker_text(_tracker_of(best))}", best))
     cells = tuple((name, *_outcome(row), *(_less(row, here, column) for column in _COLUMNS)) for name, row in shown)
     titles = ("Step", "Error, RMSE (mm)", "Time (s)", "Error less by", "Time less by")
-    caption = f"What single steps change, from {first} at {_tracker(own)}."
+    caption = f"What single steps change, from {first} at {_tracker_text(own)}."
     return Table("table-steps", caption, columns(titles, 1), cells, _INTERVALS)
 
 
@@ -151,11 +152,11 @@ _INTERVALS = (
 )
 
 
-def _of(row: Row) -> Tracker:
+def _tracker_of(row: Row) -> Tracker:
     return Tracker(*(row[name] for name in Tracker._fields))
 
 
-def _respects(tracker: Tracker, own: Tracker) -> int:
+def _differing_values(tracker: Tracker, own: Tracker) -> int:
     return sum(new != was for new, was in zip(tracker, own, strict=True))
 
 
@@ -175,13 +176,13 @@ def _less(row: Row, here: Row, column: str) -> str:
 
 
 def _surfaces(explored: Explored, drawn: Path) -> Iterator[Block]:
-    table = explored.found["explore"]
+    table = explored.tables["explore"]
     for surface, name in ((ERROR, "error"), (TIME, "time")):
         yield draw_now(drawn / f"{name}.svg", outcome, table, surface, explored.own)
     rows = explored.rows("explore")
     titles = ("Estimator", "Latency (ms)", "Noise (mm)", "Rate (Hz)", "Error, RMSE (mm)", "Time (s)", "Misses", "Left")
     cells = tuple(
-        (row["estimator"], *_place(row), *_outcome(row), _part(row), str(row["not_selected"]))
+        (row["estimator"], *_tracker_cells(row), *_outcome(row), _share_missed(row), str(row["not_selected"]))
         for row in rows[:_ROWS_MAX]
     )
     note = (
@@ -192,11 +193,11 @@ def _surfaces(explored: Explored, drawn: Path) -> Iterator[Block]:
     yield Table("table-points", f"Every point, {people} people each.{_more(rows)}", columns(titles, 1), cells, note)
 
 
-def _part(row: Row) -> str:
+def _share_missed(row: Row) -> str:
     return percent(row["misses"] / row["selections"], 1) if row["selections"] else NO_VALUE
 
 
-def _place(row: Row) -> tuple[str, str, str]:
+def _tracker_cells(row: Row) -> tuple[str, str, str]:
     return f"{1000 * row['latency_s']:g}", f"{row['noise_sd_mm']:g}", f"{row['rate_hz']:g}"
 
 
@@ -205,7 +206,7 @@ def _more(rows: Sequence[Row]) -> str:
 
 
 def _needed(explored: Explored, drawn: Path) -> Iterator[Block]:
-    table = explored.found["explore_differences"]
+    table = explored.tables["explore_differences"]
     yield Paragraph(
         (
             "So many participants, each with both estimators, would show the difference with a power of"
@@ -235,7 +236,7 @@ def _difference_cells(row: Row) -> tuple[str, ...]:
     return (
         short_label(row["measure"]),
         f"{row['first']} or {row['second']}",
-        *_place(row),
+        *_tracker_cells(row),
         difference,
         number(row["effect_size"]),
         _people(row) if row["status"] == "ok" else str(row["status"]),
@@ -255,7 +256,7 @@ def _how(explored: Explored) -> Paragraph:
     studies = counted(explored.repeats, "small study", "small studies")
     return Paragraph(
         (
-            f"{counted(len(explored.found['explore']), 'point')}, a tracker and an estimator each; {people} in each of"
+            f"{counted(len(explored.tables['explore']), 'point')}, a tracker and an estimator each; {people} in each of"
             f" {studies}, drawn from seed {settings.seed} and the traits of study.yaml. They are the same people at"
             " every point. With one estimator the same random numbers are used for every tracker, so that trackers are"
             " compared with little noise; each estimator has its own, as in two sessions of one person: otherwise too"

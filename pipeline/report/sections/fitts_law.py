@@ -73,7 +73,7 @@ def _with_interval(value: float | None, low: float | None, high: float | None) -
 
 
 def _cautions(rows: Sequence[Row]) -> list[Block]:
-    """What speaks against a line, once for all the lines it is said of."""
+    """Remarks against a line, each once, with all the lines that it concerns."""
     lines: dict[str, list[str]] = {}
     for row in rows:
         if row["remark"] is not None:

@@ -1,4 +1,4 @@
-"""What the words of a report mean: those that it uses, and no others."""
+"""The glossary of a report, with the words that it uses and no others."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ ANCHOR = "glossary"
 
 def of(sections: Sequence[Section]) -> tuple[Section, ...]:
     """A section for the end of a report that has these; none where there is nothing to explain."""
-    found = explained([text for section in sections for block in section.blocks for text in _texts(block)])
-    if not found:
+    entries = explained([text for section in sections for block in section.blocks for text in _texts(block)])
+    if not entries:
         return ()
     caption = "The statistical words of this report."
-    table = Table("table-glossary", caption, columns(("Word", "Meaning"), 2), tuple(found))
+    table = Table("table-glossary", caption, columns(("Word", "Meaning"), 2), tuple(entries))
     return (Section(ANCHOR, "Glossary", (table,)),)
 
 

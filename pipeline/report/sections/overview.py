@@ -19,11 +19,10 @@ from pipeline.report.document.model import (
     Text,
     columns,
 )
-from pipeline.report.figures.rainclouds import interval_words, met_one_each
-from pipeline.report.prose.accuracy_claims import without_reference
-from pipeline.report.prose.answer import HEADER, answer, notes, shown
-from pipeline.report.sections import preregistration, traces
-from pipeline.report.sections.cautions import NOT_KNOWN, cautions, contradicted
+from pipeline.report.figures.rainclouds import interval_words, one_condition_each
+from pipeline.report.prose.answer import HEADER, answer, lines_for_first_page, notes
+from pipeline.report.sections import overview_estimators, preregistration, traces
+from pipeline.report.sections.cautions import cautions
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
 from pipeline.study.statistical_tests import TESTS
@@ -44,9 +43,9 @@ _SENTENCES = 2
 def section(material: Material) -> Section:
     """Summary."""
     blocks: list[Block] = [Paragraph(_question(material))]
-    answer = _answer(material)
-    if answer:
-        blocks.append(Paragraph(answer))
+    sentences = _answer(material)
+    if sentences:
+        blocks.append(Paragraph(sentences))
     keys = _key_figures(material)
     if keys:
         blocks.append(KeyFigures(tuple(keys)))
@@ -54,36 +53,36 @@ def section(material: Material) -> Section:
     blocks += _figure(material)
     blocks.append(Paragraph(_data(material)))
     blocks += preregistration.notice(material)
-    found = cautions(material)
-    if found:
-        blocks.append(Notice("To be careful about", tuple(found)))
-    blocks += [Paragraph(text) for text in _evidence(material)]
+    careful = cautions(material)
+    if careful:
+        blocks.append(Notice("To be careful about", tuple(careful)))
+    blocks += [Paragraph(text) for text in _further_results(material)]
     if material.sessions:
-        told = "Look at every session closely, as the tracker recorded it and as each estimator reconstructed it: "
-        blocks.append(Paragraph((told, Link(traces.PAGE, traces.PAGE), ".")))
+        text = "Look at every session closely, as the tracker recorded it and as each estimator reconstructed it: "
+        blocks.append(Paragraph((text, Link(traces.PAGE, traces.PAGE), ".")))
     return Section("summary", "Summary", tuple(blocks))
 
 
 def _pairs(material: Material) -> list[Block]:
-    """The table of pairs, or as many of its lines as there is room for, with the rest named."""
+    """The table of pairs, or as many of its lines as there is room for, with the other measures named."""
     lines = answer(material.results)
-    kept = shown(lines)
-    if not kept:
+    on_page = lines_for_first_page(lines)
+    if not on_page:
         return []
-    left_out = list(dict.fromkeys(line.measure for line in lines[len(kept) :]))
+    left_out = list(dict.fromkeys(line.measure for line in lines[len(on_page) :]))
     more = f" Not shown here: {listing(left_out)}; see the results." if left_out else ""
     table = Table(
         "table-answer",
         "The answer: by how much each pair differs, in the unit of the measure.",
         columns(HEADER, 5),
-        tuple(line.cells for line in kept),
+        tuple(line.cells for line in on_page),
         f"{notes(material.results)}{more}",
     )
     return [table]
 
 
 def _answer(material: Material) -> Text:
-    """Two sentences: of the two measures people look for first, else of the ratings, else of the estimators."""
+    """Two sentences: on the two measures people look for first, or else on the ratings, or else on the estimators."""
     rows = _headline_rows(material)[:_SENTENCES]
     if rows:
         lead, *others = [_sentence(material, row) for row in rows]
@@ -91,7 +90,7 @@ def _answer(material: Material) -> Text:
     ratings = _ratings(material)[:_SENTENCES]
     if ratings:
         return tuple(part for text in ratings for part in (*text, " "))
-    return _closest(material)
+    return overview_estimators.answer(material)
 
 
 def _sentence(material: Material, row: Row) -> str:
@@ -101,25 +100,25 @@ def _sentence(material: Material, row: Row) -> str:
         return f"{label}: {brief_sentence(row)}."
     study, p = material.study, decisive_p(row)
     significant = p is not None and p < study.alpha
-    found = f"{p_phrase(p)}, n = {row['n']}"
-    told = {one["condition"]: one for one in material.rows("descriptives") if one["measure"] == row["measure"]}
-    if row["mean_difference"] is not None and set(study.conditions) <= set(told):
+    evidence = f"{p_phrase(p)}, n = {row['n']}"
+    described = {one["condition"]: one for one in material.rows("descriptives") if one["measure"] == row["measure"]}
+    if row["mean_difference"] is not None and set(study.conditions) <= set(described):
         first, second = study.conditions
         change = f"{amount_of_change(row)} {direction(row)}" if row["mean_difference"] else "the same"
-        means = f"{_mean(told[second])} with {second} against {_mean(told[first])} with {first}"
+        means = f"{_mean(described[second])} with {second} against {_mean(described[first])} with {first}"
         sure = "" if significant else ", a difference that is not statistically significant"
-        return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({found})."
+        return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({evidence})."
     if ratio_to_first(row):
         first, second = study.conditions
         sure = "" if significant else ", a difference that is not statistically significant"
         side = "lower" if row["details"]["ratio_to_first"] < 1 else "higher"
-        return f"{label} was {side} with {second} than with {first}{sure}: its {ratio_to_first(row)} ({found})."
-    ranked = sorted((one for one in told.values() if one["mean"] is not None), key=lambda one: one["mean"])
+        return f"{label} was {side} with {second} than with {first}{sure}: its {ratio_to_first(row)} ({evidence})."
+    ranked = sorted((one for one in described.values() if one["mean"] is not None), key=lambda one: one["mean"])
     verb = "differs" if significant else "does not differ statistically significantly"
     if len(ranked) < 2:
-        return f"{label} {verb} between the conditions ({found})."
+        return f"{label} {verb} between the conditions ({evidence})."
     ends = f"{_mean(ranked[0])} with {ranked[0]['condition']} to {_mean(ranked[-1])} with {ranked[-1]['condition']}"
-    return f"{label} {verb} between the conditions: means run from {ends} ({found})."
+    return f"{label} {verb} between the conditions: means run from {ends} ({evidence})."
 
 
 def _mean(row: Row) -> str:
@@ -128,54 +127,14 @@ def _mean(row: Row) -> str:
     return " ".join(part for part in parts if part not in ("", NO_VALUE))
 
 
-def _closest(material: Material) -> Text:
-    """The estimator with the smallest mean error and the one after it, with their range over sessions.
-
-    Without a reference nobody knows which is closest to the hand.
-    """
-    if without_reference(material.results):
-        return (Strong(NOT_KNOWN), f" {_distances(material)}")
-    unsure = contradicted(material)
-    if unsure and material.rows("accuracy_means"):
-        return (Strong(unsure), f" {_distances(material)}")
-    means = list(_means(material).items())[:_SENTENCES]
-    errors = {
-        name: [row["rmse_mm"] for row in material.rows("accuracy") if row["estimator"] == name] for name, _ in means
-    }
-    told = [
-        f"{number(mean, 1)} mm on average over {counted(n, 'session')}"
-        + (
-            f" ({number(min(errors[name]), 1)} to {number(max(errors[name]), 1)} mm in single sessions)"
-            if n > 1
-            else ""
-        )
-        for name, (mean, n) in means
-    ]
-    if not told:
-        return ()
-    lead = f"{means[0][0]} comes closest to the reference: its root mean square error (RMSE) is {told[0]}."
-    after = (f" Next is {name} with {text}." for (name, _), text in zip(means[1:], told[1:], strict=True))
-    return (Strong(lead), *after)
-
-
 def _figure(material: Material) -> list[Figure]:
     """The one figure that shows the answer."""
     for row in _headline_rows(material):
         wide = material.participant_means(row["measure"])
         if row["status"] == "ok" and wide.notna().any().any():
             return [_of_people(material, row["measure"], wide)]
-    rows = pd.DataFrame(material.rows("accuracy"))
-    if rows.empty or material.rows("comparisons"):
-        return []
-    n = rows["session"].nunique()
-    return [
-        material.figure(
-            "answer",
-            figures.errors,
-            *_of_errors(material, n),
-            rows,
-        )
-    ]
+    errors = None if material.rows("comparisons") else overview_estimators.figure(material)
+    return [] if errors is None else [errors]
 
 
 def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
@@ -183,10 +142,10 @@ def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
     differences = (
         " Right: each participant's difference, and the mean difference with its interval; zero is no difference."
     )
-    mark = "each small mark is a participant" if met_one_each(wide) else "each line is a participant"
+    mark = "each small mark is a participant" if one_condition_each(wide) else "each line is a participant"
     shares = material.of_shares(measure)
     large = f"large marks are means with 95 % intervals{interval_words(wide, measure, shares)}"
-    told = [
+    means = [
         f"{row['condition']} {_mean(row)}"
         for row in material.rows("descriptives")
         if row["measure"] == measure and row["mean"] is not None
@@ -195,7 +154,7 @@ def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
         "answer",
         figures.paired,
         f"{label}: {mark}, {large}.{differences if compared else ''}",
-        f"{label} of each participant by condition. Means with 95 % intervals: {'; '.join(told)}.",
+        f"{label} of each participant by condition. Means with 95 % intervals: {'; '.join(means)}.",
         wide,
         measure,
         shares,
@@ -234,7 +193,7 @@ def _of_conditions(material: Material) -> list[Row]:
 
 
 def _headline_rows(material: Material) -> list[Row]:
-    """One omnibus row a measure that is no questionnaire's, the well-known measures first."""
+    """One row of all conditions for each measure that is not a questionnaire's, the well-known measures first."""
     rows = [
         row for row in _of_conditions(material) if "/" not in row["measure"] and TESTS[row["test"]].tests_difference
     ]
@@ -244,11 +203,11 @@ def _headline_rows(material: Material) -> list[Row]:
 
 
 def _key_figures(material: Material) -> list[KeyFigure]:
-    """Up to three large figures; of more than two conditions none, for no single one answers."""
+    """Up to three large figures; none of more than two conditions, where no single figure is the answer."""
     if len(material.study.conditions) > 2 and material.rows("comparisons"):
         return []
     keys = [_key_figure(row) for row in _headline_rows(material)]
-    return (keys or _accuracy_keys(material))[:_KEY_FIGURES_MAX]
+    return (keys or overview_estimators.key_figures(material))[:_KEY_FIGURES_MAX]
 
 
 def _key_figure(row: Row) -> KeyFigure:
@@ -265,83 +224,29 @@ def _key_figure(row: Row) -> KeyFigure:
     return KeyFigure(f"{sign}{amount_of_change(row)}", label, evidence)
 
 
-def _means(material: Material) -> dict[str, tuple[float, int]]:
-    """Mean RMSE over sessions and their number, by estimator, best first where that is known."""
-    ranked = material.rows("accuracy_means")
-    if not (without_reference(material.results) or contradicted(material)):
-        ranked = sorted(ranked, key=lambda row: row["rmse_mm"])
-    return {row["estimator"]: (row["rmse_mm"], row["n"]) for row in ranked}
+def _further_results(material: Material) -> list[Text]:
+    """Sentences below the table of pairs, for what it has no line for.
 
-
-def _distances(material: Material) -> str:
-    """How far each estimator is from what it is held against, in the study's order: none is called the best."""
-    told = listing([f"{name} {number(mean, 1)} mm" for name, (mean, _) in _means(material).items()])
-    if without_reference(material.results):
-        return f"Root mean square distance from the smoothed readings, which is not an error: {told}."
-    return f"Root mean square error, means over all sessions, those included: {told}."
-
-
-def _of_errors(material: Material, n: int) -> tuple[str, str]:
-    """Caption and alternative text of the figure of errors on the first page."""
-    marks = f"small marks are sessions (n = {n}), large marks their means"
-    if without_reference(material.results):
-        return (
-            f"Distance from the smoothed readings (left) and lag behind them (right) of each estimator, {marks}.",
-            f"Dot plot of distance and lag from the smoothed readings by estimator over {counted(n, 'session')}.",
-        )
-    where = contradicted(material) or "An estimator that helps sits to the left in both."
-    return (
-        f"Error (left) and lag (right) of each estimator, {marks}. {where}",
-        f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
-    )
-
-
-def _accuracy_keys(material: Material) -> list[KeyFigure]:
-    if without_reference(material.results) or contradicted(material):
-        return []
-    return [
-        KeyFigure(f"{number(mean, 1)} mm", f"{name}: position error", f"mean RMSE of {counted(n, 'session')}")
-        for name, (mean, n) in _means(material).items()
-    ]
-
-
-def _evidence(material: Material) -> list[Text]:
-    """What the answer rests on: a sentence a headline, one for the questionnaires, one for the estimators."""
+    Tests of more than two conditions at once, tests of equivalence and Bayes factors, questionnaires as a whole, and
+    the estimators.
+    """
     answers: list[Text] = []
     for row in _headline_rows(material):
         if row["contrast"] is None and row["mean_difference"] is None and not ratio_to_first(row):
-            said = brief_sentence(row)
+            text = brief_sentence(row)
             if row["status"] == "ok":
-                said = f"{verdict(row, material.study.alpha)} ({said})"
-            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
+                text = f"{verdict(row, material.study.alpha)} ({text})"
+            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{text}."))
     for row in _of_conditions(material):
         if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
-            said = f"{verdict(row, material.study.alpha)} ({brief_sentence(row, with_change=False)})"
-            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{said}."))
+            text = f"{verdict(row, material.study.alpha)} ({brief_sentence(row, with_change=False)})"
+            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{text}."))
     answers += _ratings(material)
-    means = _means(material)
-    if means and (without_reference(material.results) or contradicted(material)):
-        if answers:  # else the answer at the top of the page has the same distances
-            unsure = contradicted(material)
-            answers.append((Strong("Accuracy: "), *([f"{unsure} "] if unsure else []), _distances(material)))
-    elif means:
-        best, (lowest, n) = next(iter(means.items()))
-        others = "; ".join(f"{name} {number(mean, 1)} mm" for name, (mean, _) in list(means.items())[1:])
-        tail = f" Others: {others}." if others else ""
-        answers.append(
-            (
-                Strong("Accuracy: "),
-                (
-                    f"{best} comes closest to the reference, with a root mean square error (RMSE) of"
-                    f" {number(lowest, 1)} mm on average over {counted(n, 'session')}.{tail}"
-                ),
-            )
-        )
-    return answers
+    return [*answers, *overview_estimators.statement(material, stands_alone=not answers)]
 
 
 def _ratings(material: Material) -> list[Text]:
-    """How many scales of a questionnaire differ, before and after the adjustment, over the rows of one test."""
+    """How many scales of a questionnaire differ, before and after adjustment; a sentence for each test of them."""
     answers: list[Text] = []
     alpha = material.study.alpha
     families: dict[tuple[str, str], list[Row]] = {}
@@ -353,8 +258,8 @@ def _ratings(material: Material) -> list[Text]:
         below = [row for row in rows if row["p"] is not None and row["p"] < alpha]
         text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level before adjustment"
         if any(row["p_adjusted"] is not None for row in rows):
-            kept = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
+            adjusted_below = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
             method = adjustment_label(rows[0]["adjust"])
-            text += f", and {len(kept)} after adjustment for {counted(len(rows), 'test')} ({method})"
+            text += f", and {len(adjusted_below)} after adjustment for {counted(len(rows), 'test')} ({method})"
         answers.append((Strong(f"{label}: "), f"{text}."))
     return answers

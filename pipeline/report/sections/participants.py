@@ -26,7 +26,7 @@ FOLDER = "participants"
 _MANY = 40  # of sessions or participants: the report's own tables show no more than the first rows then
 Cell = Callable[[Any], str]
 
-_SHOWN: dict[str, tuple[str, tuple[tuple[str, str, Cell], ...]]] = {
+_TABLES: dict[str, tuple[str, tuple[tuple[str, str, Cell], ...]]] = {
     "quality": (
         "The sensor streams as they were recorded.",
         (
@@ -96,30 +96,33 @@ def write(material: Material, folder: Path) -> None:
 
 
 def _by_person(material: Material) -> tuple[dict[str, dict[str, int]], dict[str, dict[str, list[Row]]]]:
-    """Each participant's sessions, with their places among all, and rows of the tables that are shown."""
+    """By participant: their sessions with their places among all, and their rows of each table shown."""
     sessions: dict[str, dict[str, int]] = {}
-    whose: dict[str, str] = {}
+    participant_of: dict[str, str] = {}
     for place, session in enumerate(material.sessions, 1):
         if session.participant is not None:
             sessions.setdefault(session.participant, {})[session.id] = place
-            whose[session.id] = session.participant
+            participant_of[session.id] = session.participant
     rows: dict[str, dict[str, list[Row]]] = {}
-    for name in _SHOWN:
+    for name in _TABLES:
         for row in material.rows(name):
-            person = whose.get(row["session"], row.get("participant"))
+            person = participant_of.get(row["session"], row.get("participant"))
             if person is not None:
                 rows.setdefault(person, {}).setdefault(name, []).append(row)
     return sessions, rows
 
 
 def _people(material: Material) -> dict[str, str]:
-    """Participants by the name of their page, which is a number: their ids may hold anything; none where few."""
-    known = {str(person) for person in material.measures["participant"].dropna()}
-    known |= {session.participant for session in material.sessions if session.participant is not None}
-    known |= {row["participant"] for row in material.rows("exclusions") if row["participant"] is not None}
-    if max(len(known), len(material.sessions)) <= _MANY:
+    """Participants by the file name of their page; empty where there are too few for pages.
+
+    Pages are numbered, because ids may hold characters that no file name can.
+    """
+    people = {str(person) for person in material.measures["participant"].dropna()}
+    people |= {session.participant for session in material.sessions if session.participant is not None}
+    people |= {row["participant"] for row in material.rows("exclusions") if row["participant"] is not None}
+    if max(len(people), len(material.sessions)) <= _MANY:
         return {}
-    return {f"{index:04d}.html": person for index, person in enumerate(sorted(known), 1)}
+    return {f"{index:04d}.html": person for index, person in enumerate(sorted(people), 1)}
 
 
 def _document(material: Material, person: str, sections: tuple[Section, ...]) -> Document:
@@ -143,19 +146,23 @@ def _measures(conditions: Sequence[str], values: Mapping[str, pd.DataFrame], per
 
 
 def _sessions(mine: Mapping[str, int], rows: Mapping[str, list[Row]], standard: str) -> Iterator[Section]:
-    """A participant's sessions, by their places, and the rows of each table; `standard` is what errors are of."""
+    """A participant's sessions and rows; `mine` has their places, `standard` is what errors are measured from."""
     blocks: list[Block] = []
     if mine:
-        blocks.append(Pages("Traces", tuple(Link(f"Traces of {one}", f"../{TRACES}#{at}") for one, at in mine.items())))
-    blocks += [_table(name, rows[name], standard) for name in _SHOWN if name in rows]
+        blocks.append(
+            Pages(
+                "Traces", tuple(Link(f"Traces of {session}", f"../{TRACES}#{place}") for session, place in mine.items())
+            )
+        )
+    blocks += [_table(name, rows[name], standard) for name in _TABLES if name in rows]
     if blocks:
         yield Section("sessions", "Sessions and gaps", tuple(blocks))
 
 
 def _table(name: str, rows: Sequence[Row], standard: str) -> Table:
-    caption, shown = _SHOWN[name]
+    caption, shown = _TABLES[name]
     titles = [title for title, _, _ in shown]
     kinds = {column.name: column.kind for column in TABLES[name].columns}
-    texts = next((at for at, (_, key, _) in enumerate(shown) if kinds[key] != TEXT), len(titles))
+    first_number = next((at for at, (_, key, _) in enumerate(shown) if kinds[key] != TEXT), len(titles))
     cells = tuple(tuple(cell(row[key]) for _, key, cell in shown) for row in rows)
-    return Table(f"table-{name}", caption.format(standard=standard), columns(titles, texts), cells)
+    return Table(f"table-{name}", caption.format(standard=standard), columns(titles, first_number), cells)

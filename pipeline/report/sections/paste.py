@@ -22,7 +22,7 @@ BIBLIOGRAPHY = "references.bib"
 
 
 def section(material: Material) -> Section:
-    """To paste."""
+    """Texts to paste."""
     methods_text = methods(material.study, material.results, used_versions())
     blocks: list[Block] = [
         Paragraph(
@@ -37,13 +37,13 @@ def section(material: Material) -> Section:
 
 
 def references(material: Material) -> list[Reference]:
-    """What the study's report rests on."""
+    """The publications and programs that the study's report rests on."""
     rows, measures = material.rows("comparisons"), material.measured()
-    return used(material.study, rows, measures, used_versions(), _shown(material))
+    return used(material.study, rows, measures, used_versions(), _cited_for_sections(material))
 
 
-def _shown(material: Material) -> Iterator[tuple[str, str]]:
-    """What sections and figures rest on that belongs to no test."""
+def _cited_for_sections(material: Material) -> Iterator[tuple[str, str]]:
+    """Keys of references.bib, with what they are cited for, of sections and figures rather than of tests."""
     if practice.section_rows(material):
         yield "newell1981", "power law of practice"
     if material.rows("fitts"):
@@ -64,10 +64,13 @@ def _results(material: Material) -> Iterator[Text]:
     study = material.study
     facts = study_facts(study.conditions, study.alpha, material.rows("descriptives"))
     rows = list(enumerate(material.rows("comparisons")))
-    lacking = {row["measure"] for _, row in rows} - {row["measure"] for _, row in rows if states_means(row, facts)}
+    # A measure none of whose sentences states means gets a sentence of its own for them, before its first test.
+    without_means = {row["measure"] for _, row in rows} - {
+        row["measure"] for _, row in rows if states_means(row, facts)
+    }
     for (measure, _), group in groupby(rows, key=lambda item: (item[1]["measure"], item[1]["test"])):
-        means = means_sentence(measure, facts) if measure in lacking else ""
-        lacking.discard(measure)
+        means = means_sentence(measure, facts) if measure in without_means else ""
+        without_means.discard(measure)
         text: list[str | Strong | CrossReference] = [f"{means} "] if means else []
         text += [part for at, row in group for part in _linked(at, row, facts)]
         yield tuple(text)

@@ -1,4 +1,4 @@
-"""The hand's way past the targets: one session closely, then every participant."""
+"""The paths of the hand past the targets: one session in full, then every participant."""
 
 from __future__ import annotations
 
@@ -21,43 +21,43 @@ def section(material: Material) -> Section | None:
     if not used or len(axes) < 2 or not material.study.estimators:
         return None
     plane = (axes[0], axes[1])
-    blocks = _one(material, used, plane)
+    blocks = _first_session(material, used, plane)
     if blocks and len(used) > 1:
-        blocks += _every(material, used, plane)
+        blocks += _every_participant(material, used, plane)
     return Section("paths", "Hand paths", tuple(blocks)) if blocks else None
 
 
-def _one(material: Material, used: list[int], plane: Plane) -> list[Block]:
+def _first_session(material: Material, used: list[int], plane: Plane) -> list[Block]:
     """The first session: the reference, what was displayed, and what the best fusion makes of it."""
     tracks, positions, events = (material.table_of(name, used[:1]) for name in _READ)
     lines = [material.study.stream_of_kind("reference"), _displayed(material, used[0]), _fused(material)]
-    there = {*positions["stream"], *tracks["estimator"]}
-    shown = [line for line in dict.fromkeys(lines) if line in there]
+    recorded = {*positions["stream"], *tracks["estimator"]}
+    shown = [line for line in dict.fromkeys(lines) if line in recorded]
     if not shown:
         return []
     return [material.drawn("path", figures.path, tracks, positions, events, shown, plane)]
 
 
-def _every(material: Material, used: list[int], plane: Plane) -> list[Block]:
-    """What each session displayed, a panel a participant."""
-    shown, more = {}, first_of(_SESSIONS_MAX, len(used), "sessions")
+def _every_participant(material: Material, used: list[int], plane: Plane) -> list[Block]:
+    """What each session displayed, one panel per participant."""
+    line_of, more = {}, first_of(_SESSIONS_MAX, len(used), "sessions")
     used = used[:_SESSIONS_MAX]
     for place in used:
         line, condition = _displayed(material, place), material.sessions[place].condition
         if line is not None and condition is not None:
-            shown[condition] = line
-    ordered = {condition: shown[condition] for condition in material.study.conditions if condition in shown}
+            line_of[condition] = line
+    ordered = {condition: line_of[condition] for condition in material.study.conditions if condition in line_of}
     if not ordered:
         return []
-    found: dict[str, list[pd.DataFrame]] = {name: [] for name in _READ}
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in _READ}
     for place in used:
         tracks, positions, events = (material.table_of(name, [place]) for name in _READ)
-        found["tracks"].append(tracks[tracks["estimator"].isin(shown.values())].iloc[::_STEP])
-        found["positions"].append(positions[positions["stream"].isin(shown.values())].iloc[::_STEP])
-        found["events"].append(events)
+        parts["tracks"].append(tracks[tracks["estimator"].isin(line_of.values())].iloc[::_STEP])
+        parts["positions"].append(positions[positions["stream"].isin(line_of.values())].iloc[::_STEP])
+        parts["events"].append(events)
     sessions = pd.DataFrame([material.sessions[place].ids for place in used])
-    whole = [pd.concat(found[name]) for name in _READ]
-    return [material.drawn("paths", figures.paths, *whole, sessions, ordered, plane, more=more)]
+    joined = [pd.concat(parts[name]) for name in _READ]
+    return [material.drawn("paths", figures.paths, *joined, sessions, ordered, plane, more=more)]
 
 
 def _displayed(material: Material, place: int) -> str | None:

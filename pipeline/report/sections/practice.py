@@ -57,7 +57,7 @@ def section_rows(material: Material) -> list[Row]:
 
 
 def _meaning(material: Material, rows: Sequence[Row]) -> Iterator[str]:
-    """In plain words: who became faster, where it had not ended, and what that does to the comparison."""
+    """In plain words: where people became faster, where they still did at the end, what that does to means."""
     alpha, conditions = material.study.alpha, material.study.conditions
     of_conditions = [row for row in rows if row["trials"] == ALL_TRIALS and row["contrast"] in conditions]
     pairs = [row for row in rows if row["trials"] == ALL_TRIALS and row["contrast"] not in conditions]
@@ -78,12 +78,12 @@ def _meaning(material: Material, rows: Sequence[Row]) -> Iterator[str]:
             f"In {listing(unfinished)} they were still becoming faster in the last half of the trials, so more practice"
             " would change the means that are compared."
         )
-    yield from _of_pairs(pairs, alpha)
+    yield from _meaning_of_pairs(pairs, alpha)
     if faster or slower:
-        yield from _of_orders(material)
+        yield from _meaning_of_order(material)
 
 
-def _of_pairs(pairs: Sequence[Row], alpha: float) -> Iterator[str]:
+def _meaning_of_pairs(pairs: Sequence[Row], alpha: float) -> Iterator[str]:
     if not pairs:
         return
     differ = [row for row in pairs if _significant(row, alpha)]
@@ -97,7 +97,7 @@ def _of_pairs(pairs: Sequence[Row], alpha: float) -> Iterator[str]:
         yield "No difference in practice was found between conditions, so nothing says that it favoured one of them."
 
 
-def _of_orders(material: Material) -> Iterator[str]:
+def _meaning_of_order(material: Material) -> Iterator[str]:
     """Whether practice may also have gone from one condition to the next."""
     remarks = [row["remark"] for row in material.rows("design_check") if row["what"] in _ORDER_CHECKS and row["remark"]]
     if remarks:
@@ -141,7 +141,7 @@ def _table(rows: Sequence[Row], conditions: Sequence[str]) -> Table:
 
 
 def _change(row: Row) -> str:
-    """`−7.0 %` of the time; nothing for a pair, whose ratio is one of ratios."""
+    """`−7.0 %` of the time when trials double; `NO_VALUE` for a pair, whose figure is a ratio of two such ratios."""
     if row["first_trial_s"] is None and row["trials"] == ALL_TRIALS:
         return NO_VALUE
     change = row["ratio_when_trials_double"] - 1

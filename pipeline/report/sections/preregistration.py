@@ -1,4 +1,4 @@
-"""What was preregistered beside what was done; nothing at all where a study has no preregistered.yaml."""
+"""What was preregistered beside what was done; empty where a study has no preregistered.yaml."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def notice(material: Material) -> Iterator[Block]:
 
 
 def caution(material: Material) -> Iterator[Text]:
-    """For the first page: that the file is not as it was written."""
+    """For the first page: a warning where preregistered.yaml was changed after it was written."""
     for row in material.rows("preregistration"):
         if row["verdict"] == ALTERED:
             stated, has = row["planned"][:_DIGEST_SHOWN], row["done"][:_DIGEST_SHOWN]

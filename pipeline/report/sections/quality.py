@@ -1,4 +1,4 @@
-"""What the logs were like, and everything that was left out."""
+"""The quality of the logs, session by session, and everything that is missing or was excluded."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pipeline.report import figures
-from pipeline.report import traffic_lights as session_quality
+from pipeline.report import figures, traffic_lights
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections import checks, timeline
 from pipeline.report.sections.material import Material
@@ -35,7 +34,7 @@ def section(material: Material) -> Section:
         elif material.rows("accuracy"):
             blocks.append(
                 Paragraph(
-                    ("No session holds a still stretch of a second or more, so the sensors' noise cannot be told.",)
+                    ("No session holds a still stretch of a second or more, so the sensors' noise cannot be measured.",)
                 )
             )
     if any(row["in_log"] == 0 or row["carried"] or row["left_out"] for row in material.rows("phones")):
@@ -50,54 +49,55 @@ def section(material: Material) -> Section:
 
 
 def _lights(material: Material) -> list[Block]:
-    """How many sessions are green, amber and red, and what it is in each."""
-    found: dict[str, list[Judged]] = {}
+    """How many sessions are green, amber and red, and what decides it in each."""
+    by_session: dict[str, list[Judged]] = {}
     rows = (material.rows(name) for name in ("quality", "replay_agreement", "checks"))
-    judged = session_quality.judged(material.study, *rows)
-    for one in judged:
-        found.setdefault(one.session, []).append(one)
-    lights = [light_of(figures) for figures in found.values()]
+    judged = traffic_lights.judged(material.study, *rows)
+    for figure in judged:
+        by_session.setdefault(figure.session, []).append(figure)
+    lights = [light_of(figures) for figures in by_session.values()]
     shares = [f"{lights.count(light)} {SYMBOLS[light]} {light}" for light in LIGHTS[1:]]
-    facts = [fact for fact in FACTS if any(one.fact == fact for one in judged)]
-    ordered = sorted(found.items(), key=lambda item: -LIGHTS.index(light_of(item[1])))
+    facts = [fact for fact in FACTS if any(figure.fact == fact for figure in judged)]
+    ordered = sorted(by_session.items(), key=lambda item: -LIGHTS.index(light_of(item[1])))
     cells = tuple((session, *_session_lights(figures, facts)) for session, figures in ordered[:_ROWS_MAX])
     more = f" The worst {_ROWS_MAX} of {len(ordered)}." if len(ordered) > _ROWS_MAX else ""
-    limits = session_quality.limits_text(material.study.quality_limits)
+    limits = traffic_lights.limits_text(material.study.quality_limits)
     table = Table(
         "table-lights",
-        f"Each session's quality at a glance, the worst first: a light, what it is of, and how far it is off.{more}",
+        f"Each session's quality at a glance, the worst first: its light, and the worst of each kind of figure.{more}",
         columns(("Session", "Light", *facts), len(facts) + 2),
         cells,
-        f"Amber from here on (red): {limits}. A rate is held against the one that study.yaml states, or the median of "
-        "three sessions and more; quality_limits in study.yaml moves the limits. Checks: what the readings "
-        "say of each other and of study.yaml, in the table of checks. No session is excluded because of its light.",
+        f"Amber from these limits on (red from those in brackets): {limits}. A rate is compared with the one that"
+        " study.yaml states, or with the median of three or more sessions; quality_limits in study.yaml moves the"
+        " limits. Checks: whether the readings fit each other and study.yaml; see the table of checks. No session is"
+        " excluded because of its light.",
     )
-    text = f"{counted(len(found), 'session')}: {listing(shares)}.{_not_whole(material)}"
+    text = f"{counted(len(by_session), 'session')}: {listing(shares)}.{_missing_sessions(material)}"
     return [Paragraph((Strong("Quality: "), text)), table]
 
 
 def _session_lights(figures: Sequence[Judged], facts: Sequence[str]) -> tuple[str, ...]:
     """A session's light, and the worst figure of each fact."""
     light = light_of(figures)
-    of_fact = [_fact_light([one for one in figures if one.fact == fact]) for fact in facts]
+    of_fact = [_fact_light([figure for figure in figures if figure.fact == fact]) for fact in facts]
     return f"{SYMBOLS[light]} {light}", *of_fact
 
 
 def _fact_light(figures: Sequence[Judged]) -> str:
     """The worst of a fact's figures, and how many others are as bad."""
-    worst = session_quality.worst(figures)
+    worst = traffic_lights.worst(figures)
     if worst is None:
         return NO_VALUE
-    others = sum(one.light == worst.light for one in figures) - 1
+    others = sum(figure.light == worst.light for figure in figures) - 1
     return worst.text + (f" and {others} more" if others and worst.light in ("amber", "red") else "")
 
 
-def _not_whole(material: Material) -> str:
-    """How many sessions are not in this report, or not as a whole."""
+def _missing_sessions(material: Material) -> str:
+    """How many sessions were set aside or read only in part."""
     what = [row["what"] for row in material.rows("exclusions")]
-    told = (("session set aside", "set aside"), ("session read in part", "read in part"))
-    parts = [f"{counted(what.count(name), 'session')} {said}" for name, said in told if name in what]
-    return f" Beside these lights: {listing(parts)}; the table of exclusions says why." if parts else ""
+    wording = (("session set aside", "set aside"), ("session read in part", "read in part"))
+    parts = [f"{counted(what.count(name), 'session')} {words}" for name, words in wording if name in what]
+    return f" In addition, {listing(parts)}; the table of exclusions says why." if parts else ""
 
 
 def _quality_table(material: Material) -> Table:
@@ -149,7 +149,7 @@ def _milliseconds(seconds: float | None) -> str:
 
 
 def _orientation_table(material: Material) -> Table:
-    """Where orientations came from, where not all of them stood in the logs."""
+    """Where the orientation of each acceleration came from, shown if not all of them were logged."""
     cells = tuple(
         (row["session"], row["stream"], *(f"{row[key]}" for key in ("in_log", "carried", "found", "left_out")))
         for row in material.rows("phones")[:_ROWS_MAX]
@@ -166,7 +166,7 @@ def _orientation_table(material: Material) -> Table:
 
 
 def _mounting_table(material: Material) -> Table:
-    """What was learned of each phone's mounting."""
+    """What was learned about each phone's mounting: rotation and lever arm."""
     learned = [row for row in material.rows("phones") if row["calibrated_until_s"] is not None]
 
     def three(row: Row, key: str, unit: str, digits: int) -> str:
@@ -195,7 +195,7 @@ def _mounting_table(material: Material) -> Table:
 
 
 def _noise(material: Material) -> list[Block]:
-    """The sensors' noise in still stretches, against what study.yaml states."""
+    """The sensors' noise while nothing moved, beside what study.yaml states."""
     rows = pd.DataFrame(material.rows("sensor_noise"))
     names = [name for name in material.study.streams if name in set(rows["stream"])]
     units = pd.Series({name: str(rows.loc[rows["stream"] == name, "unit"].iloc[0]) for name in names})
@@ -224,7 +224,7 @@ def _noise(material: Material) -> list[Block]:
         material.drawn("sensor-noise", figures.noise, _residuals(material, names), units),
         Table(
             "table-noise",
-            "Sensor noise in each session's longest still stretch, beside the noise the estimators are told.",
+            "Sensor noise in each session's longest still stretch, beside the noise that the estimators assume.",
             columns(titles, 3),
             cells,
             "Still: the reference moves slower than 20 mm/s."
@@ -235,7 +235,10 @@ def _noise(material: Material) -> list[Block]:
 
 
 def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:
-    """Every session's residuals by stream; session by session, and names as numbers, for there may be millions."""
+    """Residuals by stream, of all sessions.
+
+    There may be millions, so they are read session by session and names are kept as numbers (categoricals).
+    """
     parts = []
     for place in range(len(material.sessions)):
         rows = material.table_of("noise_residuals", [place])[["stream", "residual"]]
@@ -262,27 +265,27 @@ def _agreement_table(material: Material) -> Table:
     )
 
 
-def _lacking(material: Material) -> list[str]:
-    """What is not in the report although no row of the exclusions says so."""
+def _not_in_exclusions(material: Material) -> list[str]:
+    """What is missing from the report although the table of exclusions has no row for it."""
     unused = sum(row["left_out"] for row in material.rows("phones"))
     undefined = sum(row["status"] != "ok" for row in material.rows("comparisons"))
     lost = [row for row in material.rows("quality") if row["messages_lost"] is None or row["messages_lost"]]
-    said = (
+    causes = (
         (unused, f"{counted(unused, 'acceleration')} of unknown orientation could not be used"),
         (undefined, f"{counted(undefined, 'comparison')} cannot be computed"),
         (len(lost), f"messages were lost in {counted(len(lost), 'stream')}, or nobody can say whether any were"),
     )
-    return [text for count, text in said if count]
+    return [text for count, text in causes if count]
 
 
 def _exclusions(material: Material) -> list[Block]:
     rows = material.rows("exclusions")
     if not rows:
-        lacking = _lacking(material)
-        whole = "Nothing was left out: every session, participant and value of the study is in this report."
-        if lacking:
-            whole = f"No session, participant or value was left out as a whole; but {listing(lacking)}."
-        return [Paragraph((whole,))]
+        missing = _not_in_exclusions(material)
+        text = "Nothing was left out: every session, participant and value of the study is in this report."
+        if missing:
+            text = f"No session, participant or value was left out as a whole; but {listing(missing)}."
+        return [Paragraph((text,))]
     titles = ("Participant", "Condition", "Session", "Measure", "What", "Reason")
     cells = tuple(
         (

@@ -51,11 +51,11 @@ _NOTE_SELECTION = (
 )
 
 
-def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Document:
-    """The whole report. `studies` are as in results.json, `found` its tables; figures go into the folder `drawn`."""
+def document(studies: Sequence[Row], results: Mapping[str, pd.DataFrame], drawn: Path) -> Document:
+    """The whole report of `studies` and `results`, the tables of results.json; figures go into the folder `drawn`."""
     origins = dict.fromkeys(ORIGINS[study["data_origin"]] for study in studies)
-    sections = [Section("variants", "Variants side by side", tuple(_variants(studies, found, drawn)))]
-    left_out = _left_out(found["replay_exclusions"])
+    sections = [Section("variants", "Variants side by side", tuple(_variants(studies, results, drawn)))]
+    left_out = _left_out(results["replay_exclusions"])
     if left_out is not None:
         sections.append(Section("exclusions", "Missing or excluded", (left_out,)))
     sections.append(Section("provenance", "Provenance", (_studies(studies), libraries())))
@@ -63,8 +63,8 @@ def document(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: P
     return Document("Variants of estimators", subtitle, " ".join(origins), tuple(sections))
 
 
-def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: Path) -> Iterator[Block]:
-    every = list(tables.records("replay_means", found["replay_means"]))
+def _variants(studies: Sequence[Row], results: Mapping[str, pd.DataFrame], drawn: Path) -> Iterator[Block]:
+    every = list(tables.records("replay_means", results["replay_means"]))
     yield Paragraph(
         (
             "Every variant was run over the same raw streams and asked, at the arrival of each acceleration, where the"
@@ -72,7 +72,7 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
             " settings.",
         )
     )
-    if (found["accuracy"]["reference"] == SMOOTHED).any():
+    if (results["accuracy"]["reference"] == SMOOTHED).any():
         yield Paragraph((Strong("No reference was recorded in some study."), SMOOTHED_REMARK))
     cautions = list(in_doubt(studies))
     if cautions:
@@ -80,10 +80,11 @@ def _variants(studies: Sequence[Row], found: Mapping[str, pd.DataFrame], drawn: 
     for index, study in enumerate([None, *(study["name"] for study in studies)]):
         rows = [row for row in every if row["study"] == study]
         if rows:
-            of = found["accuracy"]
-            standard = reference_phrase(of["reference"] if study is None else of.loc[of["study"] == study, "reference"])
+            accuracy = results["accuracy"]
+            of_study = accuracy if study is None else accuracy[accuracy["study"] == study]
+            standard = reference_phrase(of_study["reference"])
             where = "all studies together" if study is None else f"study “{study}”"
-            yield from _one(rows, where, standard, drawn / f"trade-off-{index}.svg")
+            yield from _table_and_figure(rows, where, standard, drawn / f"trade-off-{index}.svg")
     if all(row["rank"] is None for row in every):
         return
     yield Notice(
@@ -109,12 +110,12 @@ def in_doubt(studies: Sequence[Row]) -> Iterator[str]:
             )
 
 
-def _one(rows: Sequence[Row], where: str, standard: str, path: Path) -> Iterator[Block]:
+def _table_and_figure(rows: Sequence[Row], where: str, standard: str, path: Path) -> Iterator[Block]:
     """One study's table and figure, or those of all together."""
     best = rows[0]
     if best["rank"] is not None:
         evidence = f"RMSE {_with_interval(best, 'rmse')} mm over {counted(best['n'], 'session')}."
-        yield Paragraph((Strong(f"Least error, {where}: {_called(best)}. "), evidence))
+        yield Paragraph((Strong(f"Least error, {where}: {_label(best)}. "), evidence))
     selections = any(row["selection_n"] for row in rows)
     titles = _TITLES + (_AT_SELECTION if selections else ())
     shown = f" The first {_ROWS_MAX} of {len(rows)}." if len(rows) > _ROWS_MAX else ""
@@ -136,7 +137,7 @@ def _one(rows: Sequence[Row], where: str, standard: str, path: Path) -> Iterator
         yield draw_now(path, figures.trade_off, tables.frame("replay_means", ranked))
 
 
-def _called(row: Row) -> str:
+def _label(row: Row) -> str:
     return str(row["variant"] or row["estimator"])
 
 
@@ -145,7 +146,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     if row["lag_low_s"] is not None:
         lag += f" [{milliseconds(row['lag_low_s'])}, {milliseconds(row['lag_high_s'])}]"
     return (
-        _called(row),
+        _label(row),
         NO_VALUE if row["rank"] is None else str(row["rank"]),
         str(row["n"]),
         _with_interval(row, "rmse"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.report.prose.answer import HEADER, Line, answer, shown
+from pipeline.report.prose.answer import HEADER, Line, answer, lines_for_first_page
 from tests.pipeline.analysis.test_options import Values, study
 from tests.pipeline.helpers import Steadyhand, as_printed
 
@@ -142,6 +142,6 @@ def test_the_first_page_has_the_lines_as_a_table(steadyhand: Steadyhand, tmp_pat
 
 def test_too_many_lines_are_cut_between_measures() -> None:
     lines = [Line(name, pair, "", "", "", "", None) for name in ("m", "n", "o") for pair in ("b − a", "c − a")]
-    assert [line.measure for line in shown(lines, most=5)] == ["m", "m", "n", "n"]
-    assert [line.measure for line in shown(lines, most=1)] == ["m", "m"]
-    assert shown(lines) == lines
+    assert [line.measure for line in lines_for_first_page(lines, most=5)] == ["m", "m", "n", "n"]
+    assert [line.measure for line in lines_for_first_page(lines, most=1)] == ["m", "m"]
+    assert lines_for_first_page(lines) == lines

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.patches import Circle, Ellipse
 
 from pipeline.report import figures
-from pipeline.report.figures.hand_paths import way
+from pipeline.report.figures.hand_paths import points_of
 from pipeline.report.figures.layout import targets_of
 from pipeline.report.figures.selections import ellipse_95, offsets_mm
 from pipeline.tables import table as tables
@@ -82,7 +82,7 @@ def test_a_path_has_its_lines_targets_and_selections(session: Any, tmp_path: Pat
 
 def test_a_path_is_thinned_in_the_order_of_time(session: Any) -> None:
     tracks, positions, _ = session
-    points = way(tracks.sample(frac=1, random_state=1), positions, "fusion", ("x", "y"))
+    points = points_of(tracks.sample(frac=1, random_state=1), positions, "fusion", ("x", "y"))
     assert 700 < len(points) <= 1500
     assert np.all(np.diff(points[:, 0]) > 0)
 
