@@ -7,7 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from pipeline.sessions.checks import agreement, counts, events, force, noise, orientation, publishers, repeats, stamps
+from pipeline.sessions.checks import (
+    agreement,
+    clocks,
+    counts,
+    events,
+    force,
+    jumps,
+    noise,
+    one_movement,
+    orientation,
+    publishers,
+    reference,
+    repeats,
+    stamps,
+)
 from pipeline.sessions.checks.finding import Finding, Status, rows_of
 from pipeline.sessions.checks.recorded import Recorded
 from pipeline.tables.table import Row
@@ -21,12 +35,15 @@ CHECKS: tuple[Check, ...] = (
     stamps.bursts,
     stamps.regular,
     stamps.clock,
+    clocks.offset,
+    clocks.together,
     counts.missing,
     counts.unusable,
     publishers.frame_ids,
     publishers.publishers,
     repeats.zeros,
     repeats.held,
+    jumps.jumps,
     repeats.frozen,
     repeats.clipped,
     force.specific_force,
@@ -36,9 +53,11 @@ CHECKS: tuple[Check, ...] = (
     orientation.gyroscope,
     orientation.covariances,
     agreement.speed,
+    one_movement.one_movement,
     agreement.lag,
     agreement.size,
     agreement.frame,
+    reference.reference,
     noise.tracker_noise,
     noise.accelerometer_noise,
     events.targets,

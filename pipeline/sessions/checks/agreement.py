@@ -13,7 +13,7 @@ from pipeline.sessions.checks.recorded import Imu, Positions, Recorded
 LAG, SIZE, AXES, SPEED = "lag", "size of the movement", "frame of the movement", "speed"
 
 _EXPLAINED_MIN = 0.15  # of the movement; recordings without a fault reach 0.66 to 0.99
-_LAG_AMBER_S, _LAG_RED_S = 0.03, 0.075  # recordings without a fault are within 0.01
+LAG_AMBER_S, LAG_RED_S = 0.03, 0.075  # recordings without a fault are within 0.01
 _UPRIGHT_S = 0.015  # an orientation from gyroscope and accelerometer alone bends the lag by up to 0.026
 _LAG_CERTAIN_S = 0.012  # by how much the nearer end of the interval must be off
 _LAG_WIDE_S = 0.15
@@ -23,7 +23,17 @@ _TURN_CERTAIN_DEG = 15.0
 _SURE = 0.99
 _SPEED_MM_S = 8_000.0  # a thrown ball is faster; a hand that points is not, over 0.2 s and in one reading of ten
 _OVER_S = 0.2
-_UNITS = ((1000.0, "millimetres where metres are expected"), (100.0, "centimetres where metres are expected"))
+_DRIFTS_S = 0.1  # from one half of the session to the other
+_UNITS = (
+    (1000.0, "millimetres"),
+    (100.0, "centimetres"),
+    (39.37, "inches"),
+    (10.0, "decimetres"),
+    (3.281, "feet"),
+    (0.001, "kilometres"),
+)
+_FORCES = ((1e3, "mm/s²"), (1e2, "cm/s² or thousandths of g"), (3.281, "feet/s²"), (1 / 9.80665, "g"))
+_UNIT_NEAR = 1.15  # the figure of the size is bent by up to a third, mostly by far less
 
 
 def see_one_movement(motion: Compared | None) -> bool:
@@ -46,23 +56,31 @@ def lag(recorded: Recorded) -> Iterator[Finding]:
     if tracker is None or imu is None:
         return
     motion, stated_s = recorded.motion, expected_lag_s(tracker, imu)
-    expected = f"{_ms(stated_s)} by study.yaml"
+    expected = f"{in_ms(stated_s)} by study.yaml"
     if motion is None or not see_one_movement(motion) or motion.lag_s.width > _LAG_WIDE_S:
         yield Finding(LAG, "green", "cannot be told from this movement", expected)
         return
-    found = _lag_text(motion.lag_s)
+    found = lag_text(motion.lag_s)
     off_s = motion.lag_s.value - stated_s
     nearer_s = max(motion.lag_s.low - stated_s, stated_s - motion.lag_s.high)
     slack_s = 0.0 if np.isfinite(motion.turn_deg.value) else _UPRIGHT_S
-    status = graded(abs(off_s) - slack_s, _LAG_AMBER_S, _LAG_RED_S)
+    status = graded(abs(off_s) - slack_s, LAG_AMBER_S, LAG_RED_S)
     if status == "green" or nearer_s < _LAG_CERTAIN_S + slack_s:
         yield Finding(LAG, "green", found, expected)
+        return
+    if abs(motion.drift_s) > _DRIFTS_S:
+        message = (
+            f'how much later the stamps of "{tracker.name}" are than those of "{imu.name}" changes by '
+            f"{in_ms(abs(motion.drift_s))} between the halves of the session: one clock runs faster, or was set; log "
+            "both with one clock"
+        )
+        yield Finding(LAG, status, found, expected, message)
         return
     yield Finding(LAG, status, found, expected, _lag_message(tracker, imu, motion.lag_s.value, off_s))
 
 
 def _lag_message(tracker: Positions, imu: Imu, lag_s: float, off_s: float) -> str:
-    later = f'the stamps of "{tracker.name}" are {_ms(lag_s)} later than those of "{imu.name}"'
+    later = f'the stamps of "{tracker.name}" are {in_ms(lag_s)} later than those of "{imu.name}"'
     if off_s > 0 and tracker.times.late_s == 0:
         latency = f"{max(0.0, lag_s + imu.times.late_s):.2f}"
         return (
@@ -71,21 +89,23 @@ def _lag_message(tracker: Positions, imu: Imu, lag_s: float, off_s: float) -> st
         )
     if tracker.times.late_s > 0:
         return (
-            f"{later} and study.yaml says {_ms(tracker.times.late_s - imu.times.late_s)}: set latency_s: "
+            f"{later} and study.yaml says {in_ms(tracker.times.late_s - imu.times.late_s)}: set latency_s: "
             f"{max(0.0, lag_s + imu.times.late_s):.2f} on it, or correct the clock of one of the two"
         )
     return (
-        f'the stamps of "{imu.name}" are {_ms(-lag_s)} later than those of "{tracker.name}": the phone probably stamps '
-        "on arrival, or the clocks differ; set stamp: arrival and latency_s on it, or correct the clocks"
+        f'the stamps of "{imu.name}" are {in_ms(-lag_s)} later than those of "{tracker.name}": the phone probably '
+        "stamps on arrival, or the clocks differ; set stamp: arrival and latency_s on it, or correct the clocks"
     )
 
 
-def _lag_text(lag_s: Interval) -> str:
-    return f"{_ms(lag_s.value)} [{1e3 * lag_s.low:.0f}, {1e3 * lag_s.high:.0f}]"
+def lag_text(lag_s: Interval) -> str:
+    """A lag with its interval, in milliseconds."""
+    return f"{in_ms(lag_s.value)} [{1e3 * lag_s.low:.0f}, {1e3 * lag_s.high:.0f}]"
 
 
-def _ms(seconds: float) -> str:
-    return f"{1e3 * seconds:.0f} ms"
+def in_ms(seconds: float) -> str:
+    """A time in whole milliseconds, as messages have it."""
+    return f"{round(1e3 * seconds)} ms"
 
 
 def size(recorded: Recorded) -> Iterator[Finding]:
@@ -105,21 +125,27 @@ def size(recorded: Recorded) -> Iterator[Finding]:
     yield Finding(SIZE, status, found, expected, _size_message(tracker, imu, motion.scale.value))
 
 
+def unit_of_positions(factor: float) -> str:
+    """What positions that are so many times too large are in where metres are expected; "" if no unit is near."""
+    near = [unit for size, unit in _UNITS if 1 / _UNIT_NEAR < factor / size < _UNIT_NEAR]
+    return f"{near[0]} where metres are expected" if near else ""
+
+
 def _size_message(tracker: Positions, imu: Imu, scale: float) -> str:
-    for factor, unit in _UNITS:
-        if factor / 2 < scale < factor * 2:
-            return (
-                f'"{tracker.name}" moves {_times(scale)} as far as "{imu.name}" says: its positions are probably in '
-                f"{unit}; convert to metres when logging"
-            )
+    start = f'"{tracker.name}" moves {_times(scale)} as far as "{imu.name}" says: '
+    position = unit_of_positions(scale)
+    force = [unit for size, unit in _FORCES if 1 / _UNIT_NEAR < 1 / scale / size < _UNIT_NEAR]
+    if position and force:
+        return f"{start}its positions are in {position}, or the accelerations in {force[0]}; log metres and m/s²"
+    if position:
+        return f"{start}its positions are probably in {position}; convert to metres when logging"
+    if force:
+        return f"{start}the accelerations are probably in {force[0]} where m/s² is expected; log m/s²"
     if scale > 1:
-        return (
-            f'"{tracker.name}" moves {_times(scale)} as far as "{imu.name}" says: its positions or the accelerations '
-            "are in another unit (g is 9.8 m/s²); log metres and m/s²"
-        )
+        return f"{start}its positions or the accelerations are in another unit (g is 9.8 m/s²); log metres and m/s²"
     return (
-        f'"{tracker.name}" moves {_times(scale)} as far as "{imu.name}" says: positions or accelerations are in '
-        "another unit, or the tracker holds still while the phone moves; log metres and m/s²"
+        f"{start}positions or accelerations are in another unit, or the tracker holds still while the phone moves; log "
+        "metres and m/s²"
     )
 
 

@@ -13,6 +13,7 @@ from pipeline.sessions.checks.turns import turned
 from pipeline.statistics.arrays import FloatArray
 
 _EXPLAINS_M_S2 = 0.7  # of the mean that is left once the mistake is undone
+_TURNED_DEG = 15.0
 _AT_MOST = 2000  # readings looked at: a mean needs no more
 _G_M_S2 = 9.80665
 
@@ -35,6 +36,8 @@ def causes(imu: Imu, motion: Compared | None) -> list[Cause]:
     quaternion = imu.orientation_xyzw[imu.oriented][::step]
     gravity = np.array(imu.gravity_mm_s2) / 1e3 if imu.gravity_mm_s2 is not None else None
     flipped = motion is not None and motion.mirrored > 0.9 and motion.axes == "-x -y -z"
+    as_phone = motion is not None and motion.explained > 0.3 and motion.mirrored < 0.1
+    turned_away = motion is not None and motion.turn_deg.low > _TURNED_DEG
     likely = []
     for text, tried_force, tried_turn, tried_gravity in _tried(force, quaternion, gravity):
         upright = turned(tried_turn, tried_force)
@@ -46,8 +49,8 @@ def causes(imu: Imu, motion: Compared | None) -> list[Cause]:
             likely.append(Cause(text, left))
     if flipped:
         likely = [cause for cause in likely if "sign is flipped" in cause.text] or likely
-    elif motion is not None and motion.explained > 0.3 and motion.mirrored < 0.1:
-        likely = [cause for cause in likely if "gravity_mm_s2" in cause.text] or likely
+    elif as_phone:  # a wrong gravity_mm_s2 leaves the movement as it is, a wrong axis or orientation does not
+        likely = [cause for cause in likely if ("gravity_mm_s2" in cause.text) != turned_away] or likely
     return likely
 
 
@@ -96,3 +99,36 @@ def _tried(
             quaternion,
             gravity,
         )
+    for pair in ("xy", "yz", "xz"):
+        both = force * np.where([name in pair for name in "xyz"], -1.0, 1.0)
+        yield (
+            f"the accelerometer's {pair[0]} and {pair[1]} axes point the other way; change their signs when logging",
+            both,
+            quaternion,
+            gravity,
+        )
+    for axis, name in enumerate("xyz"):
+        for sign, how in ((1.0, "+90°"), (-1.0, "-90°")):
+            yield (
+                f"the accelerometer's axes are turned by {how} about {name}, as by the screen's orientation; log the "
+                "device's own axes",
+                _quarter(force, axis, sign),
+                quaternion,
+                gravity,
+            )
+    size = float(np.linalg.norm(turned(quaternion, force).mean(axis=0)))
+    if gravity is not None and size > 0 and abs(size / _G_M_S2 - 1) > 0.2:
+        yield (
+            f"its values are {size / _G_M_S2:.2g} times too large: another unit (3.3 times is feet/s²); log m/s²",
+            force * _G_M_S2 / size,
+            quaternion,
+            gravity,
+        )
+
+
+def _quarter(force: FloatArray, axis: int, sign: float) -> FloatArray:
+    """Turned by a quarter about an axis, the other way round than the mistake that it undoes."""
+    before, after = (axis + 1) % 3, (axis + 2) % 3
+    found = force.copy()
+    found[:, before], found[:, after] = sign * force[:, after], -sign * force[:, before]
+    return found

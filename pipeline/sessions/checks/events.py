@@ -20,6 +20,9 @@ _SHIFTS_S = np.arange(-5.0, 5.001, 0.05)
 _OFF_MM, _OFF_RED_MM = 10.0, 50.0
 _SELECTIONS_MIN = 3
 _AS_LOW_MM = 0.5
+_OTHER_SIZE = 3.0  # times as wide as the task
+_FRAME_MIN, _FRAME_FLAT = 6, 0.02  # selections; the second dimension beside the first
+_LEFT_MM = 100.0  # at most, where a mistake is the right one
 _EXPLAINS = 0.4  # of the distance that is left once a mistake is undone
 
 
@@ -31,32 +34,52 @@ def targets(recorded: Recorded) -> Iterator[Finding]:
     if not len(there):
         return
     if recorded.targets_mm is not None and len(recorded.targets_mm):
-        yield from _against_task(there[:, :2], recorded.targets_mm, max(recorded.target_size_mm, _AT_LEAST_MM))
+        tolerance_mm = max(recorded.target_size_mm, _AT_LEAST_MM)
+        yield from _against_task(there[:, :2], recorded.targets_mm, tolerance_mm, recorded.px_per_mm)
     else:
         yield from _against_reach(recorded, there)
 
 
-def _against_task(there: FloatArray, task: FloatArray, tolerance_mm: float) -> Iterator[Finding]:
+def _against_task(
+    there: FloatArray, task: FloatArray, tolerance_mm: float, px_per_mm: float | None
+) -> Iterator[Finding]:
     off = _nearest_mm(there, task)
     wrong = int(np.sum(off > tolerance_mm))
     found, expected = f"{wrong} of {len(there)} where the task has none", "0"
     if wrong == 0:
         yield Finding(TARGETS, "green", found, expected)
         return
-    tried = {
-        "they are in millimetres where metres are expected; log metres": there / 1e3,
-        "they are in centimetres where metres are expected; log metres": there / 1e2,
-        "x and y are exchanged; log them in the tracker's order": there[:, ::-1],
-        "y points the other way; log it in the tracker's frame": there * np.array([1.0, -1.0]),
-    }
+    tried = _mistakes(there, px_per_mm)
+    shift = np.unique(there, axis=0).mean(axis=0) - task.mean(axis=0)
+    tried[f"all are off by ({shift[0]:.0f}, {shift[1]:.0f}) mm; log them in the tracker's frame"] = there - shift
     left = {cause: float(np.mean(_nearest_mm(points, task) > tolerance_mm)) for cause, points in tried.items()}
     cause = min(left, key=lambda one: left[one])
     if left[cause] > 0.5 * wrong / len(there):
+        size = float(np.std(there) / max(np.std(task), 1e-9))
         cause = "they are of another frame or task; correct task: in study.yaml or the events"
+        if not 1 / _OTHER_SIZE < size < _OTHER_SIZE:
+            cause = f"they spread {size:.3g} times as far: pixels or another unit; log metres in the tracker's frame"
     status: Status = "red" if wrong > len(there) / 2 else "amber"
     example = ", ".join(f"{value:.0f}" for value in there[int(np.argmax(off))])
     message = f"{wrong} of {len(there)} targets are where the task has none, such as ({example}) mm: {cause}"
     yield Finding(TARGETS, status, found, expected, message)
+
+
+def _mistakes(points: FloatArray, px_per_mm: float | None) -> dict[str, FloatArray]:
+    """Points (n, 2) with each mistake undone, by its words and remedy."""
+    tried = {
+        "they are in millimetres where metres are expected; log metres": points / 1e3,
+        "they are in centimetres where metres are expected; log metres": points / 1e2,
+        "x and y are exchanged; log them in the tracker's order": points[:, ::-1],
+        "y points the other way; log it in the tracker's frame": points * np.array([1.0, -1.0]),
+        "x points the other way; log it in the tracker's frame": points * np.array([-1.0, 1.0]),
+        "x and y point the other way; log them in the tracker's frame": -points,
+    }
+    if px_per_mm is not None:
+        pixels = points / 1e3 / px_per_mm
+        tried["they are in pixels where metres are expected; log metres"] = pixels
+        tried["they are in pixels with y downwards; log metres in the tracker's frame"] = pixels * np.array([1.0, -1.0])
+    return tried
 
 
 def _nearest_mm(points: FloatArray, task: FloatArray) -> FloatArray:
@@ -124,7 +147,7 @@ def selections(recorded: Recorded) -> Iterator[Finding]:
     off = _apart(shown, time, at)
     here = float(np.median(off))
     found, expected = f"{here:.3g} mm from {shown.name}", "as displayed"
-    cause = _selection_cause(shown, time, at, here) if here > _limit(shown, time, at) else ""
+    cause = _selection_cause(shown, time, at, here, recorded.px_per_mm) if here > _limit(shown, time, at) else ""
     if not cause:
         yield Finding(SHOWN, "green", found, expected)
         return
@@ -139,18 +162,14 @@ def _limit(shown: Positions, time: FloatArray, at: FloatArray) -> float:
     return max(_OFF_MM, 4.0 * float(np.sqrt(2.0)) * (shown.noise_sd_mm or 0.0))
 
 
-def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: float) -> str:
+def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: float, px_per_mm: float | None) -> str:
     """The mistake that explains most of the distance, in words; "" if none does."""
     shifts = np.array([float(np.mean(_apart(shown, time + shift, at))) for shift in _SHIFTS_S])
     best = _middle_of_lowest(shifts)
-    tried = {
-        "they are in millimetres where metres are expected; log metres": at / 1e3,
-        "x and y are exchanged; log them in the tracker's order": at[:, ::-1],
-        "y points the other way; log it in the tracker's frame": at * np.array([1.0, -1.0]),
-    }
+    tried = _mistakes(at, px_per_mm)
     left = {cause: float(np.median(_apart(shown, time, points))) for cause, points in tried.items()}
     likely = min(left, key=lambda one: left[one])
-    if left[likely] < min(_EXPLAINS * here, float(shifts[best])):
+    if left[likely] < min(_EXPLAINS * here, float(shifts[best]), _LEFT_MM):
         return likely
     if shifts[best] < _EXPLAINS * here and abs(_SHIFTS_S[best]) >= 0.1:
         by = _SHIFTS_S[best]
@@ -158,6 +177,9 @@ def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: f
             f"they fit {abs(by):.1f} s {'earlier' if by < 0 else 'later'}, so the events' clock is "
             f"{'late' if by < 0 else 'early'}; log events with the recorder's clock"
         )
+    found = _other_frame(_shown_at(shown, time), at, here, px_per_mm)
+    if found:
+        return found
     if here > _OFF_RED_MM and shown.kind == "display":
         return "they are of another clock or frame; log what was displayed, with the recorder's clock"
     return ""
@@ -182,7 +204,43 @@ def _within(shown: Positions, time: FloatArray) -> BoolArray:
 
 def _apart(shown: Positions, time: FloatArray, at: FloatArray) -> FloatArray:
     """Distances (n,) in mm between the points `at` (n, 2) and the displayed positions at `time` (n,)."""
+    return np.asarray(np.linalg.norm(_shown_at(shown, time) - at, axis=1))
+
+
+def _shown_at(shown: Positions, time: FloatArray) -> FloatArray:
+    """The displayed positions (n, 2) in mm at these times."""
     stamps, first = np.unique(shown.times.stamp_s - shown.times.late_s, return_index=True)
     value = shown.value_mm[first]
-    there = np.column_stack([np.interp(time, stamps, value[:, axis]) for axis in (0, 1)])
-    return np.asarray(np.linalg.norm(there - at, axis=1))
+    return np.column_stack([np.interp(time, stamps, value[:, axis]) for axis in (0, 1)])
+
+
+def _other_frame(there: FloatArray, at: FloatArray, here: float, px_per_mm: float | None) -> str:
+    """Size, turn and shift that bring the displayed positions (n, 2) to the selections, in words; "" if none do.
+
+    The best similarity by the singular values of the cross-products (Umeyama 1991).
+    """
+    if len(at) < _FRAME_MIN:
+        return ""
+    shown, chosen = there - there.mean(axis=0), at - at.mean(axis=0)
+    left, strength, right = np.linalg.svd(chosen.T @ shown)
+    power = float(np.sum(shown**2))
+    turn, size = left @ right, float(strength.sum()) / power if power > 0 else 0.0
+    if size == 0 or strength[1] < _FRAME_FLAT * strength[0]:
+        return ""
+    rest = float(np.median(np.linalg.norm(chosen / size - shown @ turn.T, axis=1)))
+    if rest > min(_OFF_MM * 2, _EXPLAINS * here / size):
+        return ""
+    shift = np.median(at / size - there @ turn.T, axis=0)
+    parts = []
+    if abs(size - 1) > 0.1:
+        pixels = px_per_mm is not None and abs(size / (1e3 * px_per_mm) - 1) < 0.1
+        parts.append("in pixels" if pixels else f"{size:.3g} times as large")
+    angle = float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
+    if np.linalg.det(turn) < 0:
+        parts.append("mirrored")
+    elif abs(angle) > 5:
+        parts.append(f"turned by {angle:.0f}°")
+    if np.linalg.norm(shift) > _OFF_MM:
+        parts.append(f"off by ({shift[0]:.0f}, {shift[1]:.0f}) mm")
+    named = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+    return f"they are of another frame, {named}; log metres in the tracker's frame" if parts else ""

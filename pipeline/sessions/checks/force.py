@@ -15,7 +15,9 @@ FORCE, GRAVITY, REST = "specific force", "length of gravity", "mean acceleration
 
 _G_M_S2 = 9.80665
 _SMALL_M_S2 = 3.0  # the median of |f|: in g about 1, without gravity 0.4 to 2; a brisk hand's is above 9.7
-_LARGE_M_S2 = 60.0
+LARGE_M_S2 = 60.0
+_UNITS = ((981.0, "cm/s² or thousandths of g"), (9807.0, "mm/s²"))
+_UNIT_NEAR = 1.4  # a brisk hand's median is above g
 _STEADY = 0.6  # |mean f| over mean |f| within a second: gravity alone makes it nearly 1
 _MEAN_AMBER_M_S2, _MEAN_RED_M_S2 = 1.0, 3.0  # recordings without a fault: 0.03 to 0.39; with one: 8.8 to 19.7
 _CALIBRATED = 2.0  # times as much: a mounting that is learned may be off by 10°
@@ -46,9 +48,10 @@ def _force_message(imu: Imu, median: float) -> str:
             f"{values} are about {median:.2g} where 9.8 m/s² is expected, and in no lasting direction: gravity seems "
             "removed (a phone's linear or user acceleration); log the total acceleration, with gravity"
         )
-    if median > _LARGE_M_S2:
-        unit = "cm/s² or thousandths of g" if median < 3000 else "mm/s²"
-        return f"{values} are about {median:.0f} where 9.8 m/s² is expected: they are in {unit}; log m/s²"
+    if median > LARGE_M_S2:
+        near = [unit for size, unit in _UNITS if size / _UNIT_NEAR < median < size * _UNIT_NEAR]
+        unit = f"they are in {near[0]}" if near else "they are the sensor's raw counts, or in another unit"
+        return f"{values} are about {median:.0f} where 9.8 m/s² is expected: {unit}; log m/s²"
     return ""
 
 
@@ -91,8 +94,9 @@ def mean_acceleration(recorded: Recorded) -> Iterator[Finding]:
     gravity_mm_s2 was set by it. A wrong heading does not change the vertical and is not noticed here either.
     """
     for imu in recorded.imus:
-        if imu.oriented.sum() < 10 or float(np.median(np.linalg.norm(imu.force_m_s2, axis=1))) < _SMALL_M_S2:
-            continue
+        size_m_s2 = float(np.median(np.linalg.norm(imu.force_m_s2, axis=1)))
+        if imu.oriented.sum() < 10 or not _SMALL_M_S2 <= size_m_s2 <= LARGE_M_S2:
+            continue  # the unit is wrong, which *specific force* says
         if imu.gravity_mm_s2 is None:
             yield from _without_gravity(imu)
             continue

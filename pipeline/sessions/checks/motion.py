@@ -36,17 +36,18 @@ from pipeline.statistics.arrays import FloatArray
 
 LAG_RANGE_S = 0.6
 _STEP_S = 0.04
-_LOW_HZ, _HIGH_HZ = 0.3, 4.0
+BAND_HZ = _LOW_HZ, _HIGH_HZ = 0.3, 4.0
 _BLOCK = 50  # grid steps: 2 s
 _MARGIN = 25  # grid steps over which the filter rings
 _BLOCKS_MIN = 4
 _GAP_S = 0.25
-_RESAMPLES = 200
+_RESAMPLES, _FEW_RESAMPLES = 200, 60  # positions tell a lag far better than accelerations
 _RIDGE = 1e-3  # of the accelerations' power: an axis without movement takes no part in the fit
 _SHORTEST = 10  # readings
 _LONGEST = 180_000  # grid steps: of longer sessions the first two hours
 _DEALT = 16  # ways of dealing blocks
 _FLAT, _FLAT_UPRIGHT = 0.05, 0.15  # of the strongest direction's movement, the weakest's
+_FITS = 0.5  # of the movement, before a distant lag is believed
 _LEFT_MIN = 0.02  # of an axis's variance, that is never taken for explained
 
 
@@ -73,7 +74,8 @@ class Compared:
     small where those are mostly noise, and `scale_most` what it would be if the positions were; `turn_deg` the angle
     between the frames, about any axis, NaN where the heading is not known; `mirrored` the share of resamples in which a
     reflection fits better than any turn. `axes` names what the phone calls the tracker's x, y, z, such as "+y -x +z";
-    it is "" where the heading is not known.
+    it is "" where the heading is not known. `drift_s` is how much the lag grows from the first half to the second;
+    `flat` says that the movement has fewer than three dimensions.
     """
 
     explained: float
@@ -86,6 +88,8 @@ class Compared:
     turn_deg: Interval
     mirrored: float
     axes: str
+    drift_s: float
+    flat: bool
 
 
 def compare(
@@ -100,18 +104,69 @@ def compare(
     A constant in the accelerations, such as gravity, does not matter. Without `heading_known` the accelerations are
     upright but turned about the third axis by an unknown angle.
     """
+    return _compared(tracker_s, position_mm, imu_s, acceleration_mm_s2, 2, heading_known)
+
+
+def compare_positions(
+    tracker_s: FloatArray, position_mm: FloatArray, other_s: FloatArray, other_mm: FloatArray
+) -> Compared | None:
+    """The same for two streams of positions, of which the second takes the place of the accelerations."""
+    return _compared(tracker_s, position_mm, other_s, other_mm, 0, True)
+
+
+def _compared(
+    tracker_s: FloatArray,
+    position_mm: FloatArray,
+    other_s: FloatArray,
+    other: FloatArray,
+    integrations: int,
+    heading_known: bool,
+) -> Compared | None:
     tracker_s, position_mm = _rising(tracker_s, position_mm)
-    imu_s, acceleration_mm_s2 = _rising(imu_s, acceleration_mm_s2)
-    if min(len(tracker_s), len(imu_s)) < _SHORTEST:
-        return None
-    begin, end = max(tracker_s[0], imu_s[0]), min(tracker_s[-1], imu_s[-1])
-    grid = begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), _LONGEST)))
-    rows = _blocks(grid, tracker_s, imu_s)
+    other_s, other = _rising(other_s, other)
+    grid = _grid(tracker_s, other_s)
+    rows = _blocks(grid, tracker_s, other_s) if len(grid) else np.zeros((0, _BLOCK), np.int64)
     if len(rows) < _BLOCKS_MIN:
         return None
     seen = _filtered(_averaged(grid, tracker_s, position_mm), 0)
+    felt = _filtered(_averaged(grid, other_s, other), integrations)
+    return _Blocks.of(seen, felt, rows).compared(heading_known, _RESAMPLES if integrations else _FEW_RESAMPLES)
+
+
+def _grid(tracker_s: FloatArray, other_s: FloatArray) -> FloatArray:
+    """Steps of 40 ms over the time that both cover; empty where one has next to no readings."""
+    if min(len(tracker_s), len(other_s)) < _SHORTEST:
+        return np.zeros(0)
+    begin, end = max(tracker_s[0], other_s[0]), min(tracker_s[-1], other_s[-1])
+    return begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), _LONGEST)))
+
+
+def distant_lag_s(
+    tracker_s: FloatArray, position_mm: FloatArray, imu_s: FloatArray, acceleration_mm_s2: FloatArray
+) -> float | None:
+    """The lag, up to half of the session, at which one explains at least half of the other; None if there is none.
+
+    For movements that do not fit at any lag near zero. The accelerations are whitened, so that the sum of the squared
+    cross-correlations of all axes is what the best A accounts for.
+    """
+    tracker_s, position_mm = _rising(tracker_s, position_mm)
+    imu_s, acceleration_mm_s2 = _rising(imu_s, acceleration_mm_s2)
+    grid = _grid(tracker_s, imu_s)
+    if len(grid) < _BLOCKS_MIN * _BLOCK:
+        return None
+    seen = _filtered(_averaged(grid, tracker_s, position_mm), 0)
     felt = _filtered(_averaged(grid, imu_s, acceleration_mm_s2), 2)
-    return _Blocks.of(seen, felt, rows).compared(heading_known)
+    own = felt.T @ felt
+    ridge = _RIDGE * np.trace(own) * np.eye(3) + 1e-300 * np.eye(3)
+    white = np.linalg.solve(np.linalg.cholesky(own + ridge), felt.T)
+    length = _even_length(2 * len(grid))
+    moved = np.fft.rfft(seen.T, length)[:, None] * np.conj(np.fft.rfft(white, length))
+    explained = np.sum(np.fft.irfft(moved, length) ** 2, axis=(0, 1)) / max(float(np.sum(seen**2)), 1e-300)
+    shifts = np.arange(length)
+    shifts = np.where(shifts > length // 2, shifts - length, shifts)
+    explained[np.abs(shifts) > len(grid) // 2] = 0.0
+    at = int(np.argmax(explained))
+    return float(shifts[at] * _STEP_S) if explained[at] > _FITS else None
 
 
 def _rising(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -216,16 +271,18 @@ class _Blocks:
         reach = round(LAG_RANGE_S / _STEP_S)
         return np.arange(-reach, reach + 1).astype(np.float64) * _STEP_S
 
-    def compared(self, heading_known: bool) -> Compared:
+    def compared(self, heading_known: bool, resamples: int) -> Compared:
         """Everything, with intervals by resampled blocks, the same draws each time."""
         count = len(self.power)
-        draws = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), _RESAMPLES).astype(float)
-        weights = np.vstack([np.ones(count), draws])  # the first is the session as it is
+        draws = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), resamples).astype(float)
+        halves = (np.arange(count) < count // 2, np.arange(count) >= count // 2)
+        weights = np.vstack([np.ones(count), draws, *halves])  # the first is the session as it is
         cross, own = np.tensordot(weights, self.cross, 1), np.tensordot(weights, self.own, 1)
         power = np.maximum(weights @ self.power, 1e-300)
         by_axis = _explained(cross, own)
         explained = by_axis.sum(axis=2) / power.sum(axis=1)[:, None]
-        lag = _peak(explained, self.shifts_s)
+        *_, early, late = lag = _peak(explained, self.shifts_s)
+        cross, own, power, explained, lag = cross[:-2], own[:-2], power[:-2], explained[:-2], lag[:-2]
         at = int(np.argmin(np.abs(self.shifts_s - lag[0])))
         heading = np.eye(3) if heading_known else _about_vertical(cross[0, at])
         cross, own = cross @ heading, heading.T @ own @ heading
@@ -233,7 +290,7 @@ class _Blocks:
         turn, mirror, size = _procrustes(
             cross[:, at], own, chance * np.sqrt(np.clip(1 - by_axis[0, at] / power[0], _LEFT_MIN, 1.0))
         )
-        samples = count * _BLOCK
+        samples, flat = count * _BLOCK, _flat(cross[0, at], heading_known)
         return Compared(
             float(explained[0].max()),
             float(np.sqrt(self.power.sum() / samples)),
@@ -243,8 +300,10 @@ class _Blocks:
             _interval(size),
             float(np.percentile(power.sum(axis=1) / np.maximum(size * np.trace(own, axis1=1, axis2=2), 1e-300), 97.5)),
             _interval(turn if heading_known else np.full_like(turn, np.nan)),
-            float(np.mean(mirror[1:])) if mirror[0] and not _flat(cross[0, at], heading_known) else 0.0,
+            float(np.mean(mirror[1:])) if mirror[0] and not flat else 0.0,
             _axes(cross[0, at]) if heading_known else "",
+            float(late - early),
+            flat,
         )
 
 

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
+from pipeline.sessions.checks.force import LARGE_M_S2
 from pipeline.sessions.checks.recorded import Recorded, Times
 from pipeline.statistics.arrays import FloatArray
 
@@ -35,6 +36,7 @@ _EVEN = 0.5  # of a step: by how much four readings may be unevenly spaced
 _TRACKER = (1.5, 2.5)
 _TRACKER_CLEAR = (1.2, 2.5)  # where the figure is within a tenth of the truth
 _IMU = (4.0, 10.0)
+_UNIT = 1.8  # times as far as another sensor says
 
 
 def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
@@ -53,6 +55,8 @@ def tracker_noise(recorded: Recorded) -> Iterator[Finding]:
         if clear is not None and clear[1] >= _CLEAR:
             measured, (amber, red) = clear[0], _TRACKER_CLEAR
         ratio = measured / positions.noise_sd_mm
+        if ratio > amber and _other_unit(recorded):
+            continue  # the scatter is that of the unit, which has a check of its own
         found, expected = f"{measured:.2g} mm", f"{positions.noise_sd_mm:g} mm by study.yaml"
         status = graded(ratio, amber, red)
         if status != "green":
@@ -77,6 +81,8 @@ def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
         if measured is None:
             continue
         ratio = measured / imu.noise_sd_mm_s2
+        if ratio > _IMU[0] and float(np.median(np.linalg.norm(imu.force_m_s2, axis=1))) > LARGE_M_S2:
+            continue
         found, expected = f"{measured:.2g} mm/s²", f"{imu.noise_sd_mm_s2:g} mm/s² by study.yaml"
         status: Status = "red" if ratio > _IMU[1] else "amber" if ratio > _IMU[0] else "green"
         message = ""
@@ -86,6 +92,12 @@ def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
                 f"{imu.noise_sd_mm_s2:g}: set noise_sd_mm_s2: {measured:.2g}, or look for vibration"
             )
         yield Finding(of(IMU_NOISE, imu.name), status, found, expected, message)
+
+
+def _other_unit(recorded: Recorded) -> bool:
+    """Does the tracker move much farther than the phone or the reference says?"""
+    compared = (recorded.motion, recorded.reference_motion)
+    return any(one is not None and one.scale.low > _UNIT for one in compared)
 
 
 def noise_sd(times: Times, value: FloatArray) -> float | None:

@@ -39,6 +39,8 @@ def of_log(log: Log, study: Study) -> Recorded:
         None if happened is None or not happened.read else events(happened, origin_ns),
         np.array(task.targets_mm) if task is not None and task.targets_mm else None,
         task.target_diameter_mm if task is not None else 0.0,
+        study.display.px_per_mm if study.display is not None else None,
+        tuple("xyz".index(axis) for axis in study.axes),
     )
 
 

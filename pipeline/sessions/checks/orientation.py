@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.recorded import Imu, Recorded
+from pipeline.sessions.checks.turning_causes import turning_cause
 from pipeline.sessions.checks.turns import rotation_vector
 from pipeline.statistics.arrays import FloatArray
 
@@ -18,6 +19,10 @@ _TURNS_RAD_S = 0.05  # the root mean square of a phone that turns at all
 _AMBER, _RED = 1.15, 1.6  # recordings without a fault: 0.97 to 1.01; degrees per second: 57
 _ALIKE = 0.5  # correlation below which two turnings are not one
 _DEGREES = (25.0, 130.0)
+_STANDS = 0.05  # of the time
+_LATE_STEPS = 10  # of 0.1 s
+_CLOSE = 0.8  # correlation from which a factor is the likelier mistake
+_OPPOSITE = -0.4  # of the turning of gravity; recordings without a fault: above 0
 _STILL = 0.005  # of the other: less than any unit would make of it
 _UNIT = (0.98, 1.02)
 _SMOOTH_S = 0.5
@@ -42,12 +47,35 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
     turning = _turning(imu)
     if turning is None:
         return
-    rate, measured = turning
+    rate, measured, spans = turning
     turns, reads = _rms(rate), _rms(measured)
     expected = "0.87 to 1.15 times the turning of the orientation"
     if max(turns, reads) < _TURNS_RAD_S:
         return
-    if turns < _STILL * reads:
+    alike = float(np.sum(rate * measured) / max(np.sqrt(np.sum(rate**2) * np.sum(measured**2)), 1e-300))
+    stands = np.all(rate == 0.0, axis=1) & (np.linalg.norm(measured, axis=1) > _TURNS_RAD_S)
+    if stands.mean() > _STANDS and alike >= _ALIKE / 2:
+        yield Finding(
+            of(TURNING, imu.name),
+            "red",
+            f"the orientation stands still for {stands.mean():.0%} of the time",
+            expected,
+            f'the gyroscope of "{imu.name}" turns and its orientation stands still for {stands.mean():.0%} of the time: the '
+            "orientation froze; leave that time out, or say that it is unknown by orientation_covariance[0] = -1",
+        )
+        return
+    late_s = _late_s(rate, measured)
+    if late_s is not None:
+        yield Finding(
+            of(TURNING, imu.name),
+            "amber",
+            f"the orientation turns {late_s:+.1f} s after the gyroscope",
+            expected,
+            f'the orientation of "{imu.name}" turns {abs(late_s):.1f} s {"after" if late_s > 0 else "before"} its '
+            "gyroscope: it is of another message or filtered with a delay; log both as of one instant",
+        )
+        return
+    if turns < _STILL * reads and alike < _ALIKE:
         yield Finding(
             of(TURNING, imu.name),
             "red",
@@ -68,19 +96,20 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
         )
         return
     ratio = float(np.sum(rate * measured) / np.sum(rate**2))
-    alike = float(np.sum(rate * measured) / np.sqrt(np.sum(rate**2) * np.sum(measured**2)))
     found = f"{ratio:.3g} times, correlation {alike:.2f}"
     status: Status = "red" if alike < _ALIKE else graded(max(ratio, 1 / max(ratio, 1e-9)), _AMBER, _RED)
-    message = "" if status == "green" else _turning_message(imu, ratio, alike)
+    message = "" if status == "green" else _turning_message(imu, ratio, alike, turning_cause(*spans, measured))
     yield Finding(of(TURNING, imu.name), status, found, expected, message)
 
 
-def _turning_message(imu: Imu, ratio: float, alike: float) -> str:
+def _turning_message(imu: Imu, ratio: float, alike: float, cause: str) -> str:
     if alike >= _ALIKE and _DEGREES[0] < ratio < _DEGREES[1]:
         return (
             f'the gyroscope of "{imu.name}" reads {ratio:.0f} times what the orientation turns: it is in degrees per '
             "second; multiply by π/180 when logging"
         )
+    if cause and alike < _CLOSE:
+        return f'gyroscope and orientation of "{imu.name}" do not describe one turning: {cause}'
     if alike < _ALIKE:
         return (
             f'gyroscope and orientation of "{imu.name}" do not describe one turning: the orientation is inverted (the '
@@ -93,8 +122,11 @@ def _turning_message(imu: Imu, ratio: float, alike: float) -> str:
     )
 
 
-def _turning(imu: Imu) -> tuple[FloatArray, FloatArray] | None:
-    """Angular velocities (k, 3) in rad/s by the orientation and by the gyroscope, each over 0.1 s."""
+def _turning(imu: Imu) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray, FloatArray]] | None:
+    """Angular velocities (k, 3) in rad/s by the orientation and by the gyroscope, each over 0.1 s.
+
+    And the orientations (k, 4) at both ends of each span, with its length (k,) in s.
+    """
     rows = np.flatnonzero(imu.oriented)
     order = rows[np.argsort(imu.times.stamp_s[rows], kind="stable")]
     time = imu.times.stamp_s[order]
@@ -110,7 +142,24 @@ def _turning(imu: Imu) -> tuple[FloatArray, FloatArray] | None:
     measured = (total[last] - total[first])[whole] / (last - first)[whole, None]
     if whole.sum() < 10:
         return None
-    return rotation_vector(before, after) / span[whole, None], measured
+    spans = before, after, span[whole]
+    return rotation_vector(before, after) / span[whole, None], measured, spans
+
+
+def _late_s(rate: FloatArray, measured: FloatArray) -> float | None:
+    """How much later the orientation turns than the gyroscope, in steps of 0.1 s; None below 0.2 s or if none fits."""
+    count = len(rate) - 2 * _LATE_STEPS
+    if count < 50:
+        return None
+    middle = measured[_LATE_STEPS : _LATE_STEPS + count]
+    alike = []
+    for shift in range(2 * _LATE_STEPS + 1):
+        moved = rate[shift : shift + count]
+        alike.append(float(np.sum(moved * middle) / max(np.sqrt(np.sum(moved**2) * np.sum(middle**2)), 1e-300)))
+    best = int(np.argmax(alike))
+    if abs(best - _LATE_STEPS) < 2 or alike[best] < 0.9 or alike[best] < alike[_LATE_STEPS] + 0.01:
+        return None
+    return (best - _LATE_STEPS) * _SPAN_S
 
 
 def _rms(values: FloatArray) -> float:
@@ -124,6 +173,14 @@ def _against_gravity(imu: Imu) -> Iterator[Finding]:
         return
     slope, alike = ratio
     found, expected = f"{slope:.2g} times the turning of gravity", "0.1 to 3 times"
+    if alike < _OPPOSITE:
+        degrees = ", and it is in degrees per second: multiply by -π/180" if slope > 10 else ""
+        message = (
+            f'the gyroscope of "{imu.name}" turns against what gravity turns (correlation {alike:.2f}): its sign is '
+            f"flipped{degrees}; change the sign of all three axes when logging"
+        )
+        yield Finding(of(TURNING, imu.name), "red", found, expected, message)
+        return
     if alike < 0.3 or slope < 10:
         yield Finding(of(TURNING, imu.name), "green", found, expected)
         return

@@ -63,5 +63,6 @@ def _steps(positions: Positions) -> tuple[float, float]:
     """Medians in mm: the nearest of the next three to each position but the next, and the next."""
     order = np.lexsort((positions.times.stamp_ns, positions.times.arrival_ns))
     value = positions.value_mm[order]
-    following = [np.linalg.norm(value[lag:][: len(value) - 3] - value[: len(value) - 3], axis=1) for lag in (1, 2, 3)]
+    steps = [value[lag:][: len(value) - 3] - value[: len(value) - 3] for lag in (1, 2, 3)]
+    following = [np.sqrt(np.einsum("ij,ij->i", step, step)) for step in steps]
     return float(np.median(np.minimum(following[1], following[2]))), float(np.percentile(following[0], 60))

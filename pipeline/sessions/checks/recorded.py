@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.sessions.checks.motion import Compared, compare
+from pipeline.sessions.checks.motion import Compared, compare, compare_positions, distant_lag_s
 from pipeline.sessions.checks.tilt import upright, with_z_up
 from pipeline.sessions.checks.turns import turned
 from pipeline.sessions.logs.log import BoolArray, IntArray
@@ -118,13 +118,18 @@ class Events:
 
 @dataclass(frozen=True)
 class Recorded:
-    """One session. `targets_mm` (k, 2) are those of study.yaml's task, None where it names none."""
+    """One session. `targets_mm` (k, 2) are those of study.yaml's task, None where it names none.
+
+    `px_per_mm` is the display's, None where it is not stated; `axes` are those that are analysed.
+    """
 
     positions: tuple[Positions, ...] = ()
     imus: tuple[Imu, ...] = ()
     events: Events | None = None
     targets_mm: FloatArray | None = None
     target_size_mm: float = 0.0
+    px_per_mm: float | None = None
+    axes: tuple[int, ...] = (0, 1, 2)
 
     def of_kind(self, kind: str) -> Positions | None:
         """The first stream of positions of a kind."""
@@ -151,10 +156,28 @@ class Recorded:
         tracker, imu = self.tracker, self.imu
         if tracker is None or imu is None or len(imu.force_m_s2) < 2:
             return None
+        return compare(*self._of_both(tracker, imu), bool(imu.oriented.mean() >= _MOSTLY))
+
+    @cached_property
+    def distant_lag_s(self) -> float | None:
+        """The lag between tracker and phone at which they see one movement after all; None if at none."""
+        tracker, imu = self.tracker, self.imu
+        if tracker is None or imu is None or len(imu.force_m_s2) < 2:
+            return None
+        return distant_lag_s(*self._of_both(tracker, imu))
+
+    @cached_property
+    def reference_motion(self) -> Compared | None:
+        """The tracker's movement beside the reference's, both by their own stamps."""
+        tracker, reference = self.tracker, self.of_kind("reference")
+        if tracker is None or reference is None:
+            return None
+        return compare_positions(tracker.times.stamp_s, tracker.value_mm, reference.times.stamp_s, reference.value_mm)
+
+    @staticmethod
+    def _of_both(tracker: Positions, imu: Imu) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Stamps and positions of the tracker, stamps and accelerations in mm/s² of the phone, in one frame."""
         if imu.oriented.mean() >= _MOSTLY:
-            time_s, force, position_mm = imu.times.stamp_s[imu.oriented], imu.upright_m_s2, tracker.value_mm
-        else:
-            time_s, force = upright(imu.times.stamp_s, imu.force_m_s2, imu.gyroscope_rad_s)
-            position_mm = with_z_up(tracker.value_mm, imu.gravity_mm_s2)
-        heading_known = bool(imu.oriented.mean() >= _MOSTLY)
-        return compare(tracker.times.stamp_s, position_mm, time_s, force * 1e3, heading_known)
+            return tracker.times.stamp_s, tracker.value_mm, imu.times.stamp_s[imu.oriented], imu.upright_m_s2 * 1e3
+        time_s, force = upright(imu.times.stamp_s, imu.force_m_s2, imu.gyroscope_rad_s)
+        return tracker.times.stamp_s, with_z_up(tracker.value_mm, imu.gravity_mm_s2), time_s, force * 1e3

@@ -29,7 +29,7 @@ def zeros(recorded: Recorded) -> Iterator[Finding]:
             continue
         count = int(np.sum(np.all(value == 0.0, axis=1)))
         found, expected = f"{count}", "0"
-        if count == 0 or not _jumps_to_zero(value):
+        if count == 0 or not jumps_to_zero(value):
             yield Finding(of(ZEROS, positions.name), "green", found, expected)
             continue
         yield Finding(
@@ -42,7 +42,7 @@ def zeros(recorded: Recorded) -> Iterator[Finding]:
         )
 
 
-def _jumps_to_zero(value: FloatArray) -> bool:
+def jumps_to_zero(value: FloatArray) -> bool:
     """Is the origin jumped to, as no movement does that begins there or passes through it?"""
     zero = np.all(value == 0.0, axis=1)
     edges = np.flatnonzero(np.diff(zero.astype(np.int8)))

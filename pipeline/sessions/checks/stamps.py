@@ -24,6 +24,7 @@ DOUBLED, ROUNDED, RATE, BURSTS, REGULAR, STEPS = (
 _DOUBLED_AMBER, _DOUBLED_RED = 0.01, 0.5
 _FASTEST_HZ = 5_000.0  # no tracker or phone measures so often; stamps of ms or µs in a field of ns look like 1e6 Hz
 _SLOWEST_HZ = 1.0
+_PHONE_HZ = 20.0  # a hand's accelerations reach 10 Hz (see docs/checks.md)
 _ROUNDINGS_S = (1.0, 0.1, 0.01)
 _IRREGULAR = 0.5  # SD of the usual steps over their median; recordings without a fault: up to 0.1
 _STEP_S = 0.05  # of a clock
@@ -69,7 +70,11 @@ def rounded(recorded: Recorded) -> Iterator[Finding]:
 
 
 def rate(recorded: Recorded) -> Iterator[Finding]:
-    """How often a stream measures by its own stamps; beyond 5 kHz and below 1 Hz they are of another unit."""
+    """How often a stream measures by its own stamps; beyond 5 kHz and below 1 Hz they are of another unit.
+
+    A phone below 20 Hz misses most of what a reach accelerates.
+    """
+    phones = {imu.name for imu in recorded.imus}
     for name, times in _streams(recorded):
         steps = times.steps_s[times.steps_s > 0]
         if not len(steps):
@@ -84,7 +89,13 @@ def rate(recorded: Recorded) -> Iterator[Finding]:
             continue
         hz = 1.0 / float(np.median(steps))
         found, expected = f"{hz:.4g} Hz", "1 to 5000 Hz"
-        if _SLOWEST_HZ <= hz <= _FASTEST_HZ:
+        if name in phones and _SLOWEST_HZ <= hz < _PHONE_HZ:
+            message = (
+                f'"{name}" measures {hz:.3g} times a second, too seldom for the accelerations of a hand: set its '
+                "rate to 50 Hz and more, as apps do by an option of theirs"
+            )
+            yield Finding(of(RATE, name), "amber", found, f"{_PHONE_HZ:g} to 5000 Hz", message)
+        elif _SLOWEST_HZ <= hz <= _FASTEST_HZ:
             yield Finding(of(RATE, name), "green", found, expected)
         elif hz > _FASTEST_HZ:
             unit = "microseconds" if hz < 1e6 else "milliseconds"
@@ -180,8 +191,7 @@ def _parted(times: Times) -> tuple[float, float] | None:
     delay = (times.arrival_s - times.stamp_s)[order]
     if len(delay) < 4 * _AROUND:
         return None
-    windows = np.lib.stride_tricks.sliding_window_view(delay, _AROUND)
-    low, high = windows.min(axis=1), windows.max(axis=1)
+    low, high = _extremes(delay)
     before_low, before_high, after_low, after_high = low[:-_AROUND], high[:-_AROUND], low[_AROUND:], high[_AROUND:]
     gap = np.maximum(after_low - before_high, before_low - after_high)
     at = int(np.argmax(gap))
@@ -193,6 +203,14 @@ def _parted(times: Times) -> tuple[float, float] | None:
     if abs(by_s) < _STEP_S:
         return None
     return float(times.arrival_s[order][split] - times.arrival_s.min()), by_s
+
+
+def _extremes(delay: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The least and the largest of each 15 successive values; of 8 by doubling, and two of these overlap by one."""
+    low = high = delay
+    for step in (1, 2, 4, _AROUND - 8):
+        low, high = np.minimum(low[:-step], low[step:]), np.maximum(high[:-step], high[step:])
+    return low, high
 
 
 def _back(arrival_ns: IntArray) -> tuple[int, float] | None:
