@@ -33,7 +33,7 @@ _UNITS = (
     (0.001, "kilometres"),
 )
 _FORCES = ((1e3, "mm/s²"), (1e2, "cm/s² or thousandths of g"), (3.281, "feet/s²"), (1 / 9.80665, "g"))
-_UNIT_NEAR = 1.15  # the figure of the size is bent by up to a third, mostly by far less
+_UNIT_NEAR = 1.4  # the figure of the size is bent by up to a third, and units are further apart
 
 
 def see_one_movement(motion: Compared | None) -> bool:
@@ -57,7 +57,7 @@ def lag(recorded: Recorded) -> Iterator[Finding]:
         return
     motion, stated_s = recorded.motion, expected_lag_s(tracker, imu)
     expected = f"{in_ms(stated_s)} by study.yaml"
-    if motion is None or not see_one_movement(motion) or motion.lag_s.width > _LAG_WIDE_S:
+    if motion is None or not see_one_movement(motion) or motion.lag_s.width > _LAG_WIDE_S or motion.lag_beyond:
         yield Finding(LAG, "green", "cannot be told from this movement", expected)
         return
     found = lag_text(motion.lag_s)

@@ -55,7 +55,7 @@ def _against_task(
     left = {cause: float(np.mean(_nearest_mm(points, task) > tolerance_mm)) for cause, points in tried.items()}
     cause = min(left, key=lambda one: left[one])
     if left[cause] > 0.5 * wrong / len(there):
-        size = float(np.std(there) / max(np.std(task), 1e-9))
+        size = float(np.std(there)) / max(float(np.std(task)), 1e-9)
         cause = "they are of another frame or task; correct task: in study.yaml or the events"
         if not 1 / _OTHER_SIZE < size < _OTHER_SIZE:
             cause = f"they spread {size:.3g} times as far: pixels or another unit; log metres in the tracker's frame"
@@ -234,7 +234,7 @@ def _other_frame(there: FloatArray, at: FloatArray, here: float, px_per_mm: floa
     parts = []
     if abs(size - 1) > 0.1:
         pixels = px_per_mm is not None and abs(size / (1e3 * px_per_mm) - 1) < 0.1
-        parts.append("in pixels" if pixels else f"{size:.3g} times as large")
+        parts.append("in pixels" if pixels else f"{size:.3g} times as large{' (pixels?)' if size > 1 else ''}")
     angle = float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
     if np.linalg.det(turn) < 0:
         parts.append("mirrored")

@@ -91,6 +91,11 @@ class Compared:
     drift_s: float
     flat: bool
 
+    @property
+    def lag_beyond(self) -> bool:
+        """Whether the lag is at the end of what was searched, so that it may be any that is larger."""
+        return abs(self.lag_s.value) > LAG_RANGE_S - _STEP_S
+
 
 def compare(
     tracker_s: FloatArray,
@@ -138,7 +143,8 @@ def _grid(tracker_s: FloatArray, other_s: FloatArray) -> FloatArray:
     if min(len(tracker_s), len(other_s)) < _SHORTEST:
         return np.zeros(0)
     begin, end = max(tracker_s[0], other_s[0]), min(tracker_s[-1], other_s[-1])
-    return begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), _LONGEST)))
+    grid: FloatArray = begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), _LONGEST)))
+    return grid
 
 
 def distant_lag_s(

@@ -49,7 +49,8 @@ def one_movement(recorded: Recorded) -> Iterator[Finding]:
     if tracker is None or imu is None or motion is None:
         return
     found, expected = f"{motion.explained:.0%} in common", "most, where the hand plainly moves"
-    unlike = motion.explained < _IN_DOUBT and plainly_moves(tracker, motion) and not _contradicts_itself(recorded)
+    doubt = motion.explained < _IN_DOUBT or motion.lag_beyond
+    unlike = doubt and plainly_moves(tracker, motion) and not _contradicts_itself(recorded)
     shift_s = recorded.distant_lag_s if unlike else None
     distant = shift_s is not None and abs(shift_s) > LAG_RANGE_S
     if not distant and not (unlike and motion.explained < _NOT_ONE):

@@ -60,8 +60,8 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
             "red",
             f"the orientation stands still for {stands.mean():.0%} of the time",
             expected,
-            f'the gyroscope of "{imu.name}" turns and its orientation stands still for {stands.mean():.0%} of the time: the '
-            "orientation froze; leave that time out, or say that it is unknown by orientation_covariance[0] = -1",
+            f'the gyroscope of "{imu.name}" turns and its orientation stands still for {stands.mean():.0%} of the '
+            "time: it froze; leave that time out, or say that it is unknown by orientation_covariance[0] = -1",
         )
         return
     late_s = _late_s(rate, measured)

@@ -45,8 +45,8 @@ def reference(recorded: Recorded) -> Iterator[Finding]:
     tracker, stream, motion = recorded.tracker, recorded.of_kind("reference"), recorded.reference_motion
     if tracker is None or stream is None:
         return
-    if motion is not None and (motion.explained < _NOT_ONE or not see_one_movement(motion)):
-        if motion.explained < _NOT_ONE and plainly_moves(tracker, motion):
+    if motion is not None and (motion.explained < _NOT_ONE or motion.lag_beyond or not see_one_movement(motion)):
+        if (motion.explained < _NOT_ONE or motion.lag_beyond) and plainly_moves(tracker, motion):
             message = (
                 f'"{stream.name}" and "{tracker.name}" do not see one movement: one of them is of another session or '
                 "person, of another object, or their clocks are more than 0.6 s apart; no figure of accuracy means "

@@ -294,7 +294,92 @@ def thinned(readings: Readings) -> Readings:
     )
 
 
+def gyroscope(how: Callable[[np.ndarray], np.ndarray]) -> Callable[[Log, Study], Case]:
+    """A fault of the gyroscope."""
+
+    def spoil(value: np.ndarray) -> np.ndarray:
+        value[:, 3:6] = how(value[:, 3:6])
+        return value
+
+    return values(IMU, spoil)
+
+
+def without_orientation(spoil: Callable[[Log, Study], Case]) -> Callable[[Log, Study], Case]:
+    """A fault of a phone whose log has no orientation."""
+    return both(orientation(lambda q: q * np.nan), spoil)
+
+
+def seldom(readings: Readings) -> Readings:
+    """A tenth of the phone's readings, as of an app that is set to save power."""
+    return _picked(
+        replace(readings, stamp_ns=readings.stamp_ns[::10], arrival_ns=readings.arrival_ns[::10]),
+        np.arange(0, readings.read, 10),
+    )
+
+
+def twice(readings: Readings) -> Readings:
+    """Every message a second time after the last, as where a log was appended to itself."""
+    return _picked(
+        replace(readings, stamp_ns=np.tile(readings.stamp_ns, 2), arrival_ns=np.tile(readings.arrival_ns, 2)),
+        np.tile(np.arange(readings.read), 2),
+    )
+
+
+def faster_clock(readings: Readings) -> Readings:
+    """A clock that gains 0.4 s over the session."""
+    since = readings.stamp_ns - readings.stamp_ns[0]
+    return replace(readings, stamp_ns=readings.stamp_ns + np.rint(0.4e9 * since / since[-1]).astype(np.int64))
+
+
+def nearly_w_first(quaternion: np.ndarray) -> np.ndarray:
+    """w first, and a hundredth of noise."""
+    found = quaternion[:, [3, 0, 1, 2]] + np.random.default_rng(2).normal(0, 0.01, quaternion.shape)
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
+def found_anew(value: np.ndarray) -> np.ndarray:
+    """From the middle on a metre aside, along each axis."""
+    value[len(value) // 2 :] += 1.0
+    return value
+
+
+def strays(value: np.ndarray) -> np.ndarray:
+    """Every 37th position is 0.8 m aside."""
+    value[20::37, 0] += 0.8
+    return value
+
+
+def late_orientation(readings: Readings) -> Readings:
+    """Each reading has the orientation of 0.3 s before."""
+    at = np.searchsorted(readings.stamp_ns, readings.stamp_ns - round(0.3e9))
+    value = readings.values.copy()
+    value[:, 6:10] = value[at, 6:10]
+    return replace(readings, values=value)
+
+
+def placed(how: Callable[[float, float], tuple[float, float]]) -> Callable[[Log, Study], Case]:
+    """Coordinates of targets and selections by a function of x and y."""
+
+    def change_events(readings: Readings) -> Readings:
+        changed: list[Mapping[str, object]] = []
+        for event in readings.events:
+            new = dict(event)
+            for x, y in (("x", "y"), ("target_x", "target_y")):
+                if event.get(x) is not None:
+                    new[x], new[y] = how(float(str(event[x])), float(str(event[y])))
+            changed.append(new)
+        return replace(readings, events=tuple(changed))
+
+    return change(EVENTS, change_events)
+
+
+def from_other(topic: str, other: Log) -> Callable[[Log, Study], Case]:
+    """One topic of another session's log."""
+    return lambda log, study: (with_topic(log, topic, other.topics[topic]), study)
+
+
 MM = ("speed", "millimetres")
+_ASIDE = np.array([0.3, 0.0, 0.0])
 MEAN, LAG, FRAME = "mean acceleration", "lag", "frame of the movement"
 
 FAULTS: tuple[Fault, ...] = (
@@ -356,6 +441,60 @@ FAULTS: tuple[Fault, ...] = (
     Fault("noise understated", settings("tracker", noise_sd_mm=3.0), "tracker noise", "noise_sd_mm: "),
     Fault("noise understated by a fifth", settings("tracker", noise_sd_mm=6.4), "tracker noise", "noise_sd_mm: "),
     Fault("values that are no numbers", values(TRACKER, lost_now_and_then), "unusable samples", "send nothing while"),
+    Fault("tracker in inches", values(TRACKER, lambda v: v / 0.0254), "size of the movement", "inches"),
+    Fault("tracker in feet", values(TRACKER, lambda v: v / 0.3048), "size of the movement", "feet"),
+    Fault("tracker in km", values(TRACKER, lambda v: v * 1e-3), "size of the movement", "kilometres"),
+    Fault("two axes negated", values(TRACKER, lambda v: v * [-1, -1, 1]), FRAME, "-x -y +z"),
+    Fault("accelerometer in thousandths of g", force(lambda v: v * 102), "specific force", "thousandths of g"),
+    Fault("accelerometer in mm/s²", force(lambda v: v * 1e3), "specific force", "mm/s²"),
+    Fault("accelerometer in counts", force(lambda v: np.round(v * 1670)), "specific force", "raw counts"),
+    Fault("accelerometer in feet/s²", force(lambda v: v / 0.3048), MEAN, "feet/s²"),
+    Fault("phone's x and y negated", force(lambda v: v * [-1, -1, 1]), MEAN, "x and y axes point the other way"),
+    Fault("phone turned with its screen", force(lambda v: v[:, [1, 0, 2]] * [1, -1, 1]), MEAN, "turned by"),
+    Fault(
+        "gravity removed, sign flipped",
+        both(values(IMU, without_gravity), force(lambda v: -v)),
+        FRAME,
+        "their sign is flipped",
+    ),
+    Fault("quaternion nearly w first", orientation(nearly_w_first), MEAN, "w, x, y, z"),
+    Fault("orientation late", change(IMU, late_orientation), "gyroscope", "s after its gyroscope"),
+    Fault("orientation frozen from half", orientation(frozen), "gyroscope", "it froze"),
+    Fault("gyroscope's sign", gyroscope(lambda w: -w), "gyroscope", "sign is flipped"),
+    Fault("gyroscope's sign, in °/s", gyroscope(lambda w: -np.degrees(w)), "gyroscope", "degrees per second"),
+    Fault("gyroscope's axes", gyroscope(lambda w: w[:, [1, 0, 2]]), "gyroscope", "in the order y, x, z"),
+    Fault(
+        "gyroscope's sign, no orientation",
+        without_orientation(gyroscope(lambda w: -w)),
+        "gyroscope",
+        "sign is flipped",
+    ),
+    Fault("phone at 10 Hz", change(IMU, seldom), "rate", "too seldom"),
+    Fault("tracker 250 ms late", change(TRACKER, lambda r: later(r, 0.25)), LAG, "latency_s: 0.3"),
+    Fault("tracker 0.8 s late", change(TRACKER, lambda r: later(r, 0.8)), "one movement", "s later than those of"),
+    Fault("tracker 5 s late", change(TRACKER, lambda r: later(r, 5.0)), "one movement", "5.1 s later"),
+    Fault("tracker an hour off", change(TRACKER, lambda r: later(r, 3600)), "span of the streams", "time zone"),
+    Fault(
+        "phone's stamps two hours off",
+        change(IMU, lambda r: replace(r, stamp_ns=r.stamp_ns + 7200 * 10**9)),
+        "stamps and arrivals",
+        "2 h, as by a time zone",
+    ),
+    Fault("tracker's clock gains", change(TRACKER, faster_clock), LAG, "one clock runs faster"),
+    Fault("tracker finds its place anew", values(TRACKER, found_anew), "jumps", "stays there"),
+    Fault("tracker strays", values(TRACKER, strays), "jumps", "strays for a reading or two"),
+    Fault("log appended to itself", change(IMU, twice), "identical stamps", "sent twice"),
+    Fault("reference in cm", values(REFERENCE, lambda v: v * 100), "size of the movement", "centimetres"),
+    Fault("reference late", change(REFERENCE, lambda r: later(r, 0.1)), LAG, "against the reference are off by"),
+    Fault("reference mirrored", values(REFERENCE, lambda v: v * [-1, 1, 1]), FRAME, "is mirrored against"),
+    Fault("reference's x and y exchanged", values(REFERENCE, lambda v: v[:, [1, 0, 2]]), FRAME, "+y +x +z"),
+    Fault("reference is y up", values(REFERENCE, about("x", -90)), FRAME, "axes are exchanged"),
+    Fault(
+        "reference of another origin",
+        values(REFERENCE, lambda v: v + _ASIDE),
+        "distance",
+        "translation_mm",
+    ),
     Fault("most frames lost", change(TRACKER, thinned), "missing samples", "the recorder does not keep up"),
 )
 """Of streams and study.yaml."""
@@ -366,6 +505,13 @@ EVENT_FAULTS: tuple[Fault, ...] = (
     Fault("selections in mm", events(x=1e3, y=1e3, z=1e3), "selections", "millimetres"),
     Fault("events an hour off", change(EVENTS, lambda r: later(r, 3600)), "span of the events", "another clock"),
     Fault("events 2 s late", change(EVENTS, lambda r: later(r, 2.0)), "selections", "2.0 s earlier"),
+    Fault("events in cm", placed(lambda x, y: (100 * x, 100 * y)), "selections", "centimetres"),
+    Fault("events in pixels", placed(lambda x, y: (1e4 * x + 960, 540 - 1e4 * y)), "selections", "pixels"),
+    Fault("targets in pixels", placed(lambda x, y: (1e4 * x, 1e4 * y)), "targets", "pixels"),
+    Fault("events of another origin", placed(lambda x, y: (x + 0.3, y - 0.2)), "selections", "off by (300, -200) mm"),
+    Fault("events turned", placed(lambda x, y: (0.866 * x - y / 2, x / 2 + 0.866 * y)), "selections", "turned by 30°"),
+    Fault("events' x mirrored", placed(lambda x, y: (-x, y)), "targets", "x points the other way"),
+    Fault("events two hours early", change(EVENTS, lambda r: later(r, -7200)), "span of the events", "-2.0 h"),
     Fault("events 0.5 s late", change(EVENTS, lambda r: later(r, 0.5)), "selections", "0.5 s earlier"),
 )
 """Of events."""

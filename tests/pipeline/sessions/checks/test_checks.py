@@ -19,7 +19,19 @@ from pipeline.study.settings import Study
 from tests.benchmarks.checks import drawn
 from tests.conftest import real
 from tests.pipeline.sessions.checks.hand import Hand, session
-from tests.pipeline.sessions.checks.spoilt import EVENT_FAULTS, FAULTS, IMU, TRACKER, Fault, change, later, values
+from tests.pipeline.sessions.checks.spoilt import (
+    EVENT_FAULTS,
+    EVENTS,
+    FAULTS,
+    IMU,
+    REFERENCE,
+    TRACKER,
+    Fault,
+    change,
+    from_other,
+    later,
+    values,
+)
 
 
 @cache
@@ -57,6 +69,23 @@ def test_a_fault_is_found_in_a_real_recording(fault: Fault) -> None:
     for name, log, study in recordings("phone-in-hand"):
         if name != "P02_iphone4s":  # two phones are enough
             assert names_the_cause(alarms(*fault.spoil(log, study)), fault), name
+
+
+@pytest.mark.parametrize(
+    ("topic", "check"),
+    [(TRACKER, "one movement"), (IMU, "one movement"), (REFERENCE, "one movement: reference"), (EVENTS, "selections")],
+)
+def test_a_stream_of_another_session_is_found(topic: str, check: str) -> None:
+    other, _ = session(Hand(seed=9))
+    found = alarms(*from_other(topic, other)(*simulated()))
+    assert check in [one.check for one in found if one.status == "red"]
+    assert check == "selections" or any("session" in one.message for one in found if one.check == check)
+
+
+def test_the_unit_alone_is_named_and_not_what_follows_from_it() -> None:
+    for name in ("tracker in inches", "accelerometer in mm/s²"):
+        fault = next(one for one in FAULTS if one.name == name)
+        assert not any("noise" in one.check for one in alarms(*fault.spoil(*simulated()))), name
 
 
 def test_nothing_is_found_where_nothing_is_wrong() -> None:
