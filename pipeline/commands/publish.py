@@ -14,7 +14,7 @@ from typing import Any
 
 from pipeline.engine.cache import file_digest
 from pipeline.engine.code_digest import code_digest, versions
-from pipeline.engine.provenance import LIBRARIES, PROVENANCE
+from pipeline.engine.provenance import LIBRARIES, OF_STATISTICS, PROVENANCE
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
@@ -96,7 +96,7 @@ def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
     return {
         "command": [Path(command[0]).name, *command[1:]],
         "python": platform.python_version(),
-        "versions": versions(["steadyhand", *LIBRARIES]),
+        "versions": versions(["steadyhand", *LIBRARIES, *OF_STATISTICS]),
         "code_sha256": {stage.name: code_digest(stage.module) for stage in stages},
     }
 

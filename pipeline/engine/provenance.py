@@ -18,4 +18,6 @@ LIBRARIES = (
     "typst",
     "vqf",
 )
-"""The libraries whose versions a report names, by import name."""
+"""The libraries whose versions every report names, by import name."""
+OF_STATISTICS = ("pingouin", "statsmodels")
+"""Those that a report names where they computed something of it."""

@@ -24,6 +24,7 @@ class StatisticalTest:
     of an entry that only some tests take. `symbol_names_test` is true where the statistic's symbol is name enough: W₊.
     The p of a test whose `question` is not "difference" says nothing about a difference. `values` are what it takes:
     measurements, answers that are 0 or 1, or counts. `followed_up_by` names the tests of the pairs after it.
+    `libraries` are those that compute part of it, beside NumPy and SciPy.
     """
 
     name: str
@@ -42,6 +43,7 @@ class StatisticalTest:
     followed_up_by: str = "t tests"
     cite: tuple[str, ...] = ()
     cited_for: str = ""
+    libraries: tuple[str, ...] = ()
 
     @property
     def tests_difference(self) -> bool:
@@ -96,6 +98,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             options=("within", "follow_up"),
             ranks_aligned=True,
             cite=("wobbrock2011",),
+            libraries=("pingouin",),
         ),
         StatisticalTest(
             "mixed_model",
@@ -114,6 +117,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "McNemar's tests of one answer of each participant in each condition (exact, two-sided; odds ratio)",
             values="answers",
             cite=("mcnemar1947",),
+            libraries=("statsmodels",),
         ),
         StatisticalTest(
             "cochran_q",
@@ -124,6 +128,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             values="answers",
             followed_up_by="McNemar's tests",
             cite=("cochran1950",),
+            libraries=("statsmodels",),
         ),
         StatisticalTest(
             "gee_logit",
@@ -136,6 +141,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             design="either",
             values="answers",
             cite=("liang1986", "mancl2001"),
+            libraries=("statsmodels",),
         ),
         StatisticalTest(
             "gee_poisson",
@@ -148,6 +154,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             design="either",
             values="counts",
             cite=("liang1986", "mancl2001"),
+            libraries=("statsmodels",),
         ),
         StatisticalTest(
             "crossover",
@@ -187,6 +194,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             assumes_normality=True,
             design="between",
             cite=("welch1947",),
+            libraries=("pingouin",),
         ),
         StatisticalTest(
             "mann_whitney",
@@ -207,6 +215,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             assumes_normality=True,
             design="between",
             cite=("welch1951", "games1976"),
+            libraries=("pingouin",),
         ),
         StatisticalTest(
             "kruskal",
@@ -218,6 +227,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             design="between",
             followed_up_by="Mann-Whitney tests",
             cite=("kruskal1952",),
+            libraries=("pingouin",),
         ),
         StatisticalTest(
             "mixed_anova",
@@ -228,6 +238,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             assumes_normality=True,
             assumes_sphericity=True,
             design="mixed",
+            libraries=("pingouin",),
         ),
     )
 }

@@ -37,6 +37,8 @@ _OF_PACKAGE = {
     "numba": "lam2015",
     "matplotlib": "hunter2007",
     "vqf": "laidig2023",
+    "pingouin": "vallat2018",
+    "statsmodels": "seabold2010",
 }
 _ENTRY = re.compile(r"@(\w+)\{([\w.-]+),\n(.*?)\n\}", re.DOTALL)
 _FIELD = re.compile(r"  (\w+) = \{(.*)\},?")

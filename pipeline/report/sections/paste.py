@@ -11,7 +11,7 @@ from pipeline.report.prose.references import Reference, bibliography, used
 from pipeline.report.sections import practice
 from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
-from pipeline.report.sections.provenance import used_versions
+from pipeline.report.sections.provenance import statistics_libraries, used_versions
 from pipeline.statistics import WILSON
 from pipeline.tables.table import Row
 from pipeline.words.condition_means import StudyFacts, means_sentence, states_means, study_facts
@@ -23,7 +23,8 @@ BIBLIOGRAPHY = "references.bib"
 
 def section(material: Material) -> Section:
     """Texts to paste."""
-    methods_text = methods(material.study, material.results, used_versions())
+    versions = used_versions(statistics_libraries(material.results))
+    methods_text = methods(material.study, material.results, versions)
     blocks: list[Block] = [
         Paragraph(
             ("These texts are written from the tables of this report. Shorten them and put them into your own words.",)
@@ -39,7 +40,8 @@ def section(material: Material) -> Section:
 def references(material: Material) -> list[Reference]:
     """The publications and programs that the study's report rests on."""
     rows, measures = material.rows("comparisons"), material.measured()
-    return used(material.study, rows, measures, used_versions(), _cited_for_sections(material))
+    versions = used_versions(statistics_libraries(material.results))
+    return used(material.study, rows, measures, versions, _cited_for_sections(material))
 
 
 def _cited_for_sections(material: Material) -> Iterator[tuple[str, str]]:

@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from pipeline.engine.code_digest import versions
 from pipeline.engine.provenance import LIBRARIES
 from pipeline.report.document.model import Column, Paragraph, Section, Table
 from pipeline.report.sections.material import Material
+from pipeline.statistics import WILSON
+from pipeline.study.statistical_tests import TESTS
 from pipeline.words.phrases import counted
 
 _FILES_MAX = 60
 
 
-def used_versions() -> dict[str, str]:
-    """What makes reports, and in which version."""
-    return {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES])}
+def used_versions(statistics: Iterable[str] = ()) -> dict[str, str]:
+    """What makes reports, and in which version, with the libraries that computed statistics of this one."""
+    return {"Python": platform.python_version(), **versions(["steadyhand", *LIBRARIES, *statistics])}
 
 
-def libraries() -> Table:
+def statistics_libraries(results: Mapping[str, Any]) -> set[str]:
+    """The libraries that computed part of a study's statistics, beside those that every report needs."""
+    used = {name for row in results["comparisons"] for name in TESTS[row["test"]].libraries}
+    adjusted = any(row["p_adjusted"] is not None for row in results["comparisons"])
+    if adjusted or any(row["interval"] == WILSON for row in results["descriptives"]):
+        used.add("statsmodels")
+    if any(row["alpha"] is not None for row in results["reliability"]):
+        used.add("pingouin")
+    return used
+
+
+def libraries(statistics: Iterable[str] = ()) -> Table:
     """What made the report, in which version."""
     titles = (Column("Name", False), Column("Version", False))
-    return Table("table-versions", "Program and libraries.", titles, tuple(used_versions().items()))
+    return Table("table-versions", "Program and libraries.", titles, tuple(used_versions(statistics).items()))
 
 
 def section(material: Material) -> Section:
@@ -38,7 +53,7 @@ def section(material: Material) -> Section:
         "Provenance",
         (
             Paragraph((text,)),
-            libraries(),
+            libraries(statistics_libraries(material.results)),
             Table(
                 "table-inputs",
                 f"Files that were read, with the first digits of their SHA-256 (equal files, equal digests).{more}",
