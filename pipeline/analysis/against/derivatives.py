@@ -81,13 +81,13 @@ def _column(data: Model) -> int:
     """The place of the coefficient of the row's second level among the columns of the design."""
     before = data.terms[: list(data.terms).index(data.term)]
     second = 1 if data.levels is None else data.levels[1]
-    return sum(data.columns[term].columns.shape[1] for term in before) + second
+    return int(sum(data.columns[term].columns.shape[1] for term in before) + second)
 
 
 def _covariance(data: Model, ratio: float) -> FloatArray:
     """Of the rows, over the residual variance (N, N)."""
     people = np.unique(np.asarray(data.participants), return_inverse=True)[1]
-    return np.eye(len(people)) + ratio * (people[:, None] == people[None, :])
+    return np.asarray(np.eye(len(people)) + ratio * (people[:, None] == people[None, :]))
 
 
 def _least_squares(data: Model, x: FloatArray, ratio: float) -> FloatArray:
@@ -107,13 +107,13 @@ def _parts(data: Model, x: FloatArray, beta: FloatArray, ratio: float) -> tuple[
 def _profiled(data: Model, x: FloatArray, beta: FloatArray, ratio: float) -> float:
     """The restricted log-likelihood with the residual variance at its best, less what is constant."""
     logs, squares = _parts(data, x, beta, ratio)
-    return -((len(x) - x.shape[1]) * float(np.log(squares)) + logs) / 2
+    return float(-((len(x) - x.shape[1]) * np.log(squares) + logs) / 2)
 
 
 def _deviance(data: Model, x: FloatArray, theta: float, sigma: float) -> float:
     """−2 times the restricted log-likelihood, the coefficients being at their best, less what is constant."""
     logs, squares = _parts(data, x, _least_squares(data, x, theta**2), theta**2)
-    return 2 * (len(x) - x.shape[1]) * float(np.log(sigma)) + logs + squares / sigma**2
+    return float(2 * (len(x) - x.shape[1]) * np.log(sigma) + logs + squares / sigma**2)
 
 
 def _hessian(function: Likelihood, at: FloatArray) -> FloatArray:

@@ -148,6 +148,6 @@ def test_no_reason_of_extreme_numbers_is_given_of_plain_ones() -> None:
     figures = {name: Figure(value) for name, value in far.items()}
     assert derivatives.where_it_is_flat(model, figures, "df2") is None
     (anova,) = rm_anova(values.reshape(5, 2), ("condition",))
-    row = {"statistic": anova.statistic, "df2": anova.df2, "p": anova.p, "status": "ok", "details": {}}
+    row: dict[str, Any] = {"statistic": anova.statistic, "df2": anova.df2, "p": anova.p, "status": "ok", "details": {}}
     problem = Problem(row, "rm_anova", Within(values.reshape(5, 2), (0,)), model.entry)
     assert digits.run_out(problem, {"statistic": Figure((anova.statistic or 0) * 1.00001)}, "statistic") is None
