@@ -25,9 +25,9 @@ from pipeline.words.comparison import (
 )
 from pipeline.words.condition_means import StudyFacts, means_of_conditions
 from pipeline.words.effect_sizes import effect_size, ratio_to_first
-from pipeline.words.evidence import evidence, statistic_value
-from pipeline.words.names import measure_as_subject, unit_of
-from pipeline.words.numbers import interval, number, percent
+from pipeline.words.evidence import evidence, statistic, statistic_value
+from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
+from pipeline.words.numbers import interval, number, p_phrase, percent
 from pipeline.words.phrases import listing
 
 _BEFORE_INTERVAL = ", 95 % CI "
@@ -90,6 +90,35 @@ def full_sentence(row: Row, facts: StudyFacts) -> str:
     if pair is not None and difference is not None:
         return _pair_sentence(row, facts, what, pair, difference)
     return _effect_sentence(row, facts, what)
+
+
+def finds_nothing_of_a_pair(row: Row, facts: StudyFacts) -> bool:
+    """Is this one of several pairs, whose difference is not significant? Such may share a sentence."""
+    return (
+        row["status"] == "ok"
+        and row["contrast"] is not None
+        and TESTS[row["test"]].tests_difference
+        and not ratio_to_first(row)
+        and _pair(row, facts.conditions) is not None
+        and not _significant(row, facts.alpha)
+    )
+
+
+def no_difference_sentence(rows: Sequence[Row], facts: StudyFacts) -> list[str]:
+    """`Effort did not differ significantly between a and b (…)`, `, or between b and c (…)`: a part for each row.
+
+    `rows` are pairs of one measure and test for which `finds_nothing_of_a_pair`.
+    """
+    parts = []
+    for place, row in enumerate(rows):
+        pair = _pair(row, facts.conditions)
+        assert pair is not None  # noqa: S101 - see above
+        p = row["p"] if row["p_adjusted"] is None else row["p_adjusted"]
+        name = "p" if row["p_adjusted"] is None else f"{adjustment_label(row['adjust'])}-adjusted p"
+        figures = f"{statistic(row)}, {p_phrase(p, name, _p_digits(row, facts.alpha))}, n = {row['n']}"
+        head = f"{measure_as_subject(row['measure'])} did not differ significantly" if place == 0 else ", nor"
+        parts.append(f"{head} between {pair.first} and {pair.second}{pair.where} ({figures})")
+    return parts
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -116,7 +116,36 @@ class Pages:
     links: tuple[Link, ...]
 
 
-Block = Paragraph | Notice | KeyFigures | Table | Figure | Pages
+@dataclass(frozen=True)
+class Folded:
+    """Tables and figures that most readers pass over, under a line that says what they hold and what it comes to.
+
+    A page opens them at a click. In print the line stands alone: tables go to an annex, as far as it may grow, and
+    figures are left to the page.
+    """
+
+    summary: str
+    blocks: tuple[Table | Figure, ...]
+
+
+@dataclass(frozen=True)
+class ToPaste:
+    """Words for a paper, which a page copies at a click; cross-references stay beside them and are not copied."""
+
+    label: str
+    texts: tuple[Text, ...]
+
+
+Block = Paragraph | Notice | KeyFigures | Table | Figure | Pages | Folded | ToPaste
+
+
+def unfolded(blocks: Sequence[Block]) -> Iterator[Block]:
+    """The blocks, and in place of each that is folded what it holds."""
+    for block in blocks:
+        if isinstance(block, Folded):
+            yield from block.blocks
+        else:
+            yield block
 
 
 @dataclass(frozen=True)
@@ -144,7 +173,7 @@ def numbered(document: Document) -> dict[str, str]:
     names: dict[str, str] = {}
     counts = {"Table": 0, "Figure": 0}
     for section in document.sections:
-        for block in section.blocks:
+        for block in unfolded(section.blocks):
             if isinstance(block, Table | Figure):
                 kind = type(block).__name__
                 counts[kind] += 1

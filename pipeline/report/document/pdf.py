@@ -7,17 +7,22 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from pipeline.report.document.for_print import for_print
 from pipeline.report.document.model import (
+    Block,
     CrossReference,
     Document,
     Figure,
+    Folded,
     KeyFigures,
     Notice,
     Pages,
     Paragraph,
+    Section,
     Strong,
     Table,
     Text,
+    ToPaste,
     numbered,
 )
 from pipeline.report.document.typography import Run, typeset, typeset_heading
@@ -33,9 +38,8 @@ def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
     import typst
 
-    content = _map_texts(
-        _content(document), lambda text: text.replace("\u2009", "\u202f")
-    )  # no line breaks within a number
+    # A line may break at a thin space, which within a number it must not.
+    content = _map_texts(_content(document), lambda text: text.replace("\u2009", "\u202f"))
     printed = _map_texts(content, showable)
     printed |= {"lacking": printed != content, "unbroken": _UNBROKEN}
     compiler = typst.Compiler(
@@ -67,15 +71,13 @@ def _content(document: Document) -> dict[str, Any]:
         "running": document.title if len(document.title) <= _HEAD else f"{document.title[:_HEAD]}…",
         "subtitle": document.subtitle,
         "origin": document.origin,
-        "sections": [
-            {
-                "id": section.id,
-                "title": section.title,
-                "blocks": [_block(block, names) for block in section.blocks if not isinstance(block, Pages)],
-            }
-            for section in document.sections
-        ],
+        "sections": [_section(section, names) for section in for_print(document, names).sections],
     }
+
+
+def _section(section: Section, names: dict[str, str]) -> dict[str, Any]:
+    blocks = [_block(block, names) for block in section.blocks]
+    return {"id": section.id, "title": section.title, "blocks": blocks}
 
 
 def _text(text: Text) -> list[dict[str, Any]]:
@@ -89,46 +91,41 @@ def _text(text: Text) -> list[dict[str, Any]]:
     ]
 
 
-def _block(block: Paragraph | Notice | KeyFigures | Table | Figure, names: dict[str, str]) -> dict[str, Any]:
+def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
+    """A block as plain data, its kind among them."""
+    data: dict[str, Any]
     match block:
         case Paragraph():
-            return {"kind": "paragraph", "text": _text(block.text)}
+            data = {"kind": "paragraph", "text": _text(block.text)}
         case Notice():
-            return {
-                "kind": "notice",
-                "title": block.title,
-                "care": block.kind == "care",
-                "texts": [_text(text) for text in block.texts],
-            }
+            texts = [_text(text) for text in block.texts]
+            data = {"kind": "notice", "title": block.title, "care": block.kind == "care", "texts": texts}
         case KeyFigures():
-            return {
-                "kind": "key-figures",
-                "figures": [
-                    {key: _runs(typeset(text)) for key, text in vars(figure).items()} for figure in block.figures
-                ],
-            }
+            keys = [{key: _runs(typeset(text)) for key, text in vars(figure).items()} for figure in block.figures]
+            data = {"kind": "key-figures", "figures": keys}
+        case ToPaste():
+            data = {"kind": "to-paste", "texts": [_text(text) for text in block.texts]}
         case Table():
-            return {
-                "kind": "table",
-                "name": names[block.id],
-                "caption": _runs(typeset(block.caption)),
-                "columns": [
-                    {"title": _runs(typeset_heading(column.title)), "numeric": column.numeric}
-                    for column in block.columns
-                ],
-                "rows": [[_runs(typeset(cell)) for cell in row] for row in block.rows],
-                "note": _runs(typeset(block.note)) if block.note else [],
-                "anchors": list(block.anchors),
-                "shares": _shares(block),
-            }
+            data = {"kind": "table", "name": names[block.id], **_table(block)}
         case Figure():
-            return {
-                "kind": "figure",
-                "name": names[block.id],
-                "file": block.file,
-                "caption": _runs(typeset(block.caption)),
-                "alt": block.alt,
-            }
+            picture = {"name": names[block.id], "file": block.file, "alt": block.alt}
+            data = {"kind": "figure", "caption": _runs(typeset(block.caption)), **picture}
+        case Folded() | Pages():
+            raise TypeError("is not printed: see for_print")
+    return data
+
+
+def _table(table: Table) -> dict[str, Any]:
+    return {
+        "caption": _runs(typeset(table.caption)),
+        "columns": [
+            {"title": _runs(typeset_heading(column.title)), "numeric": column.numeric} for column in table.columns
+        ],
+        "rows": [[_runs(typeset(cell)) for cell in row] for row in table.rows],
+        "note": _runs(typeset(table.note)) if table.note else [],
+        "anchors": list(table.anchors),
+        "shares": _shares(table),
+    }
 
 
 def _runs(runs: Iterable[Run]) -> list[list[str]]:

@@ -43,6 +43,41 @@ function makeSortable(table) {
   });
 }
 
+// The words of a block without the links to rows of the report, which belong to no paper.
+function wordsToPaste(block) {
+  const copy = block.querySelector(".words").cloneNode(true);
+  copy.querySelectorAll("a[href^='#']").forEach((link) => link.remove());
+  const texts = [...copy.querySelectorAll("p")].map((text) => text.textContent.replace(/\s+/g, " ").trim());
+  return texts.join("\n\n");
+}
+
+// For browsers that let no page write to the clipboard by itself: what is selected can be copied by the user's click.
+function copyBySelection(text) {
+  const field = document.createElement("textarea");
+  field.value = text;
+  document.body.append(field);
+  field.select();
+  const done = document.execCommand("copy");
+  field.remove();
+  return done;
+}
+
+function makeCopyable(block) {
+  const button = block.querySelector("button.copy");
+  button.hidden = false;
+  button.addEventListener("click", async () => {
+    const text = wordsToPaste(block);
+    let done = true;
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      done = copyBySelection(text);
+    }
+    button.textContent = done ? "Copied" : "Select the text and copy it";
+    setTimeout(() => { button.textContent = "Copy"; }, 4000);
+  });
+}
+
 function followSections(links) {
   const byId = new Map(links.map((link) => [link.hash.slice(1), link]));
   const seen = new IntersectionObserver((entries) => {
@@ -56,4 +91,6 @@ function followSections(links) {
 }
 
 document.querySelectorAll("main table").forEach(makeSortable);
+document.querySelectorAll(".paste").forEach(makeCopyable);
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((one) => { one.open = true; }));
 followSections([...document.querySelectorAll("#contents a")]);

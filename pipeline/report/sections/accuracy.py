@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import pandas as pd
 
 from pipeline.report import figures
-from pipeline.report.document.model import Block, Paragraph, Section, Strong, Table, columns
+from pipeline.report.document.model import Block, Folded, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections.cautions import contradicted
 from pipeline.report.sections.material import Material
 from pipeline.sessions.checks.finding import of
@@ -45,7 +45,8 @@ def section(material: Material) -> Section | None:
         blocks.append(Paragraph((Strong("No accuracy: "), f"errors cannot be given, for {_why_none(material)}.")))
     blocks += _session_figures(material)
     if rows and len(material.sessions) > 1:
-        blocks.append(_session_table(rows, _without_accelerations(material)))
+        each = _session_table(rows, _without_accelerations(material))
+        blocks.append(Folded("Accuracy in each session", (each,)))
     smoothed = any(row["reference"] == SMOOTHED for row in rows)
     return Section("accuracy", f"Fusion beside {SMOOTHED}" if smoothed else "Fusion accuracy", tuple(blocks))
 

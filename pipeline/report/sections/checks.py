@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from pipeline.report.document.model import Block, Paragraph, Strong, Table, Text, columns
+from pipeline.report.document.model import Block, Folded, Paragraph, Strong, Table, Text, columns
 from pipeline.report.sections.material import Material
 from pipeline.report.traffic_lights import LIGHTS, SYMBOLS
 from pipeline.sessions.fusion_checks import WORSE
@@ -24,28 +24,34 @@ def blocks(material: Material) -> Iterator[Block]:
         return
     contradicted = sorted(_contradicted(rows), key=lambda row: -LIGHTS.index(row["status"]))
     counts = f"{counted(len(contradicted), 'contradiction')} in {counted(len(rows), 'check')}"
-    text = (
-        f"{counts} of logs and tables, against each other and study.yaml; docs/checks.md describes each.{_lags(rows)}"
-    )
+    text = f"{counts} of logs and tables, against each other and study.yaml; docs/checks.md describes each."
     yield Paragraph((Strong("Checks: "), text))
     if contradicted:
         yield _table(contradicted)
+    yield from _lags(rows)
 
 
 def _contradicted(rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["status"] != "green"]
 
 
-def _lags(rows: Sequence[Row]) -> str:
-    """The lag of each session; of very many, the first ones."""
-    lags = [f"{row['session']} {row['found']}" for row in rows if row["check"] == LAG]
+def _lags(rows: Sequence[Row]) -> list[Block]:
+    """The lag of each session, and what study.yaml says of it."""
+    lags = [row for row in rows if row["check"] == LAG]
     if not lags:
-        return ""
-    more = f"; and {len(lags) - _ROWS_MAX} more in tables/checks.csv" if len(lags) > _ROWS_MAX else ""
-    return (
-        " Lag of the tracker's time stamps behind the phone's, measured from their movement, with 95 % interval: "
-        f"{'; '.join(lags[:_ROWS_MAX])}{more}."
+        return []
+    cells = tuple((row["session"], row["found"], row["expected"]) for row in lags[:_ROWS_MAX])
+    more = f" The first {_ROWS_MAX} of {len(lags)}; all are in tables/checks.csv." if len(lags) > _ROWS_MAX else ""
+    table = Table(
+        "table-lags",
+        "Lag of the tracker's time stamps behind the phone's, measured from their movement, with 95 % interval, beside"
+        f" the one that study.yaml states.{more}",
+        columns(("Session", "Lag found", "Expected"), 3),
+        cells,
     )
+    apart = sum(row["status"] != "green" for row in lags)
+    summary = f"Lag between tracker and phone: contradicts study.yaml in {apart} of {counted(len(lags), 'session')}"
+    return [Folded(summary, (table,))]
 
 
 def _table(rows: Sequence[Row]) -> Table:

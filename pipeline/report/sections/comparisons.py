@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
+from pipeline.report.document.model import Block, CrossReference, Folded, Paragraph, Section, Strong, Table, columns
 from pipeline.report.prose.families import families
 from pipeline.report.sections.material import Material
 from pipeline.statistics.diagnostics import OUTLIER_RULE
@@ -45,7 +45,11 @@ def section(material: Material) -> Section | None:
     text = "Every test of the study, one row each. The words and symbols are explained in the "
     introduction = Paragraph((text, CrossReference("glossary", "glossary"), "."))
     blocks: list[Block] = [introduction, table, Paragraph((Strong("Methods: "), _methods(rows)))]
-    return Section("comparisons", "All comparisons", tuple(blocks + _diagnostics(rows, material.study.conditions)))
+    return Section(
+        "comparisons",
+        "All comparisons",
+        tuple(blocks + _diagnostics(rows, material.study.conditions, material.study.alpha)),
+    )
 
 
 def _reduction_of_logarithms(rows: Sequence[Row]) -> str:
@@ -69,7 +73,7 @@ def _methods(rows: Sequence[Row]) -> str:
     return f"{'; '.join(texts)}. {capitalized(families(rows))}."
 
 
-def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:
+def _diagnostics(rows: Sequence[Row], conditions: Sequence[str], alpha: float) -> list[Block]:
     """Normality and outliers of the differences that are tested, once for each measure and pair."""
     tested: dict[tuple[str, str], Row] = {}
     for row in rows:
@@ -91,7 +95,11 @@ def _diagnostics(rows: Sequence[Row], conditions: Sequence[str]) -> list[Block]:
         f"Outliers: participants whose difference has a {OUTLIER_RULE}; they are kept in all tests. No spread: "
         "more than half of the differences are equal, so the rule does not apply.",
     )
-    return [table]
+    ps = [row["details"].get("shapiro_p", row["details"].get("residual_shapiro_p")) for row in tested.values()]
+    doubtful = sum(p is not None and p < alpha for p in ps)
+    level = f"below the {100 * alpha:g} % level in {doubtful} of {len(tested)}"
+    summary = f"Are the differences normally distributed? Shapiro-Wilk's p is {level}"
+    return [Folded(summary, (table,))]
 
 
 def _differences(row: Row, conditions: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.report.document.model import Block, Notice, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.report.document.model import Block, Folded, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.report.sections.material import ORIGINS, Material, conditions_text
 from pipeline.words.names import measure_label
 from pipeline.words.numbers import number
@@ -64,9 +64,9 @@ def _design_check(material: Material) -> list[Block]:
         for row in rows
     )
     remarked = [row["what"] for row in rows if row["remark"]]
-    text = "no problem found in what could be checked."
+    text = f"no problem found in {counted(len(rows), 'check')}."
     if remarked:
-        text = f"{counted(len(remarked), 'remark')}, about {listing(list(dict.fromkeys(remarked)))}; see the table."
+        text = f"{counted(len(remarked), 'remark')}, about {listing(list(dict.fromkeys(remarked)))}."
     note = (
         f"Effects of the period and carry-over are each tested at the {100 * material.study.alpha:g} % level; not "
         "finding one does not mean that there is none, least of all for carry-over with few people."
@@ -79,4 +79,10 @@ def _design_check(material: Material) -> list[Block]:
         cells,
         note if any(row["expected"] == "none" for row in rows) else "",
     )
-    return [Paragraph((Strong("Design: "), text)), table]
+    remarks = [
+        Paragraph((f"{cell[0]}{f' ({cell[1]})' if cell[1] else ''}: {cell[2]}. {cell[4]}",))
+        for cell in cells
+        if cell[4]
+    ]
+    summary = f"Design check: all {counted(len(rows), 'figure')} of it"
+    return [Paragraph((Strong("Design: "), text)), *remarks, Folded(summary, (table,))]

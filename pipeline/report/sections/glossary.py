@@ -12,8 +12,10 @@ from pipeline.report.document.model import (
     Paragraph,
     Section,
     Table,
+    ToPaste,
     columns,
     plain,
+    unfolded,
 )
 from pipeline.report.prose.glossary import explained
 
@@ -22,7 +24,7 @@ ANCHOR = "glossary"
 
 def of(sections: Sequence[Section]) -> tuple[Section, ...]:
     """A section for the end of a report that has these; none where there is nothing to explain."""
-    entries = explained([text for section in sections for block in section.blocks for text in _texts(block)])
+    entries = explained([text for section in sections for block in unfolded(section.blocks) for text in _texts(block)])
     if not entries:
         return ()
     caption = "The statistical words of this report."
@@ -37,6 +39,8 @@ def _texts(block: Block) -> Iterator[str]:
             yield plain(block.text)
         case Notice():
             yield from (block.title, *(plain(text) for text in block.texts))
+        case ToPaste():
+            yield from (plain(text) for text in block.texts)
         case KeyFigures():
             yield from (text for figure in block.figures for text in (figure.value, figure.label, figure.evidence))
         case Table():

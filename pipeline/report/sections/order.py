@@ -28,22 +28,25 @@ from pipeline.report.sections import (
 from pipeline.report.sections.material import Material
 
 SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
+    # The answer, and the results it rests on.
     overview.section,
-    design.section,
-    preregistration.section,
-    quality.section,
-    accuracy.section,
-    paths.section,
     outcomes.selection,
     outcomes.time,
-    practice.section,
-    fitts_law.section,
     outcomes.workload,
     outcomes.others,
+    practice.section,
+    fitts_law.section,
     comparisons.section,
-    simulation.section,
     paste.section,
+    # How they came about: who met what when, what was planned, and how well the hand was followed.
+    design.section,
+    preregistration.section,
+    accuracy.section,
+    paths.section,
+    simulation.section,
     printed.section,
+    # What most readers pass over, unless something is wrong.
+    quality.section,
     participants.section,
     provenance.section,
 )

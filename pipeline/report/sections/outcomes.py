@@ -9,6 +9,7 @@ from pipeline.report import figures
 from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
+from pipeline.report.sections import overview
 from pipeline.report.sections.comparisons import ESTIMATES
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.statistics import T
@@ -125,7 +126,9 @@ def _measured(material: Material, measure: str) -> list[Block]:
     if not wide.notna().any().any():
         return []
     label, shown = measure_label(measure), (wide, measure, material.of_shares(measure))
-    blocks: list[Block] = [material.drawn(f"measure-{safe_name(measure)}", figures.paired, *shown)]
+    blocks: list[Block] = []
+    if measure != overview.drawn_measure(material):
+        blocks.append(material.drawn(f"measure-{safe_name(measure)}", figures.paired, *shown))
     for sentence in _sentences(material.comparisons_of(measure)):
         blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
     return blocks

@@ -129,12 +129,19 @@ def _mean(row: Row) -> str:
 
 def _figure(material: Material) -> list[Figure]:
     """The one figure that shows the answer."""
-    for row in _headline_rows(material):
-        wide = material.participant_means(row["measure"])
-        if row["status"] == "ok" and wide.notna().any().any():
-            return [_of_people(material, row["measure"], wide)]
+    measure = drawn_measure(material)
+    if measure is not None:
+        return [_of_people(material, measure, material.participant_means(measure))]
     errors = None if material.rows("comparisons") else overview_estimators.figure(material)
     return [] if errors is None else [errors]
+
+
+def drawn_measure(material: Material) -> str | None:
+    """The measure whose figure stands on the first page; it is not repeated further on."""
+    for row in _headline_rows(material):
+        if row["status"] == "ok" and material.participant_means(row["measure"]).notna().any().any():
+            return str(row["measure"])
+    return None
 
 
 def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:

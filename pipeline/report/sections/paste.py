@@ -5,7 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, Text, columns
+from pipeline.report.document.model import (
+    Block,
+    CrossReference,
+    Folded,
+    Paragraph,
+    Section,
+    Strong,
+    Table,
+    Text,
+    ToPaste,
+    columns,
+)
 from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
 from pipeline.report.sections import practice
@@ -13,9 +24,9 @@ from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import statistics_libraries, used_versions
 from pipeline.statistics import WILSON
-from pipeline.tables.table import Row
-from pipeline.words.condition_means import StudyFacts, means_sentence, states_means, study_facts
-from pipeline.words.sentences import full_sentence
+from pipeline.words.condition_means import means_sentence, states_means, study_facts
+from pipeline.words.phrases import counted
+from pipeline.words.sentences import finds_nothing_of_a_pair, full_sentence, no_difference_sentence
 
 BIBLIOGRAPHY = "references.bib"
 """The file beside the report."""
@@ -25,16 +36,15 @@ def section(material: Material) -> Section:
     """Texts to paste."""
     versions = used_versions(statistics_libraries(material.results))
     methods_text = methods(material.study, material.results, versions)
+    introduction = "These texts are written from the tables of this report. Put them into your own words."
     blocks: list[Block] = [
-        Paragraph(
-            ("These texts are written from the tables of this report. Shorten them and put them into your own words.",)
-        ),
-        Paragraph((Strong("Methods. "), methods_text)),
+        Paragraph((introduction,)),
+        ToPaste("Methods", ((Strong("Methods. "), methods_text),)),
     ]
     results = list(_results(material))
     if results:
-        blocks += [Paragraph((Strong("Results. "), *results[0])), *(Paragraph(text) for text in results[1:])]
-    return Section("paste", "To paste", (*blocks, _references(material)))
+        blocks.append(ToPaste("Results", ((Strong("Results. "), *results[0]), *results[1:])))
+    return Section("paste", "To paste", (*blocks, Folded(_what_to_cite(material), (_references(material),))))
 
 
 def references(material: Material) -> list[Reference]:
@@ -62,7 +72,7 @@ def bibtex(material: Material) -> str:
 
 
 def _results(material: Material) -> Iterator[Text]:
-    """One paragraph per measure and test: one sentence per row, with a link to the row."""
+    """One paragraph per measure and test: a sentence per row, with a link to it; pairs that do not differ share one."""
     study = material.study
     facts = study_facts(study.conditions, study.alpha, material.rows("descriptives"))
     rows = list(enumerate(material.rows("comparisons")))
@@ -73,13 +83,20 @@ def _results(material: Material) -> Iterator[Text]:
     for (measure, _), group in groupby(rows, key=lambda item: (item[1]["measure"], item[1]["test"])):
         means = means_sentence(measure, facts) if measure in without_means else ""
         without_means.discard(measure)
-        text: list[str | Strong | CrossReference] = [f"{means} "] if means else []
-        text += [part for at, row in group for part in _linked(at, row, facts)]
-        yield tuple(text)
+        words: list[str | Strong | CrossReference] = [f"{means} "] if means else []
+        of_test = list(group)
+        together = [item for item in of_test if finds_nothing_of_a_pair(item[1], facts)]
+        together = together if len(together) > 1 else []
+        for at, row in of_test:
+            if (at, row) not in together:
+                words += [f"{full_sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "]
+        for (at, _), part in zip(together, no_difference_sentence([row for _, row in together], facts), strict=True):
+            words += [part, " ", CrossReference("[row]", anchor(at))]
+        yield (*words, ".") if together else tuple(words)
 
 
-def _linked(at: int, row: Row, facts: StudyFacts) -> tuple[str | Strong | CrossReference, ...]:
-    return f"{full_sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "
+def _what_to_cite(material: Material) -> str:
+    return f"What to cite: {counted(len(references(material)), 'reference')}, also in {BIBLIOGRAPHY} for BibTeX"
 
 
 def _references(material: Material) -> Table:

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.engine.code_digest import versions
 from pipeline.engine.provenance import LIBRARIES
-from pipeline.report.document.model import Column, Paragraph, Section, Table
+from pipeline.report.document.model import Column, Folded, Paragraph, Section, Table
 from pipeline.report.sections.material import Material
 from pipeline.statistics import WILSON
 from pipeline.study.statistical_tests import TESTS
@@ -46,19 +46,23 @@ def section(material: Material) -> Section:
         " number in this report is in results.json and in the tables folder beside it; provenance.json holds the"
         " settings and the command."
     )
-    listed = sorted(material.inputs.items())[:_FILES_MAX]
-    more = f" The first {_FILES_MAX} of {len(material.inputs)}." if len(material.inputs) > _FILES_MAX else ""
     return Section(
         "provenance",
         "Provenance",
         (
             Paragraph((text,)),
-            libraries(statistics_libraries(material.results)),
-            Table(
-                "table-inputs",
-                f"Files that were read, with the first digits of their SHA-256 (equal files, equal digests).{more}",
-                (Column("File", False), Column("SHA-256", False)),
-                tuple((name, digest[:16]) for name, digest in listed),
-            ),
+            Folded("The program and its libraries", (libraries(statistics_libraries(material.results)),)),
+            Folded("Digests of the files that were read", (_inputs(material),)),
         ),
+    )
+
+
+def _inputs(material: Material) -> Table:
+    listed = sorted(material.inputs.items())[:_FILES_MAX]
+    more = f" The first {_FILES_MAX} of {len(material.inputs)}." if len(material.inputs) > _FILES_MAX else ""
+    return Table(
+        "table-inputs",
+        f"Files that were read, with the first digits of their SHA-256 (equal files, equal digests).{more}",
+        (Column("File", False), Column("SHA-256", False)),
+        tuple((name, digest[:16]) for name, digest in listed),
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from pipeline.report import figures, traffic_lights
-from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
+from pipeline.report.document.model import Block, Column, Folded, Paragraph, Section, Strong, Table, columns
 from pipeline.report.sections import checks, timeline
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
@@ -27,8 +27,10 @@ def section(material: Material) -> Section:
         blocks += _lights(material)
     blocks += checks.blocks(material)
     if material.rows("quality"):
-        blocks.append(_quality_table(material))
-        blocks += timeline.blocks(material)
+        blocks.append(Folded("Each stream as it was recorded", (_quality_table(material),)))
+        arrivals = timeline.figure(material)
+        if arrivals is not None:
+            blocks.append(Folded("What arrived when", (arrivals,)))
         if material.rows("sensor_noise"):
             blocks += _noise(material)
         elif material.rows("accuracy"):
@@ -43,7 +45,7 @@ def section(material: Material) -> Section:
         blocks.append(_mounting_table(material))
     agreement = material.rows("replay_agreement")
     if agreement:
-        blocks.append(_agreement_table(material))
+        blocks.append(Folded(_agreement_summary(agreement), (_agreement_table(material),)))
     blocks += [*_exclusions(material), *without_exclusions(material)]
     return Section("quality", "Data quality and exclusions", tuple(blocks))
 
@@ -73,7 +75,8 @@ def _lights(material: Material) -> list[Block]:
         " excluded because of its light.",
     )
     text = f"{counted(len(by_session), 'session')}: {listing(shares)}.{_missing_sessions(material)}"
-    return [Paragraph((Strong("Quality: "), text)), table]
+    all_green = set(lights) <= {"green", "not judged"}
+    return [Paragraph((Strong("Quality: "), text)), Folded("Each session's lights", (table,)) if all_green else table]
 
 
 def _session_lights(figures: Sequence[Judged], facts: Sequence[str]) -> tuple[str, ...]:
@@ -220,18 +223,17 @@ def _noise(material: Material) -> list[Block]:
         "SD measured",
         "SD in study.yaml",
     )
-    return [
-        material.drawn("sensor-noise", figures.noise, _residuals(material, names), units),
-        Table(
-            "table-noise",
-            "Sensor noise in each session's longest still stretch, beside the noise that the estimators assume.",
-            columns(titles, 3),
-            cells,
-            "Still: the reference moves slower than 20 mm/s."
-            if material.study.stream_of_kind("reference")
-            else "Still: the accelerations vary little.",
-        ),
-    ]
+    table = Table(
+        "table-noise",
+        "Sensor noise in each session's longest still stretch, beside the noise that the estimators assume.",
+        columns(titles, 3),
+        cells,
+        "Still: the reference moves slower than 20 mm/s."
+        if material.study.stream_of_kind("reference")
+        else "Still: the accelerations vary little.",
+    )
+    drawn = material.drawn("sensor-noise", figures.noise, _residuals(material, names), units)
+    return [drawn, Folded("Sensor noise in each session", (table,))]
 
 
 def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:
@@ -244,6 +246,14 @@ def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:
         rows = material.table_of("noise_residuals", [place])[["stream", "residual"]]
         parts.append(rows.assign(stream=rows["stream"].astype(pd.CategoricalDtype(list(names)))))
     return pd.concat(parts)
+
+
+def _agreement_summary(rows: Sequence[Row]) -> str:
+    largest = max((row["max_mm"] for row in rows if row["max_mm"] is not None), default=None)
+    of = f"in {counted(len(rows), 'session')}"
+    if largest is None:
+        return f"What was displayed cannot be compared with a replay {of}"
+    return f"What was displayed is within {number(largest, 3)} mm of the replay {of}"
 
 
 def _agreement_table(material: Material) -> Table:

@@ -1,0 +1,69 @@
+"""What of a document is printed: folded tables go to an annex, as far as it may grow, and links to a page go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from pipeline.report.document.model import (
+    Block,
+    CrossReference,
+    Document,
+    Figure,
+    Folded,
+    Pages,
+    Paragraph,
+    Section,
+    Table,
+    ToPaste,
+)
+from pipeline.words.phrases import listing
+
+_ANNEX = "annex"
+_ANNEX_ROWS = 100  # of folded tables in all: two pages
+
+
+def for_print(document: Document, names: Mapping[str, str]) -> Document:
+    """The document without `Folded` and `Pages`; `names` has the number of every table and figure."""
+    sections = [replace(section, blocks=tuple(_blocks(section.blocks, names))) for section in document.sections]
+    folded = [block for section in document.sections for block in section.blocks if isinstance(block, Folded)]
+    tables = [block for fold in folded for block in fold.blocks if isinstance(block, Table)]
+    if tables:
+        sections.append(Section(_ANNEX, "Annex: the tables folded away above", tuple(_shortened(tables))))
+    return replace(document, sections=tuple(sections))
+
+
+def _blocks(blocks: Sequence[Block], names: Mapping[str, str]) -> Iterator[Block]:
+    for block in blocks:
+        if isinstance(block, Folded):
+            yield Paragraph((f"{block.summary} {_places(block, names)}",))
+        elif isinstance(block, ToPaste):
+            # A link to a row of the report is of use on a page only, and belongs to no paper.
+            texts = (tuple(part for part in text if not isinstance(part, CrossReference)) for text in block.texts)
+            yield ToPaste(block.label, tuple(texts))
+        elif not isinstance(block, Pages):
+            yield block
+
+
+def _places(block: Folded, names: Mapping[str, str]) -> str:
+    """Where what is folded is to be found."""
+    tables = [names[one.id] for one in block.blocks if isinstance(one, Table)]
+    figures = [f"figures/{one.file}" for one in block.blocks if isinstance(one, Figure)]
+    places = [f"{listing(tables)} in the annex"] if tables else []
+    places += [f"{listing(figures)} in report.html"] if figures else []
+    return f"({'; '.join(places)})"
+
+
+def _shortened(tables: Sequence[Table]) -> Iterator[Table]:
+    """The tables within the annex's rows: short ones whole, and the rest is shared by the long ones."""
+    room, left = {}, _ANNEX_ROWS
+    for place, table in enumerate(sorted(tables, key=lambda table: len(table.rows))):
+        room[table.id] = min(len(table.rows), left // (len(tables) - place))
+        left -= room[table.id]
+    for table in tables:
+        rows, all_rows = room[table.id], len(table.rows)
+        if rows < all_rows:
+            caption = f"{table.caption} In print, the first {rows} of {all_rows} rows; all of these are in report.html."
+            table = replace(table, caption=caption, rows=table.rows[:rows], anchors=table.anchors[:rows])  # noqa: PLW2901
+        if table.rows:
+            yield table
