@@ -68,9 +68,9 @@ def contrasts(levels: Sequence[int], effect: tuple[int, ...]) -> FloatArray:
 
 @dataclass(frozen=True)
 class Stratum:
-    """An effect and what it is tested against: sums of squares, the errors' cross products (d, d), degrees of freedom.
+    """An effect with its error: the effect's sum of squares, and the cross products (d, d) of the errors.
 
-    `error_df` is of one contrast: participants less groups.
+    `error_df` are the degrees of freedom of one contrast: participants less groups.
     """
 
     explained: float
@@ -90,7 +90,7 @@ class Stratum:
 
 
 def _stratum(scores: FloatArray) -> Stratum:
-    """Of scores (n, d), whose mean is the effect."""
+    """The stratum of scores (n, d), whose mean is the effect."""
     n, d = scores.shape
     apart = scores - scores.mean(axis=0)
     return Stratum(float(n * np.sum(scores.mean(axis=0) ** 2)), d, apart.T @ apart, n - 1)
@@ -102,7 +102,7 @@ def _blank(effect: str, n: int, status: str = OK) -> Result:
 
 
 def tested(blank: Result, stratum: Stratum, variation: float, values: FloatArray) -> Result:
-    """The row of an effect. `variation`: all strata's error together, beside which generalized η² sets the effect."""
+    """The row of an effect. `variation` is the error of all strata together, to which generalized η² relates it."""
     df1, df2 = float(stratum.df1), float(stratum.df2)
     if negligible(stratum.error, values):
         return replace(blank, status=NO_ERROR, df1=df1, df2=df2)

@@ -11,9 +11,9 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def at_unit_scale(arrays: Sequence[FloatArray]) -> tuple[list[FloatArray], int]:
-    """The arrays over 2ᵉ with their largest value near 1, and e: the square of 1e95's square is no number.
+    """The arrays divided by 2ᵉ so that their largest value is near 1, and e.
 
-    A power of two, so that nothing is rounded.
+    Squares of squares of values beyond 1e77 would be larger than any float. A power of two rounds nothing.
     """
     largest = max((float(np.max(np.abs(array), initial=0.0)) for array in arrays), default=0.0)
     exponent = int(np.frexp(largest)[1])

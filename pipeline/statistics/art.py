@@ -45,14 +45,14 @@ def _effect(means: FloatArray, effect: tuple[int, ...]) -> FloatArray:
     """An effect's part of the cell means (k₁, k₂, …), by inclusion and exclusion of marginal means."""
     part = np.zeros_like(means)
     for size in range(len(effect) + 1):
-        for kept in combinations(effect, size):
-            outside = tuple(axis for axis in range(means.ndim) if axis + 1 not in kept)
+        for subset in combinations(effect, size):
+            outside = tuple(axis for axis in range(means.ndim) if axis + 1 not in subset)
             part += (-1) ** (len(effect) - size) * means.mean(axis=outside, keepdims=True)
     return part
 
 
 def _on_ranks(result: Result) -> Result:
-    """The test of an effect on ranks, without the figures that do not apply to ranks."""
+    """The test of an effect on ranks, without the figures that make no sense for ranks."""
     low, high = result.details.get("partial_eta_squared_ci", (None, None))
     return replace(
         result,
@@ -93,7 +93,7 @@ def art_contrasts(values: FloatArray, factors: Sequence[str], levels: Sequence[S
 
 
 def _ranked_together(values: FloatArray, effect: tuple[int, ...]) -> FloatArray:
-    """Ranks (n, k₁, k₂, …) of the residuals beside the cell means plus the means of the factors' joint levels."""
+    """Ranks (n, k₁, k₂, …) of the residuals from the cell means, plus the means of the factors' joint levels."""
     outside = tuple(place for place in range(values.ndim - 1) if place not in effect)
     means = values.mean(axis=0)
     aligned = values - means + means.mean(axis=outside, keepdims=True) - means.mean()

@@ -1,6 +1,6 @@
 """The Bayes factor of a paired difference, two-sided and one-sided.
 
-pingouin computes the two-sided one, to where it is no float; it refuses one-sided ones, so all of it is our own.
+pingouin computes the two-sided one unless it is too large for a float, and no one-sided ones, so all of it is our own.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def bayes_t(
     t = summary.mean / summary.error
     log_bf10 = log_bayes_factor(t, summary.n, prior_scale)
     above, below = log_shares(t, summary.n, prior_scale)
-    # One side has half the prior: how much more of the posterior has it?
+    # One side has half of the prior; the factor is how much more of the posterior it has.
     logs = {"bf10": log_bf10, "bf_plus0": log_bf10 + np.log(2) + above, "bf_minus0": log_bf10 + np.log(2) + below}
     factors = {name: _factor(value) for name, value in logs.items()}
     chosen = {"two-sided": "bf10", "greater": "bf_plus0", "less": "bf_minus0"}[alternative]
@@ -64,7 +64,7 @@ def bayes_t(
 
 
 def _factor(log: float) -> float | None:
-    """None beyond the largest float; its logarithm is in the details."""
+    """The factor from its logarithm; None beyond the largest float, for which the details have the logarithm."""
     return float(np.exp(log)) if log < np.log(np.finfo(np.float64).max) else None
 
 
@@ -76,7 +76,7 @@ def log_bayes_factor(t: float, n: int, prior_scale: float) -> float:
 def log_shares(t: float, n: int, prior_scale: float) -> tuple[float, float]:
     """ln of the posterior's shares above and below zero.
 
-    Given g the mean's posterior is Student's t with n degrees of freedom around κ times the mean found, where
+    Given g the mean's posterior is Student's t with n degrees of freedom around κ times the observed mean, where
     κ = n·r²·g/(1 + n·r²·g) (Rouder et al. 2009, the model of eq. 1, integrated over the variance).
     """
     log_g, weights = _log_weights(t, n, prior_scale)

@@ -1,4 +1,4 @@
-"""Errors and counts of many trials a person: generalized estimating equations, participants being the clusters.
+"""Errors and counts of many trials per participant: generalized estimating equations with participants as clusters.
 
 Each condition has a mean on the scale of the link (log odds of an error, log rate of events), and differences between
 conditions are ratios. How a person's trials depend on each other is not modelled but allowed for: standard errors come
@@ -38,7 +38,7 @@ _METHODS = {
     "poisson": "Poisson GEE (log rate), participants as clusters, Mancl-DeRouen standard errors, t",
 }
 _RATIOS = {"logit": "odds ratio", "poisson": "rate ratio"}
-_NO_SPREAD = 1e-18  # of a log ratio's variance: everybody's trials came out alike
+_NO_SPREAD = 1e-18  # variance of a log ratio below which everybody's trials came out alike
 EACH_PAIR = "no effect size of more than two conditions: each pair has its own"
 
 
@@ -91,7 +91,7 @@ def _undefined(trials: Trials, k: int, people: int, family: Family) -> str | Non
 
 
 def _fits(trials: Trials, family: Family) -> bool:
-    """Do the outcomes fit the family (0 or 1; counts with exposures above 0)?"""
+    """Whether the outcomes fit the family: 0 or 1, or counts with exposures above 0."""
     if family == "logit":
         return bool(np.isin(trials.outcome, (0.0, 1.0)).all())
     exposed = trials.exposure is None or (trials.exposure > 0).all()
@@ -107,7 +107,7 @@ def _estimated(trials: Trials, clusters: IntArray, k: int, family: Family) -> Es
 
 
 def _f_row(blank: Result, estimated: Estimated, df: float) -> Result:
-    """Are all conditions alike? Wald's W of q contrasts, scaled as Hotelling's T² is: F = W · (df − q + 1)/(q · df)."""
+    """All conditions together: Wald's W of q contrasts, scaled as Hotelling's T²: F = W · (df − q + 1)/(q · df)."""
     blank = replace(blank, statistic_name="F", effect_size_name="")
     q = len(estimated.estimates) - 1
     contrasts = np.hstack([np.ones((q, 1)), -np.eye(q)])

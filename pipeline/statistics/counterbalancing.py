@@ -1,4 +1,4 @@
-"""Orders of conditions that are balanced for position and for the preceding condition."""
+"""Counterbalancing: orders of conditions that are balanced for position and for the preceding condition."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Seed = int | tuple[int, ...] | None
 
 
 def assigned(conditions: int, participants: int, seed: Seed = None) -> list[Order]:
-    """One order per participant: whole squares one after the other, the last as far as it is needed.
+    """One order per participant: complete squares one after the other, of the last one as much as is needed.
 
     With a seed, chance decides within each square who gets which sequence.
     """
@@ -45,16 +45,16 @@ def assigned(conditions: int, participants: int, seed: Seed = None) -> list[Orde
 
 
 def allocated(groups: int, participants: int, seed: Seed = None) -> list[int]:
-    """A group a participant, counted from 0: one of each group in every so many participants, in turn.
+    """The group of each participant, counted from 0: in turn, one of each group in every block of participants.
 
     With a seed, chance decides the order of the groups each time (permuted blocks), so that group sizes never differ by
     more than one, whenever recruiting stops.
     """
     random = None if seed is None else np.random.default_rng(seed)
-    found: list[int] = []
-    while len(found) < participants:
-        found += range(groups) if random is None else random.permutation(groups).tolist()
-    return found[:participants]
+    group_of: list[int] = []
+    while len(group_of) < participants:
+        group_of += range(groups) if random is None else random.permutation(groups).tolist()
+    return group_of[:participants]
 
 
 def nested(conditions: int, levels: int, participants: int, seed: Seed = None) -> list[tuple[Order, ...]]:
@@ -66,15 +66,15 @@ def nested(conditions: int, levels: int, participants: int, seed: Seed = None) -
     """
     design, sequences = williams_design(levels), len(williams_design(conditions))
     random = None if seed is None else np.random.default_rng(seed)
-    found: list[tuple[Order, ...]] = []
+    orders: list[tuple[Order, ...]] = []
     succession = [0] * len(design)
     for participant in range(participants):
         turn, within_round = divmod(participant, sequences)
         if within_round == 0 and turn % len(design) == 0:
             places = range(len(design)) if random is None else random.permutation(len(design))
             succession = [int(place) for place in places]
-        found.append(tuple(design[succession[(turn + condition) % len(design)]] for condition in range(conditions)))
-    return found
+        orders.append(tuple(design[succession[(turn + condition) % len(design)]] for condition in range(conditions)))
+    return orders
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Balance:
 
     @property
     def complete(self) -> bool:
-        """Every one equally often?"""
+        """Whether each condition is in each period, and follows each other one, equally often."""
         return len(set(self.period)) == len(set(self.neighbours)) == 1
 
 
@@ -112,5 +112,5 @@ def balance(orders: Sequence[Sequence[Hashable]]) -> Balance:
 
 
 def _range(counts: Iterable[int]) -> tuple[int, int]:
-    known = list(counts)
-    return min(known), max(known)
+    listed = list(counts)
+    return min(listed), max(listed)

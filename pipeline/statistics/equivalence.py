@@ -13,7 +13,7 @@ from pipeline.statistics.result import Result
 
 
 def tost(first: FloatArray, second: FloatArray, bounds: tuple[float, float], effect: str = "condition") -> Result:
-    """Is the mean of first − second above the lower bound and below the upper one? (Schuirmann 1987)
+    """Whether the mean of first − second lies between the bounds (Schuirmann 1987).
 
     The statistic is the t of the side with the larger p, which is the p of the whole; effect size d_z.
     """

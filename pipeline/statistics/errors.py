@@ -1,4 +1,4 @@
-"""Answers that are right or wrong, one of each participant in each condition: McNemar's test and Cochran's Q."""
+"""Errors: answers 0 or 1, one of each participant in each condition. McNemar's test and Cochran's Q."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ONE_SIDED = "no finite odds ratio: nobody's answer changed in the other directio
 
 
 def mcnemar(first: FloatArray, second: FloatArray, effect: str = "condition") -> Result:
-    """McNemar's (1947) test of answers 0 or 1 (n,), exact, two-sided: of those who changed, as many each way?
+    """McNemar's (1947) test of answers 0 or 1 (n,), exact, two-sided: do as many change one way as the other?
 
     The statistic is b, who have 1 in the first condition only; c, in the second only, is in the details, and so are
     the mid-p (which is less cautious: Fagerland, Lydersen and Laake 2013), χ² and the difference of the proportions
@@ -49,7 +49,7 @@ def mcnemar(first: FloatArray, second: FloatArray, effect: str = "condition") ->
 
 
 def _difference_interval(b: int, c: int, n: int) -> list[float]:
-    """Of the first proportion less the second: Wald's with one more participant for b and for c, and two for n."""
+    """Interval of the first proportion minus the second: Wald's with 1 added to b and to c, and 2 to n."""
     first, second = (b + 1) / (n + 2), (c + 1) / (n + 2)
     margin = float(stats.norm.ppf(0.975) * np.sqrt((first + second - (first - second) ** 2) / (n + 2)))
     return [max(-1.0, first - second - margin), min(1.0, first - second + margin)]

@@ -1,4 +1,4 @@
-"""Estimates beside a test of two conditions: bootstrap intervals, a permutation p, intervals within participants."""
+"""Estimates in addition to a test: bootstrap intervals, a permutation p, and intervals within participants."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ def _bca(values: FloatArray, statistic: Any, seed: int, level: float) -> list[fl
 def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, Any]:
     """For `details`: two-sided p of the mean difference if each participant's two values are exchangeable.
 
-    `permutation_p`; `permutation_exact`: are all 2ⁿ exchanges counted, as up to 40 participants? Else of 99,999 drawn
-    at random, the one found counted among them (Phipson and Smyth 2010), and `permutation_p_error` is the standard
-    error of that. `permutation_count` is how many. p is None without a participant.
+    `permutation_p`; `permutation_exact` is true if all 2ⁿ exchanges are counted, as with up to 40 participants. With
+    more, 99,999 are drawn at random and the observed one is counted too (Phipson and Smyth 2010);
+    `permutation_p_error` is the standard error of that. `permutation_count` is their number. p is None for nobody.
     """
     (values,), _ = at_unit_scale([rounded_differences(first, second)])
     n = len(values)
@@ -99,7 +99,7 @@ def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, A
 
 
 def _exact_p(values: FloatArray) -> float:
-    """The share of all signs whose sum is as far from zero as the one found.
+    """The share of all sign patterns whose sum is as far from zero as the observed one.
 
     SciPy's permutation test goes through them one by one, which of 20 participants takes ten seconds. A sum is one of
     half of the participants plus one of the others: each half's sums are few, and sorted they are counted at once.
@@ -114,7 +114,7 @@ def _exact_p(values: FloatArray) -> float:
 
 
 def _signed_sums(values: FloatArray) -> FloatArray:
-    """Of all 2ⁿ signs."""
+    """The sums (2ⁿ,) of the values under all sign patterns."""
     sums = np.zeros(1)
     for value in values:
         sums = np.concatenate([sums + value, sums - value])
@@ -124,7 +124,7 @@ def _signed_sums(values: FloatArray) -> FloatArray:
 def within_intervals(
     values: FloatArray, level: float = 0.95, bounded: bool = False
 ) -> list[tuple[float, float] | None]:
-    """Of each condition's mean, of values (n, k): without the differences between participants, for figures.
+    """Intervals of each condition's mean without the differences between participants, of values (n, k); for figures.
 
     Cousineau's (2005) normalization with Morey's (2008) correction √(k/(k − 1)): t intervals of the values less their
     participant's mean. They show what a paired test rests on and are no intervals of the conditions' own means. None

@@ -18,9 +18,9 @@ _ROUND_OFF = 1e-9
 
 @dataclass(frozen=True)
 class Blocks:
-    """Movements of one amplitude and width each, taken together: means (m,), and how many there were.
+    """Movements of the same amplitude and width taken together: means (m,), and how many movements there were.
 
-    `amplitude`, `width` and `difficulty` (bits) are effective ones where they are had from selections.
+    `amplitude`, `width` and `difficulty` (bits) are effective ones where they come from selections.
     """
 
     amplitude: FloatArray

@@ -1,4 +1,4 @@
-"""Checks and ranks that every test of groups of participants shares."""
+"""Checks and ranks that all tests of groups of participants share."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def untestable(groups: Sequence[FloatArray]) -> str | None:
 
 
 def unweightable(groups: Sequence[FloatArray]) -> str | None:
-    """The same where each mean is weighted by its own precision, which equal values would make infinite."""
+    """As `untestable`, for tests that weight each mean by its precision, which equal values would make infinite."""
     if status := untestable(groups):
         return status
     return None if all(varies(group) for group in groups) else EQUAL_IN_GROUP
 
 
 def varies(values: FloatArray) -> bool:
-    """Do the values differ by more than round-off?"""
+    """Whether the values differ by more than round-off."""
     return not negligible(float(np.sum((values - values.mean()) ** 2)), values)
 
 

@@ -1,4 +1,4 @@
-"""Do people become faster, trial by trial? The power law of practice, participant by participant."""
+"""Practice: whether people become faster from trial to trial, by the power law of practice of each participant."""
 
 from __future__ import annotations
 
@@ -81,5 +81,5 @@ def _row(first: FloatArray, second: FloatArray, contrast: str, people: int, begi
         details |= {"slope": slope, "ratio_when_trials_double": float(2**slope)}
     if "ci_difference" in tested.details:
         details["ci_slope"] = tested.details["ci_difference"]
-    kept = {name: value for name, value in tested.details.items() if name not in ("ci_difference", "d_av")}
-    return replace(tested, method=_METHOD, contrast=contrast, details={**details, **kept})
+    others = {name: value for name, value in tested.details.items() if name not in ("ci_difference", "d_av")}
+    return replace(tested, method=_METHOD, contrast=contrast, details={**details, **others})

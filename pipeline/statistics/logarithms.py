@@ -1,7 +1,7 @@
 """Tests of logarithms, read as ratios: for times and other values above zero that spread the more the larger they are.
 
 The mean of logarithms is the logarithm of the geometric mean. So what a test says of a difference of logarithms is a
-ratio of geometric means: its estimate and both bounds are taken back by the exponential.
+ratio of geometric means: its estimate and both bounds are transformed back by the exponential.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def as_ratio(result: Result) -> Result:
 
 
 def exponential(log: float | None) -> float | None:
-    """None beyond the largest number."""
+    """The exponential; None beyond the largest float."""
     with np.errstate(over="ignore"):
         result = None if log is None else float(np.exp(log))
     return result if result is not None and np.isfinite(result) else None
@@ -119,7 +119,7 @@ def ratio_follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequenc
 
 
 def geometric_mean(values: FloatArray) -> dict[str, Any]:
-    """Of values (n,) above zero: the geometric mean and the bounds of its 95 % interval; None where undefined."""
+    """The geometric mean of values (n,) above zero, and the bounds of its 95 % interval; None where undefined."""
     logs = logarithms(values)
     row = {} if isinstance(logs, str) or not len(values) else summarize(logs)
     names = {"geometric_mean": "mean", "geometric_ci_low": "ci_low", "geometric_ci_high": "ci_high"}

@@ -1,4 +1,4 @@
-"""The paired t test, and what all tests of paired differences begin with."""
+"""The paired t test, and the summary of differences that all paired tests begin with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which two things to compare: the pairs of conditions, and those that follow an analysis of variance."""
+"""The pairs to compare: of conditions, and those that follow up an analysis of variance."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def of_groups(groups: Sequence[FloatArray], names: Sequence[str], effect: str = 
 
 
 def follow_ups(values: FloatArray, factors: Sequence[str], levels: Sequence[Sequence[str]]) -> list[Pair]:
-    """What an analysis of variance of values (n, k₁, k₂, …) leaves open, effect by effect.
+    """The pairs that follow up an analysis of variance of values (n, k₁, k₂, …), effect by effect.
 
     Of a factor of three levels or more every two of its means. Of an interaction its simple effects: every two
     conditions (or levels of its first factor, where `condition` is not in it) at each level of the others; factors

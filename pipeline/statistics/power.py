@@ -40,7 +40,7 @@ class Design:
 
     @property
     def means(self) -> FloatArray:
-        """Of the conditions, (k,), in SDs of a condition."""
+        """Means of the conditions (k,), in SDs of a condition."""
         means = np.zeros(self.conditions)
         means[0], means[-1] = self.difference / 2, -self.difference / 2
         return means
@@ -66,14 +66,14 @@ def closed_form(design: Design, n: int) -> float | None:
 
 
 def paired_t_power(dz: float, n: int, alpha: float = 0.05) -> float:
-    """Of the two-sided paired t test: both tails of the noncentral t with δ = d_z·√n (Cohen 1988, section 2.3)."""
+    """Power of the two-sided paired t test: both tails of noncentral t with δ = d_z·√n (Cohen 1988, section 2.3)."""
     critical, noncentrality = float(stats.t.isf(alpha / 2, n - 1)), dz * np.sqrt(n)
     above = 1 - noncentral_t_cdf(critical, n - 1, noncentrality)
     return above + noncentral_t_cdf(-critical, n - 1, noncentrality)
 
 
 def rm_anova_power(f: float, n: int, conditions: int, correlation: float, alpha: float = 0.05) -> float:
-    """Of the uncorrected F test of one within-factor under sphericity: noncentral F with λ = n·k·f²/(1 − r).
+    """Power of the uncorrected F test of one within-factor under sphericity: noncentral F with λ = n·k·f²/(1 − r).
 
     As G*Power computes it from Cohen's f (Faul, Erdfelder, Lang and Buchner 2007, table 3).
     """

@@ -30,7 +30,7 @@ class Planned(Protocol):
         """How power is computed, in words."""
 
     def power(self, effect: float, n: int) -> float:
-        """Of an effect, with n participants in each group."""
+        """The power for an effect, with n participants in each group."""
 
 
 def detectable(design: Planned, n: int, power: float, largest: float = _LARGEST_EFFECT) -> float | None:
@@ -55,7 +55,7 @@ class PairedT:
     method: ClassVar[str] = "closed form, noncentral t"
 
     def power(self, effect: float, n: int) -> float:
-        """Of n participants."""
+        """Power with n participants."""
         return paired_t_power(effect, n, self.alpha)
 
 
@@ -72,7 +72,7 @@ class TwoGroups:
     method: ClassVar[str] = "closed form, noncentral t with Satterthwaite's degrees of freedom of the stated SDs"
 
     def power(self, effect: float, n: int) -> float:
-        """Of n participants in the first group."""
+        """Power with n participants in the first group."""
         error, df = self.error(n)
         critical, noncentrality = float(stats.t.isf(self.alpha / 2, df)), effect / error
         above = 1 - noncentral_t_cdf(critical, df, noncentrality)
@@ -100,7 +100,7 @@ class SeveralGroups:
     method: ClassVar[str] = "closed form, noncentral F with Welch's degrees of freedom of the stated SDs (Levy 1978)"
 
     def power(self, effect: float, n: int) -> float:
-        """Of n participants in each group."""
+        """Power with n participants in each group."""
         k = self.groups
         sds = np.asarray(self.sds if self.sds is not None else np.ones(k), dtype=np.float64)
         weights = n / (sds**2 / np.mean(sds**2))
@@ -110,7 +110,7 @@ class SeveralGroups:
         return float(stats.ncf.sf(stats.f.isf(self.alpha, k - 1, df2), k - 1, df2, noncentrality))
 
     def means(self, effect: float) -> FloatArray:
-        """Of the groups (k,), in roots of the mean variance."""
+        """Means of the groups (k,), in roots of the mean variance."""
         means = np.zeros(self.groups)
         means[0], means[-1] = np.array([1, -1]) * effect * np.sqrt(self.groups / 2)
         return means
@@ -141,7 +141,7 @@ class FactorialEffect:
         return "closed form, noncentral F" + (f" corrected by ε = {self.epsilon:g}" if self.epsilon < 1 else "")
 
     def power(self, effect: float, n: int) -> float:
-        """Of n participants in each group."""
+        """Power with n participants in each group."""
         cells, people = int(np.prod(self.levels)), n * self.groups
         contrasts = int(np.prod([self.levels[place] - 1 for place in self.effect]))
         epsilon = self.epsilon if self.effect else 1.0
@@ -167,7 +167,7 @@ class Equivalence:
     method: ClassVar[str] = "exact, both one-sided tests integrated over the SD's distribution"
 
     def power(self, effect: float, n: int) -> float:
-        """Of n participants, or of n in each group."""
+        """Power with n participants, or with n in each group."""
         df = 2 * (n - 1) if self.groups else n - 1
         error = float(np.sqrt((2 if self.groups else 1) / n))
         return equivalence_power((-self.bound, self.bound), effect, error, df, self.alpha)

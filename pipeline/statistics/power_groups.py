@@ -60,7 +60,7 @@ def simulate_groups(design: Groups, effect: float, n: int, studies: int, seed: i
 def detectable_by_simulation(
     design: Groups, n: int, power: float, studies: int, seed: int, largest: float = 10.0
 ) -> tuple[float, float, float] | None:
-    """The smallest effect f that n find with this power, and between which the simulation's error leaves it.
+    """The smallest effect f that n find with this power, with the bounds of the simulation's error.
 
     None up to the largest.
     """
@@ -115,7 +115,7 @@ def kruskal_p(groups: list[FloatArray]) -> FloatArray:
 
 
 def mann_whitney_significant(first: FloatArray, second: FloatArray, alpha: float) -> BoolArray:
-    """Is the exact two-sided p below alpha? (studies,) of groups (studies, nᵢ) without ties."""
+    """Whether the exact two-sided p is below alpha (studies,), of groups (studies, nᵢ) without ties."""
     n, m = first.shape[1], second.shape[1]
     ranks = np.argsort(np.argsort(np.concatenate([first, second], axis=1), axis=1), axis=1)[:, :n] + 1
     u = ranks.sum(axis=1) - n * (n + 1) // 2

@@ -43,7 +43,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Simulated:
-    """With the test's own p, and with the p corrected for sphericity where there is one."""
+    """Shares by the test's own p, and by the p corrected for sphericity where there is one."""
 
     own: Share
     corrected: Share | None
@@ -67,7 +67,7 @@ def simulate(design: Design, n: int, studies: int, seed: int, values_at_once: in
 
 
 def crossings(share_of: Callable[[float], Share], power: float, largest: float) -> tuple[float, float, float] | None:
-    """The smallest effect whose share reaches this power, and between which the simulation's error leaves it.
+    """The smallest effect whose share reaches this power, with the bounds of the simulation's error.
 
     None where the largest does not reach it. `share_of` draws the same for every effect, so that power rises with the
     effect but for single studies. Each of the three is looked for by halves, down to 1e-3 of itself.
@@ -120,7 +120,7 @@ def t_paired_p(differences: FloatArray) -> FloatArray:
 
 
 def wilcoxon_significant(differences: FloatArray, alpha: float) -> BoolArray:
-    """Is the signed-rank test's exact two-sided p below alpha? (studies,) of differences (studies, n) without ties."""
+    """Whether the signed-rank test's exact p is below alpha (studies,), of differences (studies, n) without ties."""
     n = differences.shape[1]
     order = np.argsort(np.abs(differences), axis=1)
     positive = np.take_along_axis(differences > 0, order, axis=1)

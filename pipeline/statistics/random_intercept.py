@@ -38,7 +38,7 @@ class Rows:
 
     @cached_property
     def sizes(self) -> FloatArray:
-        """Rows a participant (G,)."""
+        """Rows of each participant (G,)."""
         return np.bincount(self.participants).astype(np.float64)
 
     @cached_property
@@ -136,7 +136,7 @@ class _Solved:
 
     @property
     def slope(self) -> float:
-        """Of −2 log restricted likelihood in σ_b²: tr(PG) − yᵀPGPy."""
+        """Derivative of −2 log restricted likelihood in σ_b²: tr(PG) − yᵀPGPy."""
         trace = np.sum(self._rows.sizes / self._total) - np.trace(self.covariance @ self._inner[1])
         return float(trace - self._moved[0] @ self._moved[1])
 

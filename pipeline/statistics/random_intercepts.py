@@ -37,7 +37,7 @@ def fitted(rows: Rows, groupings: Mapping[str, IntArray]) -> Fitted | str:
 
 
 def _without_residual(problem: Problem) -> bool:
-    """Do fixed effects and random intercepts leave nothing of the values?"""
+    """Whether fixed effects and random intercepts explain the values completely."""
     blocks = [codes[:, None] == np.unique(codes) for codes in problem.groupings.values()]
     explained = np.hstack([problem.design, *blocks])
     left = problem.values - explained @ np.linalg.lstsq(explained, problem.values, rcond=None)[0]

@@ -102,7 +102,7 @@ def from_first(values: FloatArray) -> FloatArray:
 
 
 def negligible(sum_of_squares: float, values: FloatArray) -> bool:
-    """Is a sum of squares nothing but round-off of the values it was made from?"""
+    """Whether a sum of squares is nothing but round-off of the values that it was computed from."""
     return sum_of_squares <= values.size * (_ROUND_OFF * float(np.max(np.abs(values), initial=0.0))) ** 2
 
 

@@ -1,4 +1,4 @@
-"""The number of participants at which a planned comparison has the power that is asked for."""
+"""The number of participants at which a planned comparison reaches a stated power."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Needed:
-    """The fewest participants by simulation, and between which numbers its error leaves them; None beyond the most."""
+    """The fewest participants by simulation, with the bounds of its error; None where that is more than the most."""
 
     n: int | None
     low: int | None
@@ -105,7 +105,7 @@ def needed(share: Callable[[int], Share], power: float, start: int, most: int) -
 
 
 def spread(middle: int, most: int) -> Iterable[int]:
-    """Round numbers up to well beyond the middle."""
+    """Round numbers of participants, from few to well beyond the middle one."""
     last = min(most, max(middle + 4, round(1.6 * middle)))
     step = next((step for step in _STEPS if last / step <= _ROWS), _STEPS[-1])
     return range(max(FEWEST, step), last + 1, step)

@@ -1,4 +1,4 @@
-"""What a fitted linear mixed model says of its coefficients, with Satterthwaite's (1946) degrees of freedom.
+"""Tests of the coefficients of a linear mixed model, with Satterthwaite's (1946) degrees of freedom.
 
 As lmerTest computes them (Kuznetsova et al. 2017): the variance of an estimate is itself estimated, and its degrees of
 freedom are those of the χ² with the same mean and variance.
@@ -34,12 +34,12 @@ class Fit:
 
     @property
     def zero(self) -> list[str]:
-        """The random intercepts whose variance is estimated as zero: of a singular fit."""
+        """The random intercepts whose variance is estimated as zero; any makes the fit singular."""
         return [name for name, variance in self.variances.items() if variance == 0]
 
 
 def degrees_of_freedom(fitted: Fit, hypothesis: FloatArray) -> float:
-    """Of one linear combination (p,) of the coefficients: 2v² / Var(v̂)."""
+    """Degrees of freedom of one linear combination (p,) of the coefficients: 2v² / Var(v̂)."""
     variance = hypothesis @ fitted.covariance @ hypothesis
     slope = np.array([hypothesis @ matrix @ hypothesis for matrix in fitted.derivatives])
     return float(2 * variance**2 / (slope @ fitted.uncertainty @ slope))

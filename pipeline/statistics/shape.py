@@ -1,9 +1,9 @@
-"""How are the values within the cells of a design shaped: are they skewed, and do they spread alike?
+"""The shape of the values within the cells of a design: whether they are skewed, and spread alike.
 
-Asked before ranks or means are believed. Times are often log-normal: where one factor makes them five times as long it
-makes them spread five times as far too. The aligned rank transform then finds effects of the other factor that are not
-there: in simulations of 12 and 24 people, 3 × 2 cells, in 25 to 37 % of studies where that strong factor was (5 % is
-meant), whether the values themselves were much skewed or little; in 4 to 7 % where it was not.
+It matters before ranks or means are believed. Times are often log-normal: where one factor makes them five times as
+long, it makes them spread five times as far too. The aligned rank transform then finds effects of the other factor that
+do not exist: in simulations of 12 and 24 people, 3 × 2 cells, in 25 to 37 % of studies where that strong factor was
+present (5 % is nominal), whether the values themselves were skewed much or little; in 4 to 7 % where it was absent.
 """
 
 from __future__ import annotations

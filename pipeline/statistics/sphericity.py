@@ -1,4 +1,4 @@
-"""Do the differences between any two levels vary alike? Mauchly's test, and what corrects F where they do not."""
+"""Sphericity: whether the differences between any two levels vary alike. Mauchly's test, and the corrections of F."""
 
 from __future__ import annotations
 

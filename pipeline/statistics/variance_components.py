@@ -76,12 +76,12 @@ def distinct(problem: Problem) -> tuple[Problem, list[str]]:
 
     One that is a function of the fixed effects, or has a group for every row, leaves nothing of its own.
     """
-    kept: dict[str, IntArray] = {}
+    identifiable: dict[str, IntArray] = {}
     for name, codes in problem.groupings.items():
-        tried = Problem(problem.values, problem.design, {**kept, name: codes})
+        tried = Problem(problem.values, problem.design, {**identifiable, name: codes})
         if np.linalg.eigvalsh(_correlations(_Matrices(tried)))[0] > _DISTINCT:
-            kept[name] = codes
-    left_out = [name for name in problem.groupings if name not in kept]
+            identifiable[name] = codes
+    left_out = [name for name in problem.groupings if name not in identifiable]
     return problem.without(set(left_out)), left_out
 
 
@@ -135,12 +135,12 @@ class _Solved:
 
     @property
     def deviance(self) -> float:
-        """But for its constants."""
+        """−2 log restricted likelihood, without its constants."""
         return float(self._at.free * np.log(self.squares) - np.linalg.slogdet(self.inverse)[1])
 
     @property
     def slope(self) -> FloatArray:
-        """Of the deviance in each τ."""
+        """Derivatives of the deviance in each τ."""
         return np.array(
             [
                 np.trace(self.weighted[part, part])

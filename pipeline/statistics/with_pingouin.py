@@ -1,4 +1,4 @@
-"""What pingouin computes (Vallat 2018), on plain arrays: it is imported, and its warnings kept quiet, here alone.
+"""What pingouin computes (Vallat 2018), on plain arrays. Only here is it imported, and are its warnings silenced.
 
 Its answers equal R's in these tests. Equal data, on which it raises or divides by zero, are sorted out before.
 """

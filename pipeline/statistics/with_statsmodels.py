@@ -1,4 +1,4 @@
-"""What statsmodels computes (Seabold and Perktold 2010), on plain arrays: imported, and its warnings kept, here alone.
+"""What statsmodels computes (Seabold and Perktold 2010), on plain arrays; imported, its warnings caught, only here.
 
 Its answers equal R's in these tests. Data without an estimate are sorted out before; what does not converge is None.
 """
