@@ -1,4 +1,4 @@
-"""Every table by its name, and the lists of tables that follow from their records."""
+"""All tables by name, and the lists of tables that derive from their records."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.tables.study_tables import STUDY_TABLES
 TABLES: Mapping[str, Table] = {
     table.name: table for table in (*SESSION_TABLES, *STUDY_TABLES, *REPLAY_TABLES, *EXPLORE_TABLES)
 }
-"""Columns never vary with data or options; what does not apply is null."""
+"""All tables. Columns never vary with data or options; what does not apply is null."""
 
 
 def written_by(command: str) -> list[str]:
-    """The tables that a command writes beside its report: replay or explore."""
+    """The tables that a command, replay or explore, writes with its report."""
     return [table.name for table in TABLES.values() if command in table.commands]
 
 
 def in_results_of(command: str) -> list[str]:
-    """Those of them whose rows stand in its results.json."""
+    """Those of its tables whose rows are in the command's results.json."""
     return [name for name in written_by(command) if TABLES[name].in_results]
 
 
@@ -39,4 +39,4 @@ GATHERED: Mapping[str, str] = {
     for table in TABLES.values()
     if len(table.stages) == 2 and table.stages[0] in ("ingest", "assess") and table.stages[1] == "compare"
 }
-"""What the stage compare takes from an earlier stage, session by session and as it is: the table and that stage."""
+"""The tables that the stage compare only gathers from the sessions, each with the stage that writes it."""

@@ -1,4 +1,4 @@
-"""What a table is: its record, its columns, and the columns that several tables share.
+"""The record of a table, its columns, and the columns that several tables share.
 
 The records stand in `session_tables`, `recording_tables`, `study_tables` and `command_tables`; `catalogue` has all of
 them by name.
@@ -22,7 +22,7 @@ TEXT, FLOAT, COUNT = pa.string(), pa.float64(), pa.int64()
 
 
 class Column(NamedTuple):
-    """A column: its name, which ends in the unit, its type, and what it says, with the unit where the name has none."""
+    """A column: its name, which ends in the unit, its type, and what it holds, with the unit if the name has none."""
 
     name: str
     kind: pa.DataType
@@ -31,10 +31,10 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """The one place that says what a table is; everything that lists tables is derived from these records.
+    """A table. Everything that lists tables derives from these records.
 
     `about` says what a row stands for. `stages` of a study write the table, in this order, and the last of them has it
-    whole; `commands` that are no stage, such as replay, may write it too. `key` are the text columns that tell the rows
+    completely; `commands` such as replay may write it too. `key` are the text columns that tell the rows
     of results.json apart. `in_results`: its rows stand in results.json. `as_csv`: it is written as CSV beside the
     report. `checked`: `steadyhand check` expects its numbers to stay the same.
     """
@@ -51,7 +51,7 @@ class Table:
 
     @cached_property
     def schema(self) -> pa.Schema:
-        """The columns as Arrow has them."""
+        """The columns as an Arrow schema."""
         return pa.schema([(column.name, column.kind) for column in self.columns])
 
     @cached_property
@@ -61,7 +61,7 @@ class Table:
 
     @property
     def stage(self) -> str:
-        """The stage that has the table whole; empty for a table that no stage of a study writes."""
+        """The stage that has the complete table; empty for a table that no stage of a study writes."""
         return self.stages[-1] if self.stages else ""
 
 
@@ -81,7 +81,7 @@ def count(name: str, about: str) -> Column:
 
 
 def each(name: str, about: str, axes: Iterable[str] = "xyz") -> tuple[Column, ...]:
-    """A column of numbers for each axis, which stands for {} in the name and in what is said of it."""
+    """A column of numbers for each axis; the axis replaces {} in the name and in the description."""
     return tuple(number(name.format(axis), about.format(axis)) for axis in axes)
 
 

@@ -1,4 +1,4 @@
-"""Compare two sets of results, value by value: which moved, which rows were added, and which are gone."""
+"""Compares two results.json value by value: which values moved, which rows were added, and which are gone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ The name of the study's folder tells no rows apart there, and is not compared: r
 OF_A_REPLAY: Mapping[str, tuple[str, ...]] = {name: TABLES[name].key for name in in_results_of("replay")}
 """The same for the results.json of a replay, where a row belongs to one of several studies."""
 
-_NEAR_ZERO = 1e-12  # where the true difference is zero, what is left is the rounding of what was subtracted
+_NEAR_ZERO = 1e-12  # a difference that is truly zero may leave this much rounding error
 _FACTS: Mapping[str, tuple[str, ...]] = {_STUDY: (), _STUDIES: ("name",)}
 
 
@@ -38,7 +38,7 @@ ABSENT = _Absent()
 
 @dataclass(frozen=True)
 class Change:
-    """A value that changed, was added or is gone: its name, and what it was and is, ABSENT if nothing."""
+    """A value that changed, was added or is gone: its name, and its values before and now, `ABSENT` if none."""
 
     name: str
     before: Any
@@ -46,7 +46,7 @@ class Change:
 
     @property
     def is_numeric(self) -> bool:
-        """Is or was it a number?"""
+        """Whether it is or was a number."""
         return is_number(self.before) or is_number(self.now)
 
     @property
@@ -107,12 +107,12 @@ class Differences:
 
 
 def is_number(value: object) -> bool:
-    """Is it a number? True and false are not."""
+    """Whether it is a number. True and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def cell(value: object) -> str:
-    """A value as a table of differences shows it."""
+    """A value as text in a table of differences."""
     if value is ABSENT:
         return "absent"
     if value is None:

@@ -57,7 +57,7 @@ def _lines(table: Table) -> Iterator[str]:
 
 
 def _whereabouts(table: Table) -> Iterator[str]:
-    """Which stages and commands write the table, and in which files of a report it is found."""
+    """Which stages and commands write the table, and which files of a report hold it."""
     if table.stages:
         if len(table.stages) == 1:
             yield f"Written by the stage {table.stage}."

@@ -1,4 +1,4 @@
-"""Write and read results.json: every number of the report, as lists of objects with the tables' columns."""
+"""Writes and reads results.json: all numbers of the report, as lists of objects with the tables' columns."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def write_exploration(
 
 
 def _dump(path: Path, head: Mapping[str, Any], lists: Mapping[str, Iterable[Mapping[str, Any]]]) -> None:
-    """Write one object row by row, each on a line of its own: an archive's rows never stand in memory as one text."""
+    """Write one object, each row on its own line; row by row, so that large results never fill the memory."""
     as_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
     with path.open("w", encoding="utf-8") as file:
         file.write(f'{{\n "schema_version": {SCHEMA_VERSION}')

@@ -1,4 +1,4 @@
-"""Tables as DataFrames, as Arrow, and as files: every one with exactly the columns and types of its record."""
+"""Tables as DataFrames, in Arrow, and in files, always with exactly the columns and types of their records."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def of_rows(name: str, rows: Iterable[Row]) -> pa.Table:
 
 
 def _known_columns(name: str, rows: Sequence[Row]) -> list[str]:
-    """The table's columns; KeyError for a row that has another."""
+    """The table's columns. Raises KeyError for a row that has any other."""
     columns = TABLES[name].names
     for row in rows:
         unknown = row.keys() - set(columns)
@@ -108,7 +108,7 @@ def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
 
 
 def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
-    """Write `<name>.parquet`; a small table uncompressed, since unpacking would take most of the time to read it."""
+    """Write `<name>.parquet`. Small tables are not compressed: unpacking would take most of the time to read them."""
     if len(data) == 0:
         data = TABLES[name].schema.empty_table()
     elif isinstance(data, pd.DataFrame):
@@ -172,7 +172,7 @@ def of_stream(table: pa.Table, stream: str) -> Columns:
 
 
 def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Rows as plain objects for JSON: null for what does not apply; `details` and `factors` stay text."""
+    """Rows as plain objects for JSON, None for what does not apply; `details` and `factors` stay text."""
     for row in as_table(name, data).itertuples(index=False):
         yield {key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)}
 
