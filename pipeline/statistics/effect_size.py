@@ -13,7 +13,7 @@ from pipeline.statistics.arrays import FloatArray
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 _STEP = np.array([-9.0, 9.0])  # where Φ is neither 0 nor 1
 _SMOOTH_FROM = 3  # degrees of freedom
-_WIDEST = 1e6  # beyond this times what was found, no bound is looked for
+_WIDEST = 1e6  # times the estimate: no bound is searched for beyond it
 _LARGEST = 1e5  # noncentrality for which SciPy's noncentral F is used: beyond it gives NaN
 
 

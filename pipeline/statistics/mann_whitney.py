@@ -97,7 +97,7 @@ def _ways(weights: np.ndarray[tuple[int], np.dtype[np.int64]], count: int) -> Fl
 def _biserial_interval(theta: float, ranks: FloatArray, n: int, m: int) -> tuple[float, float]:
     """Newcombe (2006, Statistics in Medicine 25, 559-573), method 5, on the scale of the correlation.
 
-    The θ = P(first > second) + P(tie) / 2 from which the one found is 1.96 standard errors away. Where θ = ½ this
+    The θ = P(first > second) + P(tie) / 2 from which the observed one is 1.96 standard errors away. Where θ = ½ this
     error is that of the test. In simulations of 6 to 20 a group 94 to 97 % of intervals held the true value, also of
     ratings that tie; 91 to 94 % where the smaller of two unequal groups spreads twice as far.
     """

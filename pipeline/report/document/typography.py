@@ -47,18 +47,18 @@ def typeset(text: str) -> tuple[Run, ...]:
 
 def _runs(text: str) -> Iterator[Run]:
     done = 0
-    for found in _SYMBOL.finditer(text):
-        yield Run(text[done : found.start()])
-        if found["letter"]:
-            yield Run(found["letter"], "italic")
-        elif found["effect"]:
-            yield Run(found["effect"], "italic")
-            yield Run(found["of"], "subscript")
+    for match in _SYMBOL.finditer(text):
+        yield Run(text[done : match.start()])
+        if match["letter"]:
+            yield Run(match["letter"], "italic")
+        elif match["effect"]:
+            yield Run(match["effect"], "italic")
+            yield Run(match["of"], "subscript")
         else:
-            yield Run(found["share"], "italic")
-            yield Run(found["squared"])
-            yield Run(found["kind"], "subscript")
-        done = found.end()
+            yield Run(match["share"], "italic")
+            yield Run(match["squared"])
+            yield Run(match["kind"], "subscript")
+        done = match.end()
     yield Run(text[done:])
 
 

@@ -25,7 +25,7 @@ from pipeline.report.figures.style import (
 from pipeline.report.figures.wording import listed
 from pipeline.words.numbers import MINUS, number, percent
 
-_POINTS_MAX = 16  # of a condition; more intervals side by side cannot be told apart
+_POINTS_MAX = 16  # of a condition; more intervals side by side cannot be distinguished
 _SHARE_MIN = 0.5  # of the participants: a point of the few who had the most trials is no point of the same people
 
 
@@ -105,9 +105,9 @@ def points(trials: pd.DataFrame, width: int) -> tuple[np.ndarray[Any, Any], ...]
     A point needs half of the participants.
     """
     people = trials["participant"].nunique()
-    placed = trials.assign(point=(trials["order"] - 1) // width, log=np.log(trials["duration_s"]))
+    by_point = trials.assign(point=(trials["order"] - 1) // width, log=np.log(trials["duration_s"]))
     rows = []
-    for own in (own for _, own in placed.groupby("point")):
+    for own in (own for _, own in by_point.groupby("point")):
         values = own.groupby("participant")["log"].mean().to_numpy(np.float64)
         if len(values) >= _SHARE_MIN * people:
             mean, low, high = mean_and_interval(values)

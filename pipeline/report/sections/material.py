@@ -86,8 +86,8 @@ class Material:
 
     def of_shares(self, measure: str) -> bool:
         """Is each value of a measure a participant's share of answers 0 or 1?"""
-        found = (row["interval"] for row in self.rows("descriptives") if row["measure"] == measure)
-        return not {T_OF_SHARES, NONE_OF_ALIKE}.isdisjoint(found)
+        intervals = (row["interval"] for row in self.rows("descriptives") if row["measure"] == measure)
+        return not {T_OF_SHARES, NONE_OF_ALIKE}.isdisjoint(intervals)
 
     def figure(
         self,

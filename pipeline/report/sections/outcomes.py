@@ -1,4 +1,4 @@
-"""Outcomes: selection, time, workload and further measures."""
+"""The sections of measures: target selection, time, questionnaires and further measures."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
 
 def selection(material: Material) -> Section | None:
     """Accuracy of target selection (the paper's Fig. 12)."""
-    names = _shown_here(material, "selection")
+    names = _measures_in(material, "selection")
     if not names:
         return None
     drawn = next(name for name in names if "mse" in name)
@@ -39,16 +39,16 @@ def selection(material: Material) -> Section | None:
         " square root of the mean of the participants' MSEs, in the unit of the display."
     )
     blocks: list[Block] = [Paragraph((text,)), *_task(material), _descriptives(material, "table-selection", names)]
-    blocks += _measured(material, drawn)
-    blocks += _selected(material)
+    blocks += _figure_and_tests(material, drawn)
+    blocks += _selections(material)
     if material.rows("shown_at_selection"):
-        blocks.append(_shown(material))
+        blocks.append(_shown_at_selection(material))
     return Section("selection", "Target selection", tuple(blocks))
 
 
 def time(material: Material) -> Section | None:
     """Time (the paper's Fig. 13)."""
-    names = _shown_here(material, "time")
+    names = _measures_in(material, "time")
     if not names:
         return None
     text = (
@@ -57,38 +57,38 @@ def time(material: Material) -> Section | None:
     )
     blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-time", names)]
     for name in names:
-        blocks += _measured(material, name)
+        blocks += _figure_and_tests(material, name)
     return Section("time", "Time", tuple(blocks))
 
 
 def workload(material: Material) -> Section | None:
     """Questionnaires (the paper's Table 2 and Fig. 14)."""
-    scales = _shown_here(material, "ratings")
+    scales = _measures_in(material, "ratings")
     if not scales:
         return None
     blocks: list[Block] = []
     for questionnaire in dict.fromkeys(name.partition("/")[0] for name in scales):
-        mine = [name for name in scales if name.partition("/")[0] == questionnaire]
-        blocks += _questionnaire(material, questionnaire, mine)
+        own_scales = [name for name in scales if name.partition("/")[0] == questionnaire]
+        blocks += _questionnaire(material, questionnaire, own_scales)
     return Section("workload", "Workload and other ratings", tuple(blocks))
 
 
 def others(material: Material) -> Section | None:
     """Every measure that has no section of its own."""
-    names = _shown_here(material, "others")
+    names = _measures_in(material, "others")
     if not names:
         return None
     blocks: list[Block] = [_descriptives(material, "table-others", names)]
     for name in names:
-        blocks += _measured(material, name)
+        blocks += _figure_and_tests(material, name)
     return Section("others", "Further measures", tuple(blocks))
 
 
-def _shown_here(material: Material, section_name: SectionName) -> list[str]:
-    """The study's measures that a section shows; those that Steadyhand computes itself stand in their own order."""
-    mine = [name for name in material.measured() if measure(name).section == section_name]
-    ours = [name for name in MEASURES if name in mine]
-    return [*ours, *(name for name in mine if name not in ours)]
+def _measures_in(material: Material, section_name: SectionName) -> list[str]:
+    """The study's measures that a section shows: built-in ones first, in their own order, then the others."""
+    names = [name for name in material.measured() if measure(name).section == section_name]
+    built_in = [name for name in MEASURES if name in names]
+    return [*built_in, *(name for name in names if name not in built_in)]
 
 
 def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Table:
@@ -116,11 +116,11 @@ def interval_note(rows: Sequence[Row]) -> str:
     for row in rows:
         if row["interval"] not in (None, T):
             of.setdefault(row["interval"], []).append(measure_label(row["measure"]))
-    told = (f"{listing(list(dict.fromkeys(labels)))}: {method}" for method, labels in of.items())
-    return f"Intervals are t intervals; of {'; of '.join(told)}." if of else ""
+    exceptions = (f"{listing(list(dict.fromkeys(labels)))}: {method}" for method, labels in of.items())
+    return f"Intervals are t intervals; of {'; of '.join(exceptions)}." if of else ""
 
 
-def _measured(material: Material, measure: str) -> list[Block]:
+def _figure_and_tests(material: Material, measure: str) -> list[Block]:
     """A measure's figure and what its tests say."""
     wide = material.participant_means(measure)
     if not wide.notna().any().any():
@@ -140,7 +140,7 @@ def _task(material: Material) -> list[Block]:
     return [] if task is None else [material.drawn("task", figures.task_layout, task)]
 
 
-def _selected(material: Material) -> list[Block]:
+def _selections(material: Material) -> list[Block]:
     """Where selections fell about their targets, and each participant's errors trial by trial."""
     study, selections, trials = material.study, material.table("selections"), material.table("trials")
     blocks: list[Block] = []
@@ -161,20 +161,20 @@ def _selected(material: Material) -> list[Block]:
 
 def _sentences(rows: Sequence[Row]) -> Iterator[str]:
     """One sentence per comparison; its follow-up pairs share one."""
-    whole = {
+    omnibus = {
         (row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] in ("F", "Q")
     }
 
     def follows_up(row: Row) -> bool:
-        return row["contrast"] is not None and (row["test"], row["effect"]) in whole
+        return row["contrast"] is not None and (row["test"], row["effect"]) in omnibus
 
     for (test, _, follows), group in groupby(rows, key=lambda row: (row["test"], row["effect"], follows_up(row))):
         pairs = list(group)
         if not follows:
             yield from (brief_sentence(row) for row in pairs)
             continue
-        told = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
-        yield f"follow-up of {with_article(TESTS[test].label)}, n = {pairs[0]['n']}: {'; '.join(told)}"
+        pair_texts = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
+        yield f"follow-up of {with_article(TESTS[test].label)}, n = {pairs[0]['n']}: {'; '.join(pair_texts)}"
 
 
 def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:
@@ -194,7 +194,7 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
 def _ratings_table(material: Material, questionnaire: str, title: str, names: list[str]) -> Table:
     """Mean and SD of every scale, conditions side by side (the paper's Table 2)."""
     conditions = material.study.conditions
-    found = {(row["measure"], row["condition"]): row for row in material.rows("descriptives")}
+    described = {(row["measure"], row["condition"]): row for row in material.rows("descriptives")}
     columns = [Column("Scale", False)]
     for condition in conditions:
         columns += [Column(f"{condition}: mean"), Column("SD"), Column("n")]
@@ -202,7 +202,7 @@ def _ratings_table(material: Material, questionnaire: str, title: str, names: li
     for name in names:
         cells = [short_label(name)]
         for condition in conditions:
-            row = found.get((name, condition))
+            row = described.get((name, condition))
             cells += ["–", "–", "0"] if row is None else [number(row["mean"]), number(row["sd"]), f"{row['n']}"]
         rows.append(tuple(cells))
     note = "Total: a participant's sum over the scales." if any(name.endswith("/total") for name in names) else ""
@@ -237,8 +237,8 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     )
 
 
-def _shown(material: Material) -> Table:
-    """What each estimator would have shown when people selected."""
+def _shown_at_selection(material: Material) -> Table:
+    """How far from the targets each estimator would have been when people selected."""
     titles = ("Condition", "Estimator", "n", "RMSE (mm)")
     cells = tuple(
         (row["condition"], row["estimator"], f"{row['n']}", number(row["rmse_mm"]))

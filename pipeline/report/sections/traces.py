@@ -37,15 +37,15 @@ def _all(material: Material) -> Iterator[Traces]:
 def _of_session(material: Material, session: Session, ingested: Path, fused: Path) -> Traces:
     study = material.study
     origin_ns, streams = recording.positions(study, ingested)
-    found: list[Series] = []
+    series: list[Series] = []
     for name, samples in streams.items():
         kind = _KINDS[study.streams[name].kind]
         time_s = samples.arrival if kind == "tracker" else samples.time
         order = np.argsort(time_s, kind="stable")
         if len(order):
-            found.append(Series(name, kind, recording.shown_axes(study, name), time_s[order], samples.value[order]))
+            series.append(Series(name, kind, recording.shown_axes(study, name), time_s[order], samples.value[order]))
     columns = [f"{axis}_mm" for axis in study.axes]
     for estimator, rows in tables.read("tracks", fused).groupby("estimator", sort=False):
         time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
-        found.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
-    return Traces(session.id, session.participant, session.condition, tuple(found))
+        series.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
+    return Traces(session.id, session.participant, session.condition, tuple(series))

@@ -37,8 +37,8 @@ def without_exclusions(material: Material) -> list[Block]:
         _significant(old, material.study.alpha) != _significant(new, material.study.alpha) for old, new in changed
     )
     level = f"{100 * material.study.alpha:g} % level"
-    said = f"{over or 'none'} of them between significant and not at the {level}"
-    text = f"{len(changed)} of {counted(len({**before, **after}), 'comparison')} change, {said}."
+    crossing = f"{over or 'none'} of them between significant and not at the {level}"
+    text = f"{len(changed)} of {counted(len({**before, **after}), 'comparison')} change, {crossing}."
     titles = ("Measure", "Test", "Compared", "Data", "n", "Statistic", "p", "Effect size [95 %]")
     cells = [cell for old, new in changed for cell in (_cells(old, new, "with"), _cells(new, old, "without"))]
     table = Table(
@@ -82,5 +82,5 @@ def _cells(row: Row | None, other: Row | None, which: str) -> tuple[str, ...]:
     head = (measure_label(named["measure"]), test_label(named), contrast(named), f"{which} exclusions")
     if row is None:
         return (*head, *(NO_VALUE,) * 4)
-    said = statistic(row) if row["status"] == "ok" else row["status"]
-    return (*head, f"{row['n']}", said, p_value(decisive_p(row)), effect_size(row))
+    result = statistic(row) if row["status"] == "ok" else row["status"]
+    return (*head, f"{row['n']}", result, p_value(decisive_p(row)), effect_size(row))
