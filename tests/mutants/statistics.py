@@ -64,8 +64,8 @@ MUTANTS = (
     Mutant("elif n < 3:", "elif n < 2:", _MODELS),
     Mutant("elif early.all() or not early.any():", "elif early.all():", _MODELS),
     # Descriptives and diagnostics.
-    Mutant("stats.t.ppf(0.975, n - 1)) * sd", "stats.t.ppf(0.975, n)) * sd", _TESTS),
-    Mutant("sd = float(np.std(values, ddof=1))", "sd = float(np.std(values))", _TESTS),
+    Mutant("stats.t.ppf(0.975, n - 1)) * float(np.std(", "stats.t.ppf(0.975, n)) * float(np.std(", _TESTS),
+    Mutant('row["sd"] = float(np.std(values, ddof=1))', 'row["sd"] = float(np.std(values))', _TESTS),
     Mutant("_FAR_OUT = 3.5", "_FAR_OUT = 3.0", _MODELS),
     Mutant("_NORMAL_QUARTILE = 0.6745", "_NORMAL_QUARTILE = 1.0", _MODELS),
     Mutant("np.abs(_NORMAL_QUARTILE * apart / spread)", "_NORMAL_QUARTILE * apart / spread", _MODELS),
