@@ -29,6 +29,9 @@ class Compiler:
 
     It is for the functions of one package, which is a folder. They may call each other and those of fusion_core. They
     must not use functions or constants from anywhere else, since a change there would not be noticed.
+
+    A function whose name begins with an underscore is called by compiled functions alone: no entry from Python is made
+    for it, and for none one from C. Entries take a quarter of the time that compiling takes.
     """
 
     def __init__(self, package: Path) -> None:
@@ -44,6 +47,8 @@ class Compiler:
         return self._compile(function, options)
 
     def _compile(self, function: Callable[..., Any], options: dict[str, Any]) -> Any:
+        inner = function.__name__.startswith("_")
+        options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": inner, **options}
         folder = code_folder(self._package, numba.config.CACHE_DIR)  # type: ignore[attr-defined]
         if folder is None:
             return numba.njit(**options)(function)

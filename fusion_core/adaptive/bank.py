@@ -14,13 +14,16 @@ import numpy as np
 
 from fusion_core.adaptive.layout import (
     ACCELERATION_PSD,
+    AHEAD,
     ARM,
     AT,
     BEGAN,
     BIAS,
     DRIFT_S,
     DRIFT_VARIANCE,
+    HELD,
     INPUTS,
+    MEMBERS,
     NOISE,
     NOISE_DRIFT,
     NOISE_DRIFT_S,
@@ -49,7 +52,8 @@ _PP, _PV, _PR, _PN, _VV, _VR, _VN, _RR, _RN, _NN = range(10)
 @compiled
 def begin(model: Model, state: State, position: FloatArray) -> None:
     """All members at the first position."""
-    state.weight[:] = 0.0
+    for member in range(MEMBERS):
+        state.weight[member] = 0.0
     begin_again(model, state, position)
     judge(model, state)
 
@@ -58,8 +62,11 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
 def begin_again(model: Model, state: State, position: FloatArray) -> None:
     """The motion begins anew at a position; weights stay."""
     mean, own = state.bank_mean, state.bank_covariance
-    mean[:], own[:] = 0.0, 0.0
-    for member in range(len(state.weight)):
+    for member in range(MEMBERS):
+        for part in range(len(mean)):
+            mean[part, member] = 0.0
+        for part in range(len(own)):
+            own[part, member] = 0.0
         drift = model.member[DRIFT_VARIANCE, member]
         rate = _RATE_SD if model.member[USES_PHONE, member] else _ACCELERATION_SD
         for axis in range(model.dimension):
@@ -79,7 +86,7 @@ def considered(model: Model, state: State, turned: FloatArray, coupling: FloatAr
     apart = np.empty(3 + INPUTS)
     for axis in range(model.dimension):
         for part in range(3 + INPUTS):
-            now = turned[axis, part] if part < 3 else coupling[axis, part - 3] / dt
+            now = turned[axis, part] if part < 3 else coupling[0, axis, part - 3] / dt
             apart[part] = now - usual[axis, part]
             usual[axis, part] += share * apart[part]
         for one in range(3):
@@ -101,7 +108,7 @@ def move(model: Model, state: State, dt: float, net: FloatArray, more_psd: float
     own, parameters = state.bank_covariance, model.member
     half, cube = dt * dt / 2.0, dt * dt * dt
     fourth, fifth = cube * dt / 8.0, cube * dt * dt / 20.0
-    for member in range(own.shape[1]):
+    for member in range(MEMBERS):
         rate, kept = parameters[RATE_PSD, member], state.kept[member]
         psd = (parameters[ACCELERATION_PSD, member] + more_psd) * parameters[USES_PHONE, member]
         pv, pr, vr, rr = own[_PV, member], own[_PR, member], own[_VR, member], own[_RR, member]
@@ -122,11 +129,11 @@ def move(model: Model, state: State, dt: float, net: FloatArray, more_psd: float
 @compiled
 def _move_means(model: Model, state: State, dt: float, net: FloatArray) -> None:
     mean, half, phone = state.bank_mean, dt * dt / 2.0, model.member[USES_PHONE]
-    for member in range(len(state.kept)):
+    for member in range(MEMBERS):
         drift_s = model.member[DRIFT_S, member]
         state.kept[member] = np.exp(-dt / drift_s) if drift_s > 0.0 else 0.0
     for axis in range(model.dimension):
-        for member in range(len(phone)):
+        for member in range(MEMBERS):
             rate, used = mean[6 + axis, member], phone[member]
             mean[axis, member] += dt * mean[3 + axis, member] + half * rate + used * net[1, axis]
             mean[3 + axis, member] += dt * rate + used * net[0, axis]
@@ -138,9 +145,9 @@ def take_in(model: Model, state: State, position: FloatArray, more_variance: flo
     """A position taken in by all members, and their weights moved by how likely it was to each."""
     since = state.fact[AT] - state.fact[BEGAN]
     kept = np.exp(-dt / min(_FORGET_S, 1.0 + since / 2.0))
-    mean, own, apart = state.bank_mean, state.bank_covariance, np.empty((3, len(state.weight)))
-    gain = np.empty(len(state.weight))
-    for member in range(len(gain)):
+    mean, own, apart = state.bank_mean, state.bank_covariance, np.empty((3, MEMBERS))
+    gain = np.empty(MEMBERS)
+    for member in range(MEMBERS):
         variance = own[_PP, member] + 2.0 * own[_PN, member] + own[_NN, member]
         variance += model.member[TRACKER_VARIANCE, member] + more_variance
         squared = 0.0
@@ -157,7 +164,7 @@ def take_in(model: Model, state: State, position: FloatArray, more_variance: flo
 @compiled
 def _correct(dimension: int, mean: FloatArray, own: FloatArray, apart: FloatArray, gain: FloatArray) -> None:
     """Means and covariances of all members corrected, with the inverse of each innovation's variance as `gain`."""
-    for member in range(len(gain)):
+    for member in range(MEMBERS):
         share = gain[member]
         p, v = own[_PP, member] + own[_PN, member], own[_PV, member] + own[_VN, member]
         r, n = own[_PR, member] + own[_RN, member], own[_PN, member] + own[_NN, member]
@@ -195,39 +202,44 @@ def judge(model: Model, state: State) -> None:
 
     Leaves every member's share in `share`, those with the phone and those without each summing to 1.
     """
-    highest, total = np.full(2, -np.inf), np.zeros(2)
-    for member in range(len(state.weight)):
-        kind = int(model.member[USES_PHONE, member])
-        highest[kind] = max(highest[kind], state.weight[member] + model.log_prior[member])
-    for member in range(len(state.weight)):
-        kind = int(model.member[USES_PHONE, member])
-        state.share[member] = np.exp(state.weight[member] + model.log_prior[member] - highest[kind])
-        total[kind] += state.share[member]
+    _to_shares(model, state, 0, model.first_alone)
+    _to_shares(model, state, model.first_alone, MEMBERS)
     noise, trust, drift, drift_s, drifting = 0.0, 0.0, 0.0, 0.0, 0.0
-    for member in range(len(state.weight)):
-        kind = int(model.member[USES_PHONE, member])
-        state.share[member] /= total[kind]
-        if kind == 1:
-            share = state.share[member]
-            noise += share * model.log_member[TRACKER_VARIANCE, member]
-            trust += share * model.log_member[ACCELERATION_PSD, member]
-            if model.member[DRIFT_VARIANCE, member] > 0.0:
-                drift += share * model.member[DRIFT_VARIANCE, member]
-                drift_s += share * model.log_member[DRIFT_S, member]
-                drifting += share
+    for member in range(model.first_alone):
+        share = state.share[member]
+        noise += share * model.log_member[TRACKER_VARIANCE, member]
+        trust += share * model.log_member[ACCELERATION_PSD, member]
+        if model.member[DRIFT_VARIANCE, member] > 0.0:
+            drift += share * model.member[DRIFT_VARIANCE, member]
+            drift_s += share * model.log_member[DRIFT_S, member]
+            drifting += share
     state.fact[NOISE], state.fact[TRUST] = np.exp(noise), np.exp(trust)
     state.fact[NOISE_DRIFT] = drift
     state.fact[NOISE_DRIFT_S] = np.exp(drift_s / drifting) if drifting > 0.0 else 0.0
 
 
 @compiled
-def by_positions(model: Model, state: State, ahead_s: float, ahead: FloatArray, held: FloatArray) -> None:
-    """What members that do not use the phone say of the position, `ahead_s` gone on and not, (3,) each."""
+def _to_shares(model: Model, state: State, begin: int, end: int) -> None:
+    """The shares of the members from `begin` to `end`, which sum to 1."""
+    highest, total = -np.inf, 0.0
+    for member in range(begin, end):
+        highest = max(highest, state.weight[member] + model.log_prior[member])
+    for member in range(begin, end):
+        state.share[member] = np.exp(state.weight[member] + model.log_prior[member] - highest)
+        total += state.share[member]
+    for member in range(begin, end):
+        state.share[member] /= total
+
+
+@compiled
+def by_positions(model: Model, state: State, ahead_s: float, answers: FloatArray) -> None:
+    """What members that do not use the phone say of the position, `ahead_s` gone on and held, into `answers`."""
     mean = state.bank_mean
-    ahead[:], held[:] = 0.0, 0.0
-    for member in range(model.first_alone, len(state.share)):
-        share = state.share[member]
-        for axis in range(model.dimension):
-            gone = ahead_s * (mean[3 + axis, member] + ahead_s / 2.0 * mean[6 + axis, member])
-            held[axis] += share * mean[axis, member]
-            ahead[axis] += share * (mean[axis, member] + gone)
+    for axis in range(3):
+        ahead, held = 0.0, 0.0
+        if axis < model.dimension:
+            for member in range(model.first_alone, MEMBERS):
+                gone = ahead_s * (mean[3 + axis, member] + ahead_s / 2.0 * mean[6 + axis, member])
+                held += state.share[member] * mean[axis, member]
+                ahead += state.share[member] * (mean[axis, member] + gone)
+        answers[AHEAD + axis], answers[HELD + axis] = ahead, held

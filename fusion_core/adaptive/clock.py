@@ -24,17 +24,18 @@ from fusion_core.adaptive.layout import (
     NOISE_DRIFT_S,
     OFFSETS,
     ROWS,
+    STAMP,
     TRUST,
     VELOCITY,
     Model,
+    Phone,
     State,
 )
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
 STEP_S = 0.02  # between the offsets tried: less than the width of the likelihood of any motion but a thrust
-FIRST_S = -0.14  # the tracker is later than stated by so much
-MANY = OFFSETS  # up to 60 ms earlier
+FIRST_S = -0.14  # the tracker is later than stated by so much, at the most; and up to 60 ms earlier
 _FORGET_S = 10.0  # as the bank does
 _PRIOR_SD_S = 0.02  # of a stated latency: trackers' own figures are right within a frame or so
 _LEAST_SD_S = 0.002  # the past is forgotten so far as to leave no more certainty: a latency wanders
@@ -44,8 +45,8 @@ _RATE_SD, _RATE_PSD = 1000.0, 900.0  # of the acceleration error, as in the bank
 @compiled
 def begin(model: Model, state: State, position: FloatArray) -> None:
     """At the first position."""
-    own = state.clock_covariance
-    state.clock_mean[:], own[:], state.clock_weight[:] = 0.0, 0.0, 0.0
+    for one in range(OFFSETS):
+        state.clock_weight[one] = 0.0
     begin_again(model, state, position)
     judge(state)
 
@@ -54,45 +55,68 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
 def begin_again(model: Model, state: State, position: FloatArray) -> None:
     """The motion begins anew at a position; weights stay."""
     own, drift = state.clock_covariance, state.fact[NOISE_DRIFT]
-    state.clock_mean[:], own[:] = 0.0, 0.0
+    for row in range(4):
+        for column in range(4):
+            own[row, column] = 0.0
     own[0, 0], own[1, 1], own[2, 2] = state.fact[NOISE] + drift, model.prior[VELOCITY], _RATE_SD**2
     own[3, 3], own[0, 3], own[3, 0] = drift, -drift, -drift
-    for one in range(MANY):
-        for axis in range(model.dimension):
-            state.clock_mean[one, 0, axis] = position[axis]
+    for one in range(OFFSETS):
+        for axis in range(3):
+            for row in range(4):
+                state.clock_mean[one, row, axis] = 0.0
+            if axis < model.dimension:
+                state.clock_mean[one, 0, axis] = position[axis]
 
 
 @compiled
 def take_in(
-    model: Model, state: State, before: float, time: float, value: FloatArray, more_psd: float, more: float, news: bool
+    model: Model,
+    state: State,
+    phone: Phone,
+    stamp: float,
+    value: FloatArray,
+    more_psd: float,
+    more: float,
+    news: int,
 ) -> None:
-    """All moved from the stamp `before` to `time`, each by its own offset; and with `news` the position taken in."""
-    dt = time - before
-    if dt <= 0.0:
-        return
-    own, apart, net, arm = state.clock_covariance, np.empty((MANY, 3)), np.empty((2, 3)), np.empty(3)
-    _move(state, own, dt, more_psd)
-    first = rows.row_before(state, before + FIRST_S)
-    times = state.time[first : state.count[ROWS]]
-    accelerations, arms = np.empty((len(times), 3)), np.zeros((len(times), 3))
-    rows.corrected(state, first, model.dimension, accelerations, arms)
-    kept = np.exp(-dt / state.fact[NOISE_DRIFT_S]) if state.fact[NOISE_DRIFT_S] > 0.0 else 0.0
-    for one in range(MANY):
-        offset, mean = FIRST_S + one * STEP_S, state.clock_mean[one]
-        rows.integrate(times, accelerations, before + offset, time + offset, net)
-        rows.between(times, arms, time + offset, arm)
-        for axis in range(model.dimension):
-            mean[0, axis] += dt * mean[1, axis] + dt * dt / 2.0 * mean[2, axis] + net[1, axis]
-            mean[1, axis] += dt * mean[2, axis] + net[0, axis]
-            mean[3, axis] *= kept
-            apart[one, axis] = value[axis] - mean[0, axis] - mean[3, axis] - arm[axis]
+    """All moved to the stamp of a frame, each by its own offset; and with `news` the position taken in."""
+    before = state.fact[STAMP]
+    dt = stamp - before
+    if dt > 0.0:
+        state.fact[STAMP] = stamp
+        apart = np.empty((OFFSETS, 3))
+        _move(state, dt, more_psd)
+        _move_means(model, state, phone, before, stamp, value, apart)
+        if news:
+            _correct(model, state, apart, more, dt)
     if news:
-        _correct(model, state, own, apart, more, dt)
+        judge(state)
 
 
 @compiled
-def _move(state: State, own: FloatArray, dt: float, more_psd: float) -> None:
+def _move_means(
+    model: Model, state: State, phone: Phone, before: float, stamp: float, value: FloatArray, apart: FloatArray
+) -> None:
+    """The means moved from the stamp `before` to another; how far the position is from each goes into `apart`."""
+    mean, net, arm, count = state.clock_mean, np.empty((2, 3)), np.empty(3), state.count[ROWS]
+    dt = stamp - before
+    rows.correct(state, phone, rows.row_before(phone, count, before + FIRST_S), model.dimension)
+    kept = np.exp(-dt / state.fact[NOISE_DRIFT_S]) if state.fact[NOISE_DRIFT_S] > 0.0 else 0.0
+    for one in range(OFFSETS):
+        begin, end = before + (FIRST_S + one * STEP_S), stamp + (FIRST_S + one * STEP_S)
+        rows.integrate(phone.time, count, phone.corrected, begin, end, net)
+        rows.between(phone, count, end, arm)
+        for axis in range(model.dimension):
+            mean[one, 0, axis] += dt * mean[one, 1, axis] + dt * dt / 2.0 * mean[one, 2, axis] + net[1, axis]
+            mean[one, 1, axis] += dt * mean[one, 2, axis] + net[0, axis]
+            mean[one, 3, axis] *= kept
+            apart[one, axis] = value[axis] - mean[one, 0, axis] - mean[one, 3, axis] - arm[axis]
+
+
+@compiled
+def _move(state: State, dt: float, more_psd: float) -> None:
     """The covariance of all moved over `dt` seconds, as that of a member of the bank."""
+    own = state.clock_covariance
     drift_s, half, psd = state.fact[NOISE_DRIFT_S], dt * dt / 2.0, state.fact[TRUST] + more_psd
     kept = np.exp(-dt / drift_s) if drift_s > 0.0 else 0.0
     for column in range(4):
@@ -112,15 +136,15 @@ def _move(state: State, own: FloatArray, dt: float, more_psd: float) -> None:
 
 
 @compiled
-def _correct(model: Model, state: State, own: FloatArray, apart: FloatArray, more: float, dt: float) -> None:
+def _correct(model: Model, state: State, apart: FloatArray, more: float, dt: float) -> None:
     """A position taken in by all, with one gain, and their weights moved by how likely it was to each."""
     kept = np.exp(-dt / min(_FORGET_S, 1.0 + (state.fact[AT] - state.fact[BEGAN]) / 2.0))
-    shared = np.empty(4)
+    own, shared = state.clock_covariance, np.empty(4)
     for row in range(4):
         shared[row] = own[0, row] + own[3, row]
     variance = shared[0] + shared[3] + state.fact[NOISE] + more
     best = np.inf
-    for one in range(MANY):
+    for one in range(OFFSETS):
         squared = 0.0
         for axis in range(model.dimension):
             squared += apart[one, axis] ** 2 / variance
@@ -128,7 +152,7 @@ def _correct(model: Model, state: State, own: FloatArray, apart: FloatArray, mor
         state.clock_weight[one] = kept * state.clock_weight[one] + weighed(model, squared, variance)
     variance *= max(best / model.surprise, 1.0)
     for row in range(4):
-        for one in range(MANY):
+        for one in range(OFFSETS):
             for axis in range(model.dimension):
                 state.clock_mean[one, row, axis] += shared[row] / variance * apart[one, axis]
     for row in range(4):
@@ -140,7 +164,7 @@ def _correct(model: Model, state: State, own: FloatArray, apart: FloatArray, mor
 def judge(state: State) -> None:
     """The offset and its variance: the vertex and bend of the log weights about the highest, with the prior's."""
     prior, best, highest = 1.0 / _PRIOR_SD_S**2, 0, -np.inf
-    for one in range(1, MANY - 1):
+    for one in range(1, OFFSETS - 1):
         offset = FIRST_S + one * STEP_S
         log_weight = state.clock_weight[one] - 0.5 * prior * offset * offset
         if log_weight > highest:
@@ -149,7 +173,8 @@ def judge(state: State) -> None:
     bend = max(-(before - 2.0 * here + after) / STEP_S**2, 0.0)
     most = 1.0 / _LEAST_SD_S**2
     if bend > most:
-        state.clock_weight[:] *= most / bend
+        for one in range(OFFSETS):
+            state.clock_weight[one] *= most / bend
     slope = (after - before) / (2.0 * STEP_S)
     offset = FIRST_S + best * STEP_S
     vertex = (bend * offset + slope) / (bend + prior)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtri
 
-from fusion_core.adaptive import layout, shown, steps
-from fusion_core.adaptive.layout import FELT, ORIENTED, ROWS, UNTURNED, Model, State
+from fusion_core.adaptive import layout, steps
+from fusion_core.adaptive.layout import FELT, ORIENTED, READING, ROWS, UNTURNED, Memory, Records
 from fusion_core.checks import require_positive
 from fusion_core.estimator import require_reading, require_readings
 from fusion_core.samples import FloatArray, Sample, Samples, Track
@@ -20,6 +20,7 @@ from fusion_core.sensors import Sensor, position_sensor, require_covered, requir
 
 _RARE = 0.003  # how often a position of ordinary noise is taken for a surprise
 _ROOM = 64  # rows, more than are kept between two readings of most phones
+_NO_READINGS, _NO_TIMES, _NO_ROWS = np.empty((0, READING)), np.empty(0), np.empty((0, 0))
 
 _PRIOR_SD = {
     layout.BIAS: (3, 300.0, 10.0),  # how many, SD, walk per √s: mm/s²
@@ -77,8 +78,8 @@ class FusionAdaptive:
         return self.sensors[self.tracker].dimension
 
     @cached_property
-    def model(self) -> Model:
-        """Priors and members, by what the sensors state."""
+    def model(self) -> Records:
+        """Priors and members, by what the sensors state: a record of `layout.MODEL`."""
         noise_sd, dimension = self.sensors[self.tracker].noise_sd, self.dimension
         prior, walk = np.zeros(layout.SIZE), np.zeros(layout.SIZE)
         prior[layout.POSITION : layout.POSITION + dimension] = noise_sd**2
@@ -87,54 +88,73 @@ class FusionAdaptive:
             end = begin + (dimension if begin == layout.OFFSET else count)
             prior[begin:end], walk[begin:end] = sd**2, drift**2
         member, log_prior = _members(noise_sd)
-        return Model(
-            dimension=dimension,
-            prior=prior,
-            walk=walk,
-            member=member,
-            log_member=np.log(np.maximum(member, np.finfo(float).tiny)),
-            first_alone=int(np.sum(member[layout.USES_PHONE])),
-            log_prior=log_prior,
-            surprise=float(chdtri(dimension, _RARE)),
-            history_s=float(self.history_s),
-        )
+        model = np.zeros(1, layout.MODEL)
+        for field, value in {
+            "dimension": dimension,
+            "prior": prior,
+            "walk": walk,
+            "member": member,
+            "log_member": np.log(np.maximum(member, np.finfo(float).tiny)),
+            "first_alone": np.sum(member[layout.USES_PHONE]),
+            "log_prior": log_prior,
+            "surprise": chdtri(dimension, _RARE),
+            "history_s": self.history_s,
+        }.items():
+            model[field] = value
+        return model
 
-    def start(self) -> State:
-        """Nothing seen. What a reading needs is compiled by now."""
-        return layout.empty(self.model, 1)
+    def start(self) -> Memory:
+        """Nothing seen."""
+        return layout.empty(1)
 
-    def update(self, state: State, sensor: str, sample: Sample) -> State:
+    def update(self, state: Memory, sensor: str, sample: Sample) -> Memory:
         """A copy of the state with the reading taken in; a position waits for the phone's readings up to its time."""
         if sensor not in self.sensors:
             return state
         require_reading(sensor, self.sensors[sensor], sample)
-        room = layout.empty(self.model, int(state.count[ROWS]) + 1)
-        steps.copied(self.model, state, room)
-        is_frame = sensor == self.tracker
-        value = np.ascontiguousarray(sample.value, dtype=np.float64)
-        rotation, force, known = self._orientation(sample.rotation, sample.force)
-        steps.arrive(self.model, room, is_frame, sample.time, sample.arrival, value, rotation, force, known)
+        reading = np.zeros((1, READING))
+        self._write(reading, sensor, sample.time, sample.arrival, sample.value, sample.rotation, sample.force)
+        room = self._copied(state)
+        steps.go_through(self.model, room.state, room.phone, reading, _NO_TIMES, _NO_ROWS, _NO_ROWS, _NO_ROWS)
         return room
 
-    @cached_property
-    def _upright(self) -> FloatArray:
-        return np.eye(self.dimension, 3)
+    def _copied(self, memory: Memory) -> Memory:
+        """A copy with room for a row more, less the rows that are no longer needed."""
+        count = memory.state["count"][0, ROWS]
+        first = steps.oldest_needed(self.model, memory.state, memory.phone)
+        room = Memory(memory.state.copy(), layout.room(int(count - first) + 1))
+        for to, of in zip(room.phone[:3], memory.phone[:3], strict=True):
+            to[: count - first] = of[first:count]
+        room.state["count"][0, ROWS] = count - first
+        return room
 
-    def _orientation(
-        self, rotation: FloatArray | None, force: FloatArray | None
-    ) -> tuple[FloatArray, FloatArray, float]:
-        """Rotation (d, 3), force (3,), and how much of them is known."""
-        if rotation is None:
-            return self._upright, np.zeros(3), UNTURNED
-        if force is None:
-            return np.ascontiguousarray(rotation), np.zeros(3), ORIENTED
-        return np.ascontiguousarray(rotation), np.ascontiguousarray(force), FELT
-
-    def predict(self, state: State, time: float) -> tuple[FloatArray, FloatArray]:
+    def predict(self, state: Memory, time: float) -> tuple[FloatArray, FloatArray]:
         """What is known, moved on to `time`."""
-        mean, sd = np.empty(self.dimension), np.empty(self.dimension)
-        shown.expect(self.model, state, time, mean, sd)
-        return mean, sd
+        mean, sd = np.empty((2, 1, self.dimension))
+        steps.go_through(self.model, state.state, state.phone, _NO_READINGS, np.array([time]), mean, sd, _NO_ROWS)
+        return mean[0], sd[0]
+
+    def _write(
+        self,
+        readings: FloatArray,
+        sensor: str,
+        time: Any,
+        arrival: Any,
+        value: FloatArray,
+        rotation: FloatArray | None,
+        force: FloatArray | None,
+    ) -> None:
+        """One or more readings of a sensor into rows (n, READING), the columns of which are in `layout`."""
+        dimension = self.dimension
+        known = UNTURNED if rotation is None else ORIENTED if force is None else FELT
+        readings[:, layout.TIME], readings[:, layout.ARRIVAL] = time, arrival
+        readings[:, layout.IS_FRAME], readings[:, layout.ORIENTATION] = sensor == self.tracker, known
+        readings[:, layout.READ : layout.READ + dimension] = value
+        turned = readings[:, layout.ROTATION : layout.SPECIFIC].reshape(-1, 3, 3)
+        turned[:, :dimension] = np.eye(dimension, 3) if rotation is None else rotation
+        readings[:, layout.ROTATION : layout.SPECIFIC] = turned.reshape(-1, 9)
+        if force is not None:
+            readings[:, layout.SPECIFIC :] = force
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
         """The same steps in one compiled loop."""
@@ -144,12 +164,15 @@ class FusionAdaptive:
     def traced(self, samples: Mapping[str, Samples], times: FloatArray, trace: FloatArray) -> Track:
         """The same; `trace` (n, FACTS + 2 SIZE) takes facts, mean and its SDs at `times`, which then must rise."""
         order = np.argsort(times, kind="stable")
-        mean, sd = np.empty((2, len(times), self.dimension))
         rising = np.asarray(times, dtype=np.float64)[order]
         readings = self._readings(samples)
-        state = layout.empty(self.model, 2 * self._most_kept(samples) + _ROOM)
-        mean[order], sd[order] = steps.replay(self.model, state, *readings, rising, trace)  # type: ignore[call-arg]
-        return Track(times, mean, sd)
+        if len(rising):
+            readings = readings[: np.searchsorted(readings[:, layout.ARRIVAL], rising[-1], side="right")]
+        mean, sd = np.empty((2, len(times), self.dimension))
+        memory = layout.empty(2 * self._most_kept(samples) + _ROOM)
+        steps.go_through(self.model, memory.state, memory.phone, readings, rising, mean, sd, trace)
+        back = np.argsort(order, kind="stable")
+        return Track(times, mean[back], sd[back])
 
     def _most_kept(self, samples: Mapping[str, Samples]) -> int:
         """The largest number of the phone's readings within the time that rows are kept."""
@@ -161,29 +184,16 @@ class FusionAdaptive:
                 most = int(np.max(np.arange(len(time)) + 1 - since))
         return most
 
-    def _readings(self, samples: Mapping[str, Samples]) -> tuple[Any, ...]:
-        """All readings by arrival, in the sensors' order where they arrive at once, as columns of `steps.replay`."""
-        columns = [self._columns(name, samples[name]) for name in self.sensors if name in samples]
-        if not columns:
-            columns = [self._columns(self.tracker, Samples(np.empty(0), np.empty(0), np.empty((0, self.dimension))))]
-        joined = [np.concatenate(column) for column in zip(*columns, strict=True)]
-        order = np.argsort(joined[2], kind="stable")
-        return tuple(column[order] for column in joined)
-
-    def _columns(self, name: str, stream: Samples) -> list[Any]:
-        count, dimension = len(stream), self.dimension
-        rotation = np.broadcast_to(self._upright, (count, dimension, 3)) if stream.rotation is None else stream.rotation
-        force = np.zeros((count, 3)) if stream.force is None else stream.force
-        known = UNTURNED if stream.rotation is None else ORIENTED if stream.force is None else FELT
-        return [
-            np.full(count, name == self.tracker),
-            np.asarray(stream.time, dtype=np.float64),
-            np.asarray(stream.arrival, dtype=np.float64),
-            np.asarray(stream.value, dtype=np.float64),
-            np.asarray(rotation, dtype=np.float64),
-            np.asarray(force, dtype=np.float64),
-            np.full(count, known),
-        ]
+    def _readings(self, samples: Mapping[str, Samples]) -> FloatArray:
+        """All readings (n, READING) by arrival, in the sensors' order where they arrive at once."""
+        streams = [(name, samples[name]) for name in self.sensors if name in samples]
+        readings, end = np.zeros((sum(len(stream) for _, stream in streams), READING)), 0
+        for name, stream in streams:
+            begin, end = end, end + len(stream)
+            columns = stream.time, stream.arrival, stream.value, stream.rotation, stream.force
+            self._write(readings[begin:end], name, *columns)
+        order = np.argsort(readings[:, layout.ARRIVAL], kind="stable")
+        return np.asarray(readings[order])
 
 
 def _members(noise_sd: float) -> tuple[FloatArray, FloatArray]:

@@ -1,8 +1,12 @@
-"""Where everything stands: the state's parts, the columns of rows and members, and the data that steps work on."""
+"""Where everything stands: the state's parts, the columns of rows and members, and the data that steps work on.
+
+Model and state are records of NumPy, whose fields are arrays of fixed size. To compiled code a record is one address: a
+tuple of as many arrays would be taken apart and counted at each call, which made compiling three times as long.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,17 +20,22 @@ ARM, DRIFT = 17, 20  # what enters positions: the lever arm, and correlated nois
 SIZE = 23
 INPUTS = ARM - BIAS
 
-# A row of the phone: acceleration in the tracker's frame (3), rotation (3, 3), rotation times force
-# as a cross (3, 3), and
-# the density of what is not known of the acceleration where a reading is clipped.
+# A reading as it arrives: its times, whether it is the tracker's, what is known of its orientation, its value (3),
+# rotation (3, 3) and specific force in the body's frame (3).
+TIME, ARRIVAL, IS_FRAME, ORIENTATION, READ, ROTATION, SPECIFIC, READING = 0, 1, 2, 3, 4, 7, 16, 19
+UNTURNED, ORIENTED, FELT = 0.0, 1.0, 2.0  # what is known: nothing, the rotation, and also the force
+
+# A row of the phone: acceleration in the tracker's frame (3), rotation (3, 3), rotation times force as a cross (3, 3),
+# and the density of what is not known of the acceleration where a reading is clipped. So far it is integrated; then
+# follow the force in the body's frame (3) and what is known of the row.
 VALUE, TURNED, CROSSED, CLIPPED, ROW = 0, 3, 12, 21, 22
-UNTURNED, ORIENTED, FELT = 0.0, 1.0, 2.0  # what is known of a row: nothing, its rotation, and also its force
+FORCE, KNOWN, COLUMNS = 22, 25, 26
 
 # A member of the bank.
 TRACKER_VARIANCE, ACCELERATION_PSD, RATE_PSD, USES_PHONE, DRIFT_VARIANCE, DRIFT_S, MEMBER = 0, 1, 2, 3, 4, 5, 6
 
 # State.count.
-ROWS, WAITING, TAKEN, TOO_LATE, KNOWS_ARM, HAS_DIFFERED, STRANGE = 0, 1, 2, 3, 4, 5, 6
+ROWS, WAITING, TAKEN, TOO_LATE, KNOWS_ARM, HAS_DIFFERED, STRANGE, COUNTS = 0, 1, 2, 3, 4, 5, 6, 7
 
 # State.fact.
 AT, BEGAN, STRANGE_SINCE, PHONE_AHEAD = 0, 1, 2, 3  # times in s; how far the phone's stamps are ahead of their arrival
@@ -40,33 +49,33 @@ STRANGE_MM = 20  # how far off the first strange frame was
 AT_LARGEST = 21  # how often the largest component came again
 FACTS = 22
 
-# A row of State.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
+# A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
 # position (3) and its variance as the filters state it.
 FUSED, AHEAD, HELD, MIXED, STATED, SHOWN = 0, 3, 6, 9, 12, 13
 
+MEMBERS = 81  # of the bank
+OFFSETS = 11  # of the tracker's clock, that are tried
+MOST_WAITING = 8
 
-class Model(NamedTuple):
+
+class Model(Protocol):
     """What does not change. Variances and densities in mm and s."""
 
     dimension: int
+    first_alone: int  # the first member that does not use the phone
+    surprise: float  # the squared innovation beyond which a position counts for less
+    history_s: float
     prior: FloatArray  # (SIZE,) variances before any reading
     walk: FloatArray  # (SIZE,) densities of the states that drift
     member: FloatArray  # (MEMBER, members): those that use the phone come first
     log_member: FloatArray  # (MEMBER, members): their logarithms, where there are any
-    first_alone: int  # the first member that does not use the phone
     log_prior: FloatArray  # (members,)
-    surprise: float  # the squared innovation beyond which a position counts for less
-    history_s: float
 
 
-class State(NamedTuple):
-    """What is known. Arrays are changed in place; `count` and `fact` hold the single figures."""
+class State(Protocol):
+    """What is known, changed in place; `count` and `fact` hold the single figures."""
 
-    time: FloatArray  # (capacity,) of the rows, rising
-    row: FloatArray  # (capacity, ROW)
-    force: FloatArray  # (capacity, 4): force in the body's frame, and what is known of the row
-    shown: FloatArray  # (capacity, SHOWN): NaN where nothing was
-    count: npt.NDArray[np.int64]  # type: ignore[assignment]  # not a tuple's count
+    count: npt.NDArray[np.int64]
     fact: FloatArray
     mean: FloatArray  # (SIZE,)
     covariance: FloatArray  # (SIZE, SIZE)
@@ -80,34 +89,68 @@ class State(NamedTuple):
     clock_covariance: FloatArray  # (4, 4), of all
     clock_weight: FloatArray  # (offsets,)
     usual: FloatArray  # (3, 3 + INPUTS): slow averages of lever-arm and input couplings
-    waiting: FloatArray  # (most, 5): time, arrival and value of frames not taken in yet
+    waiting: FloatArray  # (most + 1, 5): time, arrival and value of frames not taken in yet
 
 
-MOST_WAITING = 8
-OFFSETS = 11  # of the tracker's clock, that are tried
+class Phone(NamedTuple):
+    """The phone's readings that are kept, rising in time; State.count says how many there are."""
+
+    time: FloatArray  # (capacity,)
+    row: FloatArray  # (capacity, COLUMNS)
+    shown: FloatArray  # (capacity, SHOWN): what was shown when the row was the newest; NaN where nothing was
+    corrected: FloatArray  # (capacity, 6): room for accelerations and lever arms as the state corrects them
 
 
-def empty(model: Model, capacity: int) -> State:
+MODEL = np.dtype(
+    [
+        ("dimension", np.int64),
+        ("first_alone", np.int64),
+        ("surprise", np.float64),
+        ("history_s", np.float64),
+        ("prior", np.float64, (SIZE,)),
+        ("walk", np.float64, (SIZE,)),
+        ("member", np.float64, (MEMBER, MEMBERS)),
+        ("log_member", np.float64, (MEMBER, MEMBERS)),
+        ("log_prior", np.float64, (MEMBERS,)),
+    ]
+)
+STATE = np.dtype(
+    [
+        ("count", np.int64, (COUNTS,)),
+        ("fact", np.float64, (FACTS,)),
+        ("mean", np.float64, (SIZE,)),
+        ("covariance", np.float64, (SIZE, SIZE)),
+        ("head", np.float64, (2, ROW)),
+        ("bank_mean", np.float64, (12, MEMBERS)),
+        ("bank_covariance", np.float64, (10, MEMBERS)),
+        ("weight", np.float64, (MEMBERS,)),
+        ("share", np.float64, (MEMBERS,)),
+        ("kept", np.float64, (MEMBERS,)),
+        ("clock_mean", np.float64, (OFFSETS, 4, 3)),
+        ("clock_covariance", np.float64, (4, 4)),
+        ("clock_weight", np.float64, (OFFSETS,)),
+        ("usual", np.float64, (3, 3 + INPUTS)),
+        ("waiting", np.float64, (MOST_WAITING + 1, 5)),
+    ]
+)
+Records = npt.NDArray[Any]
+"""One record of `MODEL` or `STATE`, as an array of shape (1,)."""
+
+
+class Memory(NamedTuple):
+    """A state and the phone's readings that it still needs."""
+
+    state: Records
+    phone: Phone
+
+
+def empty(capacity: int) -> Memory:
     """Nothing known, and room for `capacity` rows of the phone."""
-    members = model.member.shape[1]
-    return State(
-        np.zeros(capacity),
-        np.zeros((capacity, ROW)),
-        np.zeros((capacity, 4)),
-        np.full((capacity, SHOWN), np.nan),
-        np.zeros(7, np.int64),
-        np.zeros(FACTS),
-        np.zeros(SIZE),
-        np.zeros((SIZE, SIZE)),
-        np.zeros((2, ROW)),
-        np.zeros((12, members)),
-        np.zeros((10, members)),
-        np.zeros(members),
-        np.zeros(members),
-        np.zeros(members),
-        np.zeros((OFFSETS, 4, 3)),
-        np.zeros((4, 4)),
-        np.zeros(OFFSETS),
-        np.zeros((3, 3 + INPUTS)),
-        np.zeros((MOST_WAITING, 5)),
+    return Memory(np.zeros(1, STATE), room(capacity))
+
+
+def room(capacity: int) -> Phone:
+    """Room for `capacity` rows."""
+    return Phone(
+        np.zeros(capacity), np.zeros((capacity, COLUMNS)), np.full((capacity, SHOWN), np.nan), np.zeros((capacity, 6))
     )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusion_core.adaptive.layout import ARM, BIAS, DRIFT, INPUTS, POSITION, SIZE, VELOCITY
+from fusion_core.adaptive.layout import ARM, BIAS, DRIFT, INPUTS, POSITION, SIZE, VELOCITY, Model, State
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
@@ -15,40 +15,34 @@ _MOVED = 6  # position and velocity
 
 
 @compiled
-def inputs_of(mean: FloatArray, total: FloatArray, coupling: FloatArray, net: FloatArray) -> None:
-    """An integral (ROW,) of the readings less what the input states put into it, into `net` (3,)."""
-    for axis in range(3):
-        net[axis] = total[axis]
-        for state in range(INPUTS):
-            net[axis] -= coupling[axis, state] * mean[BIAS + state]
+def inputs_of(state: State, total: FloatArray, coupling: FloatArray, net: FloatArray) -> None:
+    """Integrals (2, ROW) of the readings less what the input states put into them, into `net` (2, 3)."""
+    for order in range(2):
+        for axis in range(3):
+            left = total[order, axis]
+            for one in range(INPUTS):
+                left -= coupling[order, axis, one] * state.mean[BIAS + one]
+            net[order, axis] = left
 
 
 @compiled
-def move(
-    mean: FloatArray,
-    covariance: FloatArray,
-    dt: float,
-    net: FloatArray,
-    coupling: FloatArray,
-    psd: float,
-    walk: FloatArray,
-) -> None:
+def move(model: Model, state: State, dt: float, net: FloatArray, coupling: FloatArray, psd: float) -> None:
     """Both moved over `dt` seconds. `net` (2, 3) and `coupling` (2, 3, INPUTS) are of first and second integrals.
 
     p + dt v + ∫∫a and v + ∫a, with white noise of density `psd` on the acceleration; the input states drift by `walk`.
     """
+    mean, covariance, moved = state.mean, state.covariance, np.empty((_MOVED, SIZE))
     for axis in range(3):
         mean[POSITION + axis] += dt * mean[VELOCITY + axis] + net[1, axis]
         mean[VELOCITY + axis] += net[0, axis]
-    moved = np.empty((_MOVED, SIZE))
     for axis in range(3):
         for column in range(SIZE):
             speed = covariance[VELOCITY + axis, column]
             place = covariance[POSITION + axis, column] + dt * speed
-            for state in range(INPUTS):
-                of_input = covariance[BIAS + state, column]
-                place -= coupling[1, axis, state] * of_input
-                speed -= coupling[0, axis, state] * of_input
+            for one in range(INPUTS):
+                of_input = covariance[BIAS + one, column]
+                place -= coupling[1, axis, one] * of_input
+                speed -= coupling[0, axis, one] * of_input
             moved[POSITION + axis, column], moved[VELOCITY + axis, column] = place, speed
     for row in range(_MOVED):
         for column in range(_MOVED, SIZE):
@@ -57,32 +51,34 @@ def move(
         for axis in range(3):
             speed = moved[row, VELOCITY + axis]
             place = moved[row, POSITION + axis] + dt * speed
-            for state in range(INPUTS):
-                place -= moved[row, BIAS + state] * coupling[1, axis, state]
-                speed -= moved[row, BIAS + state] * coupling[0, axis, state]
+            for one in range(INPUTS):
+                place -= moved[row, BIAS + one] * coupling[1, axis, one]
+                speed -= moved[row, BIAS + one] * coupling[0, axis, one]
             covariance[row, POSITION + axis], covariance[row, VELOCITY + axis] = place, speed
     for row in range(_MOVED):
         for column in range(row):
             both = (covariance[row, column] + covariance[column, row]) / 2.0
             covariance[row, column] = covariance[column, row] = both
-    _add_noise(covariance, dt, psd, walk)
+    _add_noise(model, state, dt, psd)
 
 
 @compiled
-def _add_noise(covariance: FloatArray, dt: float, psd: float, walk: FloatArray) -> None:
+def _add_noise(model: Model, state: State, dt: float, psd: float) -> None:
+    covariance = state.covariance
     for axis in range(3):
         place, speed = POSITION + axis, VELOCITY + axis
         covariance[place, place] += psd * dt * dt * dt / 3.0
         covariance[place, speed] += psd * dt * dt / 2.0
         covariance[speed, place] += psd * dt * dt / 2.0
         covariance[speed, speed] += psd * dt
-    for state in range(BIAS, DRIFT):
-        covariance[state, state] += walk[state] * dt
+    for one in range(BIAS, DRIFT):
+        covariance[one, one] += model.walk[one] * dt
 
 
 @compiled
-def fade(mean: FloatArray, covariance: FloatArray, dt: float, variance: float, time_s: float) -> None:
+def fade(state: State, dt: float, variance: float, time_s: float) -> None:
     """The tracker's correlated noise, a first-order autoregression, moved over `dt` seconds."""
+    mean, covariance = state.mean, state.covariance
     kept = np.exp(-dt / time_s) if time_s > 0.0 else 0.0
     for axis in range(3):
         row = DRIFT + axis
@@ -96,8 +92,9 @@ def fade(mean: FloatArray, covariance: FloatArray, dt: float, variance: float, t
 
 
 @compiled
-def to_phone(mean: FloatArray, covariance: FloatArray, turned: FloatArray) -> None:
+def to_phone(state: State, turned: FloatArray) -> None:
     """From the tracked point to the phone, once its rotation (3, 3) is known: p − R r, with r the lever arm."""
+    mean, covariance = state.mean, state.covariance
     for axis in range(3):
         for arm in range(3):
             share = turned[axis, arm]
@@ -111,60 +108,51 @@ def to_phone(mean: FloatArray, covariance: FloatArray, turned: FloatArray) -> No
 
 
 @compiled
-def correct(
-    dimension: int,
-    mean: FloatArray,
-    covariance: FloatArray,
-    ago: float,
-    turned: FloatArray,
-    position: FloatArray,
-    variance: float,
-    surprise: float,
-) -> float:
-    """A position taken in that was measured `ago` seconds before the state's time; returns νᵀS⁻¹ν.
+def correct(model: Model, state: State, ago: float, turned: FloatArray, position: FloatArray, variance: float) -> None:
+    """A position taken in that was measured `ago` seconds before the state's time.
 
-    It observes p − ago·v + R r + correlated noise. Where νᵀS⁻¹ν is above `surprise`, the noise is taken for as much
-    larger as brings it there: a robust update, after Huber (1964).
+    It observes p − ago·v + R r + correlated noise. Where νᵀS⁻¹ν is above the model's `surprise`, the noise is taken for
+    as much larger as brings it there: a robust update, after Huber (1964).
     """
-    shared, innovation = np.empty((SIZE, 3)), np.empty(3)
+    dimension, mean, covariance = model.dimension, state.mean, state.covariance
+    shared, innovation, spread = np.empty((SIZE, 3)), np.empty(3), np.empty((3, 3))
+    factor, white, own = np.empty((3, 3)), np.empty(3), 0.0
     for axis in range(dimension):
         expected = mean[POSITION + axis] - ago * mean[VELOCITY + axis] + mean[DRIFT + axis]
         for arm in range(3):
             expected += turned[axis, arm] * mean[ARM + arm]
         innovation[axis] = position[axis] - expected
-        for state in range(SIZE):
-            shared[state, axis] = _observed(covariance[state], axis, ago, turned)
-    spread, own = np.zeros((3, 3)), 0.0
+        for one in range(SIZE):
+            total = covariance[one, POSITION + axis] - ago * covariance[one, VELOCITY + axis]
+            total += covariance[one, DRIFT + axis]
+            for arm in range(3):
+                total += turned[axis, arm] * covariance[one, ARM + arm]
+            shared[one, axis] = total
     for axis in range(dimension):
         for other in range(dimension):
-            spread[axis, other] = _observed(shared[:, other], axis, ago, turned)
+            total = shared[POSITION + axis, other] - ago * shared[VELOCITY + axis, other] + shared[DRIFT + axis, other]
+            for arm in range(3):
+                total += turned[axis, arm] * shared[ARM + arm, other]
+            spread[axis, other] = total
         own += spread[axis, axis] / dimension
-    factor, squared = np.empty((3, 3)), 0.0
-    white = _whiten(dimension, spread, variance, innovation, factor)
-    for axis in range(dimension):
-        squared += white[axis] * white[axis]
-    if squared > surprise:
-        more = squared / surprise * (own + variance) - own
-        white = _whiten(dimension, spread, more, innovation, factor)
+    squared = _whiten(dimension, spread, variance, innovation, factor, white)
+    if squared > model.surprise:
+        more = squared / model.surprise * (own + variance) - own
+        _whiten(dimension, spread, more, innovation, factor, white)
     _gain(dimension, mean, covariance, shared, factor, white)
-    return squared
-
-
-@compiled
-def _observed(states: FloatArray, axis: int, ago: float, turned: FloatArray) -> float:
-    """What an axis of a position makes of a vector of all states: a row of its observation matrix times that."""
-    total = states[POSITION + axis] - ago * states[VELOCITY + axis] + states[DRIFT + axis]
-    for arm in range(3):
-        total += turned[axis, arm] * states[ARM + arm]
-    return float(total)
 
 
 @compiled
 def _whiten(
-    dimension: int, spread: FloatArray, variance: float, innovation: FloatArray, factor: FloatArray
-) -> FloatArray:
-    """L⁻¹ν, with L (into `factor`) Cholesky's factor of the innovation's covariance."""
-    white = np.empty(3)
+    dimension: int,
+    spread: FloatArray,
+    variance: float,
+    innovation: FloatArray,
+    factor: FloatArray,
+    white: FloatArray,
+) -> float:
+    """L⁻¹ν into `white`, with L, Cholesky's factor of the innovation's covariance, into `factor`; returns |L⁻¹ν|²."""
+    squared = 0.0
     for row in range(dimension):
         for column in range(row + 1):
             rest = spread[row, column] + (variance if row == column else 0.0)
@@ -175,7 +163,8 @@ def _whiten(
         for k in range(row):
             rest -= factor[row, k] * white[k]
         white[row] = rest / factor[row, row]
-    return white
+        squared += white[row] * white[row]
+    return squared
 
 
 @compiled
@@ -188,39 +177,41 @@ def _gain(
     white: FloatArray,
 ) -> None:
     """The correction: with A = shared L⁻ᵀ, the mean moves by A L⁻¹ν and the covariance loses A Aᵀ."""
-    for state in range(SIZE):
+    for one in range(SIZE):
         for axis in range(dimension):
-            rest = shared[state, axis]
+            rest = shared[one, axis]
             for k in range(axis):
-                rest -= factor[axis, k] * shared[state, k]
-            shared[state, axis] = rest / factor[axis, axis]
-            mean[state] += shared[state, axis] * white[axis]
-        for other in range(state + 1):
-            left = covariance[state, other]
+                rest -= factor[axis, k] * shared[one, k]
+            shared[one, axis] = rest / factor[axis, axis]
+            mean[one] += shared[one, axis] * white[axis]
+        for other in range(one + 1):
+            left = covariance[one, other]
             for axis in range(dimension):
-                left -= shared[state, axis] * shared[other, axis]
-            covariance[state, other] = covariance[other, state] = left
+                left -= shared[one, axis] * shared[other, axis]
+            covariance[one, other] = covariance[other, one] = left
 
 
 @compiled
-def begin(dimension: int, mean: FloatArray, covariance: FloatArray, prior: FloatArray, position: FloatArray) -> None:
+def begin(model: Model, state: State, position: FloatArray) -> None:
     """Both at the first position."""
-    mean[:], covariance[:] = 0.0, 0.0
-    for state in range(SIZE):
-        covariance[state, state] = prior[state]
-    for axis in range(dimension):
+    mean, covariance = state.mean, state.covariance
+    for one in range(SIZE):
+        mean[one] = 0.0
+        for other in range(SIZE):
+            covariance[one, other] = 0.0
+        covariance[one, one] = model.prior[one]
+    for axis in range(model.dimension):
         mean[POSITION + axis] = position[axis]
 
 
 @compiled
-def begin_again(
-    dimension: int, mean: FloatArray, covariance: FloatArray, prior: FloatArray, position: FloatArray
-) -> None:
+def begin_again(model: Model, state: State, position: FloatArray) -> None:
     """The motion is forgotten and begins at a position; what is known of phone and tracker stays."""
-    for state in range(_MOVED):
+    mean, covariance = state.mean, state.covariance
+    for one in range(_MOVED):
         for other in range(SIZE):
-            covariance[state, other] = covariance[other, state] = 0.0
-        covariance[state, state] = prior[state]
-        mean[state] = 0.0
-    for axis in range(dimension):
+            covariance[one, other] = covariance[other, one] = 0.0
+        covariance[one, one] = model.prior[one]
+        mean[one] = 0.0
+    for axis in range(model.dimension):
         mean[POSITION + axis] = position[axis]

@@ -18,17 +18,30 @@ from fusion_core.adaptive.layout import (
     AT_LARGEST,
     BIAS,
     CLIPPED,
+    COLUMNS,
     CROSSED,
     FELT,
+    FORCE,
+    INPUTS,
+    KNOWN,
     KNOWS_ARM,
     LARGEST,
     MOUNTING,
     OFFSET,
+    ORIENTATION,
     ORIENTED,
+    PHONE_AHEAD,
+    READ,
+    ROTATION,
     ROWS,
+    SHOWN,
+    SPECIFIC,
+    TIME,
     TURN,
     TURNED,
     VALUE,
+    Model,
+    Phone,
     State,
 )
 from fusion_core.compilation import compiled
@@ -46,32 +59,32 @@ _ROUND_OFF = 1e-9
 
 
 @compiled
-def put_in(state: State, time: float, value: FloatArray, rotation: FloatArray, force: FloatArray, known: float) -> int:
+def put_in(model: Model, state: State, phone: Phone, reading: FloatArray) -> int:
     """A reading put in at its time; returns where, −1 if there is one of that time. There must be room."""
-    count = state.count[ROWS]
+    count, time = state.count[ROWS], reading[TIME] - state.fact[PHONE_AHEAD]
     at = count
-    while at > 0 and state.time[at - 1] > time:
+    while at > 0 and phone.time[at - 1] > time:
         at -= 1
-    if at > 0 and time - state.time[at - 1] < _SAME_S:
+    if at > 0 and time - phone.time[at - 1] < _SAME_S:
         return -1
     for to in range(count, at, -1):
-        _copy_row(state, to - 1, to)
-    state.time[at], state.force[at, 3], state.shown[at, :] = time, known, np.nan
-    for axis in range(3):
-        state.force[at, axis] = force[axis]
-    _write_row(state.row[at], value, rotation, force, known)
-    if known == FELT and _is_clipped(state, force):
-        state.row[at, CLIPPED] = CLIPPED_PSD
+        _copy_row(phone, to - 1, to)
+    for column in range(SHOWN):
+        phone.shown[at, column] = np.nan
+    phone.time[at] = time
+    _write_row(phone.row, at, reading, model.dimension)
+    if reading[ORIENTATION] == FELT and _is_clipped(state, reading):
+        phone.row[at, CLIPPED] = CLIPPED_PSD
     state.count[ROWS] = count + 1
     return int(at)
 
 
 @compiled
-def _is_clipped(state: State, force: FloatArray) -> bool:
+def _is_clipped(state: State, reading: FloatArray) -> bool:
     """Is a component the very largest there was, and not for the first times? A motion's peaks differ, a range ends."""
     largest = 0.0
     for axis in range(3):
-        largest = max(largest, abs(force[axis]))
+        largest = max(largest, abs(reading[SPECIFIC + axis]))
     if largest > state.fact[LARGEST] * (1.0 + _ROUND_OFF):
         state.fact[LARGEST], state.fact[AT_LARGEST] = largest, 0.0
         return False
@@ -82,37 +95,44 @@ def _is_clipped(state: State, force: FloatArray) -> bool:
 
 
 @compiled
-def _write_row(row: FloatArray, value: FloatArray, rotation: FloatArray, force: FloatArray, known: float) -> None:
-    row[:] = 0.0
-    for axis in range(len(value)):
-        row[VALUE + axis] = value[axis]
-        x, y, z = rotation[axis, 0], rotation[axis, 1], rotation[axis, 2]
-        row[TURNED + 3 * axis], row[TURNED + 3 * axis + 1], row[TURNED + 3 * axis + 2] = x, y, z
-        if known == FELT:
-            row[CROSSED + 3 * axis] = y * force[2] - z * force[1]
-            row[CROSSED + 3 * axis + 1] = z * force[0] - x * force[2]
-            row[CROSSED + 3 * axis + 2] = x * force[1] - y * force[0]
+def _write_row(row: FloatArray, at: int, reading: FloatArray, dimension: int) -> None:
+    for column in range(COLUMNS):
+        row[at, column] = 0.0
+    row[at, KNOWN] = reading[ORIENTATION]
+    a, b, c = reading[SPECIFIC], reading[SPECIFIC + 1], reading[SPECIFIC + 2]
+    row[at, FORCE], row[at, FORCE + 1], row[at, FORCE + 2] = a, b, c
+    for axis in range(dimension):
+        row[at, VALUE + axis] = reading[READ + axis]
+        x, y, z = reading[ROTATION + 3 * axis], reading[ROTATION + 3 * axis + 1], reading[ROTATION + 3 * axis + 2]
+        row[at, TURNED + 3 * axis], row[at, TURNED + 3 * axis + 1], row[at, TURNED + 3 * axis + 2] = x, y, z
+        if reading[ORIENTATION] == FELT:
+            row[at, CROSSED + 3 * axis] = y * c - z * b
+            row[at, CROSSED + 3 * axis + 1] = z * a - x * c
+            row[at, CROSSED + 3 * axis + 2] = x * b - y * a
 
 
 @compiled
-def _copy_row(state: State, of: int, to: int) -> None:
-    state.time[to], state.row[to] = state.time[of], state.row[of]
-    state.force[to], state.shown[to] = state.force[of], state.shown[of]
+def _copy_row(phone: Phone, of: int, to: int) -> None:
+    phone.time[to] = phone.time[of]
+    for column in range(COLUMNS):
+        phone.row[to, column] = phone.row[of, column]
+    for column in range(SHOWN):
+        phone.shown[to, column] = phone.shown[of, column]
 
 
 @compiled
-def let_go(state: State, first: int) -> None:
+def let_go(state: State, phone: Phone, first: int) -> None:
     """The rows before `first` are no longer kept."""
     count = state.count[ROWS]
     for row in range(first, count):
-        _copy_row(state, row, row - first)
+        _copy_row(phone, row, row - first)
     state.count[ROWS] = count - first
 
 
 @compiled
-def row_before(state: State, time: float) -> int:
+def row_before(phone: Phone, count: int, time: float) -> int:
     """The newest row that is not after a time; the first if all are."""
-    return _before(state.time, state.count[ROWS], time)
+    return _before(phone.time, count, time)
 
 
 @compiled
@@ -124,14 +144,14 @@ def _before(times: FloatArray, count: int, time: float) -> int:
 
 
 @compiled
-def integrate(times: FloatArray, values: FloatArray, begin: float, end: float, total: FloatArray) -> float:
-    """First and second integrals of the columns of `values` (n, k) from `begin` to `end` into `total` (2, k).
+def integrate(times: FloatArray, count: int, values: FloatArray, begin: float, end: float, total: FloatArray) -> float:
+    """First and second integrals of the first k columns of `values` from `begin` to `end` into `total` (2, k).
 
     The first three are accelerations, which end where no reading says they go on. Returns the density, in mm²/s³, of
     what gaps leave unknown of the acceleration.
     """
-    total[:] = 0.0
-    count = len(times)
+    for column in range(total.shape[1]):
+        total[0, column], total[1, column] = 0.0, 0.0
     if end <= begin or count == 0:
         return SILENT_PSD
     unknown, at, row = 0.0, begin, _before(times, count, begin)
@@ -157,7 +177,7 @@ def _straight(
     dt, rest = until - at, end - until
     first, last = (at - begin) / step, (until - begin) / step
     share, early = (first + last) / 2.0, (2.0 * first + last) / 3.0
-    for column in range(values.shape[1]):
+    for column in range(total.shape[1]):
         here = values[row, column]
         rise = values[row + 1, column] - here
         once = dt * (here + share * rise)
@@ -174,7 +194,7 @@ def _held(
     source = max(row, 0)
     dt, rest = until - at, end - until
     held = dt if row < 0 else min(max(times[source] + HOLD_S - at, 0.0), dt)
-    for column in range(values.shape[1]):
+    for column in range(total.shape[1]):
         of = held if column < TURNED else dt  # what turns the bias goes on
         here = values[source, column]
         total[0, column] += of * here
@@ -183,37 +203,37 @@ def _held(
 
 
 @compiled
-def between(times: FloatArray, values: FloatArray, time: float, found: FloatArray) -> None:
-    """The columns of `values` (n, k) at a time, by a straight line between rows; the first or last outside."""
-    if len(times) == 0:
-        found[:] = 0.0
+def between(phone: Phone, count: int, time: float, arm: FloatArray) -> None:
+    """The corrected lever arm (3,) at a time, by a straight line between rows; the first or last outside."""
+    if count == 0:
+        for axis in range(3):
+            arm[axis] = 0.0
         return
-    row = _before(times, len(times), time)
-    following, share = min(row + 1, len(times) - 1), 0.0
+    row = _before(phone.time, count, time)
+    following, share = min(row + 1, count - 1), 0.0
     if following > row:
-        share = min(max((time - times[row]) / (times[following] - times[row]), 0.0), 1.0)
-    for column in range(values.shape[1]):
-        found[column] = (1.0 - share) * values[row, column] + share * values[following, column]
+        share = min(max((time - phone.time[row]) / (phone.time[following] - phone.time[row]), 0.0), 1.0)
+    for axis in range(3):
+        arm[axis] = (1.0 - share) * phone.corrected[row, 3 + axis] + share * phone.corrected[following, 3 + axis]
 
 
 @compiled
-def corrected(state: State, first: int, dimension: int, accelerations: FloatArray, arms: FloatArray) -> None:
-    """From the row `first` on: accelerations less what the input states put into them, and lever arms, (n, 3) each."""
-    mean, up, level, felt = state.mean, np.zeros(3), np.zeros(3), False
-    if dimension == 3 and len(accelerations) > 0:
-        newest = state.count[ROWS] - 1
-        felt = state.force[newest, 3] == FELT
-        _upward(state, newest, up)
-    for row in range(len(accelerations)):
-        own = state.row[first + row]
-        turned = state.count[KNOWS_ARM] and state.force[first + row, 3] >= ORIENTED
+def correct(state: State, phone: Phone, first: int, dimension: int) -> None:
+    """From the row `first` on: accelerations less what the input states put into them, and lever arms."""
+    mean, up, level, felt, count = state.mean, np.zeros(3), np.zeros(3), False, state.count[ROWS]
+    if dimension == 3 and count > 0:
+        felt = phone.row[count - 1, KNOWN] == FELT
+        _upward(phone, count - 1, up)
+    for at in range(first, count):
+        own = phone.row[at]
+        turned = state.count[KNOWS_ARM] and own[KNOWN] >= ORIENTED
         for axis in range(3):
             total, arm = own[VALUE + axis] - mean[OFFSET + axis], 0.0
             for part in range(3):
                 share = own[TURNED + 3 * axis + part]
                 arm += share * mean[ARM + part]
                 total -= share * mean[BIAS + part] + own[CROSSED + 3 * axis + part] * mean[MOUNTING + part]
-            accelerations[row, axis], arms[row, axis] = total, arm if turned else 0.0
+            phone.corrected[at, axis], phone.corrected[at, 3 + axis] = total, arm if turned else 0.0
         if felt:
             rise = own[VALUE] * up[0] + own[VALUE + 1] * up[1] + own[VALUE + 2] * up[2]
             for axis in range(3):
@@ -221,63 +241,68 @@ def corrected(state: State, first: int, dimension: int, accelerations: FloatArra
             for axis in range(3):
                 one, two = (axis + 1) % 3, (axis + 2) % 3
                 across = up[one] * level[two] - up[two] * level[one]
-                accelerations[row, axis] -= mean[TURN] * level[axis] + mean[TURN + 1] * across
+                phone.corrected[at, axis] -= mean[TURN] * level[axis] + mean[TURN + 1] * across
 
 
 @compiled
-def couple(state: State, total: FloatArray, span: float, dimension: int, coupling: FloatArray) -> None:
-    """How far each input state enters an integral (ROW,) of the accelerations, into `coupling` (3, INPUTS).
+def couple(
+    state: State, phone: Phone, total: FloatArray, order: int, span: float, dimension: int, coupling: FloatArray
+) -> None:
+    """How far each input state enters an integral of the accelerations, into `coupling[order]` (3, INPUTS).
 
-    `span` is the same integral of 1: the duration, or half its square.
+    `total[order]` (ROW,) is the integral of the rows, `span` that of 1: the duration, or half its square.
     """
-    coupling[:] = 0.0
     for axis in range(3):
+        for one in range(INPUTS):
+            coupling[order, axis, one] = 0.0
         for column in range(3):
-            coupling[axis, column] = total[TURNED + 3 * axis + column]
-            coupling[axis, MOUNTING - BIAS + column] = total[CROSSED + 3 * axis + column]
-        coupling[axis, OFFSET - BIAS + axis] = span
+            coupling[order, axis, column] = total[order, TURNED + 3 * axis + column]
+            coupling[order, axis, MOUNTING - BIAS + column] = total[order, CROSSED + 3 * axis + column]
+        coupling[order, axis, OFFSET - BIAS + axis] = span
     newest = state.count[ROWS] - 1
-    if dimension < 3 or newest < 0 or state.force[newest, 3] != FELT:
+    if dimension < 3 or newest < 0 or phone.row[newest, KNOWN] != FELT:
         return  # without all three axes there is no telling which way is up
     up, level = np.empty(3), np.empty(3)
-    _upward(state, newest, up)
-    rise = total[0] * up[0] + total[1] * up[1] + total[2] * up[2]
+    _upward(phone, newest, up)
+    rise = total[order, 0] * up[0] + total[order, 1] * up[1] + total[order, 2] * up[2]
     for axis in range(3):
-        level[axis] = total[axis] - rise * up[axis]
+        level[axis] = total[order, axis] - rise * up[axis]
     for axis in range(3):
         one, two = (axis + 1) % 3, (axis + 2) % 3
-        coupling[axis, TURN - BIAS] = level[axis]
-        coupling[axis, TURN - BIAS + 1] = up[one] * level[two] - up[two] * level[one]
+        coupling[order, axis, TURN - BIAS] = level[axis]
+        coupling[order, axis, TURN - BIAS + 1] = up[one] * level[two] - up[two] * level[one]
 
 
 @compiled
-def _upward(state: State, row: int, up: FloatArray) -> None:
+def _upward(phone: Phone, row: int, up: FloatArray) -> None:
     """Against gravity, which was added to R f to make the row's acceleration; zeros where there was none."""
-    squared = 0.0
+    own, squared = phone.row[row], 0.0
     for axis in range(3):
-        up[axis] = -state.row[row, axis]
+        up[axis] = -own[axis]
         for column in range(3):
-            up[axis] += state.row[row, TURNED + 3 * axis + column] * state.force[row, column]
+            up[axis] += own[TURNED + 3 * axis + column] * own[FORCE + column]
         squared += up[axis] * up[axis]
     if squared > 0.0:
-        up /= np.sqrt(squared)
+        for axis in range(3):
+            up[axis] /= np.sqrt(squared)
 
 
 @compiled
-def turned_at(state: State, time: float, turned: FloatArray) -> bool:
+def turned_at(state: State, phone: Phone, time: float, turned: FloatArray) -> bool:
     """The phone's rotation at a time into `turned` (3, 3), between rows by a straight line; false where unknown."""
-    turned[:] = 0.0
-    if state.count[ROWS] == 0:
+    count = state.count[ROWS]
+    row = _before(phone.time, count, time)
+    if count == 0 or phone.row[row, KNOWN] < ORIENTED:
+        for axis in range(3):
+            for column in range(3):
+                turned[axis, column] = 0.0
         return False
-    row = row_before(state, time)
-    if state.force[row, 3] < ORIENTED:
-        return False
-    following = min(row + 1, state.count[ROWS] - 1)
-    step, share = state.time[following] - state.time[row], 0.0
-    if 0.0 < step < 2 * HOLD_S and state.force[following, 3] >= ORIENTED:
-        share = min(max((time - state.time[row]) / step, 0.0), 1.0)
+    following = min(row + 1, count - 1)
+    step, share = phone.time[following] - phone.time[row], 0.0
+    if 0.0 < step < 2 * HOLD_S and phone.row[following, KNOWN] >= ORIENTED:
+        share = min(max((time - phone.time[row]) / step, 0.0), 1.0)
     for axis in range(3):
         for column in range(3):
             at = TURNED + 3 * axis + column
-            turned[axis, column] = (1.0 - share) * state.row[row, at] + share * state.row[following, at]
+            turned[axis, column] = (1.0 - share) * phone.row[row, at] + share * phone.row[following, at]
     return True

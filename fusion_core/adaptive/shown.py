@@ -22,6 +22,7 @@ from fusion_core.adaptive.layout import (
     FUSED,
     HELD,
     INPUTS,
+    KNOWN,
     KNOWS_ARM,
     MIXED,
     NOISE,
@@ -39,6 +40,7 @@ from fusion_core.adaptive.layout import (
     TURNED,
     VELOCITY,
     Model,
+    Phone,
     State,
 )
 from fusion_core.adaptive.rows import HOLD_S, SILENT_PSD, couple, row_before
@@ -56,71 +58,72 @@ _LEAST_OF_NOISE = 0.2  # of the noise's variance, in positions alone: five frame
 
 
 @compiled
-def fused(model: Model, state: State, time: float, position: FloatArray) -> float:
-    """The fusion's position (3,) at a time; returns its variance, the mean over axes."""
+def fused(model: Model, state: State, phone: Phone, time: float, answers: FloatArray) -> float:
+    """The fusion's position at a time, into `answers`; returns its variance, the mean over axes."""
     dimension, newest, at = model.dimension, state.count[ROWS] - 1, state.fact[AT]
     dt = max(time - at, 0.0)
-    total, coupling, row = np.zeros(ROW), np.zeros((3, INPUTS)), np.zeros(POSITION + ARM + 3)
-    silent, turned = dt, np.zeros((3, 3))
+    total, coupling, row = np.zeros((1, ROW)), np.zeros((1, 3, INPUTS)), np.empty(DRIFT)
+    silent = dt
     if newest >= 0:
-        silent = max(time - max(state.time[newest], at), 0.0)
+        silent = max(time - max(phone.time[newest], at), 0.0)
         held = min(silent, HOLD_S)
         for column in range(ROW):
             of = held if column < TURNED else silent
-            total[column] = state.head[1, column] + silent * state.head[0, column]
-            total[column] += (silent - of / 2.0) * of * state.row[newest, column]
-        couple(state, total, dt * dt / 2.0, dimension, coupling)
-        if state.count[KNOWS_ARM] and state.force[newest, 3] >= ORIENTED:
-            for axis in range(3):
-                for arm in range(3):
-                    turned[axis, arm] = state.row[newest, TURNED + 3 * axis + arm]
+            total[0, column] = state.head[1, column] + silent * state.head[0, column]
+            total[0, column] += (silent - of / 2.0) * of * phone.row[newest, column]
+        couple(state, phone, total, 0, dt * dt / 2.0, dimension, coupling)
+    turned = newest >= 0 and state.count[KNOWS_ARM] and phone.row[newest, KNOWN] >= ORIENTED
     variance = 0.0
     for axis in range(dimension):
-        row[:] = 0.0
+        for one in range(DRIFT):
+            row[one] = 0.0
         row[POSITION + axis], row[VELOCITY + axis] = 1.0, dt
         for part in range(INPUTS):
-            row[BIAS + part] = -coupling[axis, part]
-        for arm in range(3):
-            row[ARM + arm] = turned[axis, arm]
-        position[axis] = total[axis]
+            row[BIAS + part] = -coupling[0, axis, part]
+        if turned:
+            for arm in range(3):
+                row[ARM + arm] = phone.row[newest, TURNED + 3 * axis + arm]
+        position = total[0, axis]
         for one in range(DRIFT):
             if row[one] != 0.0:
-                position[axis] += row[one] * state.mean[one]
+                position += row[one] * state.mean[one]
                 for other in range(DRIFT):
                     variance += row[one] * state.covariance[one, other] * row[other]
-    psd_dt2 = state.fact[TRUST] * dt**2 + 2.0 * total[CLIPPED]  # ∫∫ψ is ψ dt²/2 where ψ lasts
+        answers[FUSED + axis] = position
+    psd_dt2 = state.fact[TRUST] * dt**2 + 2.0 * total[0, CLIPPED]  # ∫∫ψ is ψ dt²/2 where ψ lasts
     of_silence = SILENT_PSD * max(silent - HOLD_S, 0.0) ** 3 / 3.0
     return float(variance / dimension + psd_dt2 * dt / 3.0 + of_silence)
 
 
 @compiled
-def answer(model: Model, state: State, time: float, answers: FloatArray) -> None:
-    """What is shown at a time, and what it is mixed of, as a row of `State.shown`."""
-    position, turned = np.zeros(3), np.zeros(3)
-    answers[STATED] = fused(model, state, time, position)
-    ahead, held, weight = np.zeros(3), np.zeros(3), np.empty(_ANSWERS)
-    bank.by_positions(model, state, max(time - state.fact[AT], 0.0), ahead, held)
-    _arm(state, turned)
+def answer(model: Model, state: State, phone: Phone, time: float, answers: FloatArray) -> None:
+    """What is shown at a time, and what it is mixed of, as a row of `Phone.shown`."""
+    for axis in range(3):
+        answers[FUSED + axis] = 0.0
+    own, weight = fused(model, state, phone, time, answers), np.empty(_ANSWERS)
+    bank.by_positions(model, state, max(time - state.fact[AT], 0.0), answers)
+    _add_arm(state, phone, answers)
     _weights(state, weight)
-    answers[STATED] *= weight[0]
+    answers[STATED] = own * weight[0]
     for other in range(1, _ANSWERS):
         seen = state.fact[ERROR + other] - _noise(state)
         answers[STATED] += weight[other] * max(seen, _LEAST_OF_NOISE * _noise(state))
     for axis in range(3):
-        answers[FUSED + axis] = position[axis]
-        answers[AHEAD + axis], answers[HELD + axis] = ahead[axis] + turned[axis], held[axis] + turned[axis]
-        answers[MIXED + axis] = weight[0] * position[axis]
+        answers[MIXED + axis] = weight[0] * answers[FUSED + axis]
         answers[MIXED + axis] += weight[1] * answers[AHEAD + axis] + weight[2] * answers[HELD + axis]
 
 
 @compiled
-def _arm(state: State, arm: FloatArray) -> None:
-    """The lever arm as the newest row turns it."""
+def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
+    """The lever arm, as the newest row turns it, added to what positions alone say of the phone."""
     newest = state.count[ROWS] - 1
-    if newest >= 0 and state.count[KNOWS_ARM] and state.force[newest, 3] >= ORIENTED:
+    if newest >= 0 and state.count[KNOWS_ARM] and phone.row[newest, KNOWN] >= ORIENTED:
         for axis in range(3):
+            arm = 0.0
             for part in range(3):
-                arm[axis] += state.row[newest, TURNED + 3 * axis + part] * state.mean[ARM + part]
+                arm += phone.row[newest, TURNED + 3 * axis + part] * state.mean[ARM + part]
+            answers[AHEAD + axis] += arm
+            answers[HELD + axis] += arm
 
 
 @compiled
@@ -139,28 +142,28 @@ def _weights(state: State, weight: FloatArray) -> None:
 
 
 @compiled
-def score(model: Model, state: State, time: float, position: FloatArray) -> None:
+def score(model: Model, state: State, phone: Phone, time: float, position: FloatArray) -> None:
     """What was shown for `time` held against the position that has now come."""
-    row = row_before(state, time)
-    if row + 1 >= state.count[ROWS] or state.time[row] > time:
+    row, shown = row_before(phone, state.count[ROWS], time), phone.shown
+    if row + 1 >= state.count[ROWS] or phone.time[row] > time:
         return
-    share = (time - state.time[row]) / (state.time[row + 1] - state.time[row])
-    before, after = state.shown[row], state.shown[row + 1]
-    if np.isnan(before[STATED]) or np.isnan(after[STATED]):
+    if np.isnan(shown[row, STATED]) or np.isnan(shown[row + 1, STATED]):
         return
+    share = (time - phone.time[row]) / (phone.time[row + 1] - phone.time[row])
     state.fact[SCORED] += 1.0
-    shares = max(1.0 / state.fact[SCORED], 1.0 / _SCORES), max(1.0 / state.fact[SCORED], 1.0 / _SURPRISES)
+    newer = max(1.0 / state.fact[SCORED], 1.0 / _SCORES)
     for one in range(_ANSWERS + 1):
         squared = 0.0
         for axis in range(model.dimension):
-            shown = (1.0 - share) * before[3 * one + axis] + share * after[3 * one + axis]
-            squared += (position[axis] - shown) ** 2 / model.dimension
+            at = 3 * one + axis
+            there = (1.0 - share) * shown[row, at] + share * shown[row + 1, at]
+            squared += (position[axis] - there) ** 2 / model.dimension
         if one < _ANSWERS:
-            state.fact[ERROR + one] += shares[0] * (squared - state.fact[ERROR + one])
+            state.fact[ERROR + one] += newer * (squared - state.fact[ERROR + one])
         else:
-            expected = before[STATED] + _noise(state)
-            surprise = min(squared / expected, _MOST_SURPRISE)
-            state.fact[SURPRISE] += shares[1] * (surprise - state.fact[SURPRISE])
+            newer = max(1.0 / state.fact[SCORED], 1.0 / _SURPRISES)
+            surprise = min(squared / (shown[row, STATED] + _noise(state)), _MOST_SURPRISE)
+            state.fact[SURPRISE] += newer * (surprise - state.fact[SURPRISE])
 
 
 @compiled
@@ -170,15 +173,16 @@ def _noise(state: State) -> float:
 
 
 @compiled
-def expect(model: Model, state: State, time: float, mean: FloatArray, sd: FloatArray) -> None:
-    """Position and SD at a time, (d,) each; NaN before the first position."""
+def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArray, sd: FloatArray, at: int) -> None:
+    """Position and SD at a time, into row `at` of `mean` and `sd`; NaN before the first position."""
     if state.count[TAKEN] == 0:
-        mean[:], sd[:] = np.nan, np.nan
+        for axis in range(model.dimension):
+            mean[at, axis], sd[at, axis] = np.nan, np.nan
         return
     answers = np.empty(SHOWN)
-    answer(model, state, time, answers)
+    answer(model, state, phone, time, answers)
     variance = answers[STATED]
     if state.fact[SCORED] >= _ENOUGH and state.fact[SURPRISE] > 1.0:
         variance += (state.fact[SURPRISE] - 1.0) * (variance + _noise(state))
     for axis in range(model.dimension):
-        mean[axis], sd[axis] = answers[MIXED + axis], np.sqrt(variance)
+        mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance)

@@ -1,40 +1,52 @@
-"""A reading arrives: the one door for live and replay. The package's theory of operation says what a frame does."""
+"""A reading arrives. The package's theory of operation says what a frame does.
+
+Each function of any size is called from one place only, and the two largest become part of their caller
+(`inline="always"`): LLVM optimises whatever a function calls once more with it.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from fusion_core.adaptive import bank, clock, moments, rows, shown
 from fusion_core.adaptive.layout import (
     ARM,
+    ARRIVAL,
     AT,
     BEGAN,
     CLIPPED,
     CLOCK_S,
     CLOCK_VARIANCE,
     DRIFT,
+    FACTS,
     HAS_DIFFERED,
     INPUTS,
+    IS_FRAME,
     KNOWS_ARM,
     LAST,
+    MOST_WAITING,
     NOISE,
     NOISE_DRIFT,
     NOISE_DRIFT_S,
     PHONE_AHEAD,
     POSITION,
+    READ,
     ROW,
     ROWS,
+    SIZE,
     STAMP,
     STRANGE,
     STRANGE_MM,
     STRANGE_SINCE,
     TAKEN,
+    TIME,
     TOO_LATE,
     TRUST,
     VELOCITY,
     WAITING,
     Model,
+    Phone,
+    Records,
     State,
 )
 from fusion_core.compilation import compiled
@@ -51,39 +63,62 @@ _BELIEVED_AFTER_S = 1.3  # a jump that stays so long is where the hand is now
 _MOST_AHEAD_S = 0.2
 _AHEAD_TAKEN, _AHEAD_KEPT = 0.2, 0.9997  # of a reading that is ahead; of what is known, from reading to reading
 _ROUND_OFF_S = 1e-6
+_NOTHING, _MEASURED, _BELIEVED_AGAIN = 0, 1, 2  # what a frame is taken for
 
 
 @compiled
-def arrive(
-    model: Model,
-    state: State,
-    is_frame: bool,
-    time: float,
-    arrival: float,
-    value: FloatArray,
-    rotation: FloatArray,
-    force: FloatArray,
-    known: float,
+def go_through(
+    models: Records,
+    states: Records,
+    phone: Phone,
+    readings: FloatArray,
+    times: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    traced: FloatArray,
 ) -> None:
+    """All `readings` (n, READING), in order of arrival, taken in; `mean` and `sd` (m, d) written at `times`.
+
+    The one door for live and replay: a live step has one reading and no time, or one time and no reading. Times rise.
+    `traced` (m, FACTS + 2 SIZE), unless it is empty, takes the facts, the mean and its SDs at each time.
+    """
+    model, state, upcoming, index = models[0], states[0], 0, 0
+    while upcoming < len(readings) or index < len(times):
+        if upcoming < len(readings) and (index == len(times) or readings[upcoming, ARRIVAL] <= times[index]):
+            if state.count[ROWS] == len(phone.time):
+                rows.let_go(state, phone, oldest_needed(models, states, phone))
+            _arrive(model, state, phone, readings[upcoming])
+            upcoming += 1
+        else:
+            shown.expect(model, state, phone, times[index], mean, sd, index)
+            if len(traced):
+                _trace(state, traced[index])
+            index += 1
+
+
+@compiled(inline="always")
+def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> None:
     """A reading taken in. There must be room for a row."""
     newest = -1
-    if is_frame:
-        _queue(model, state, time, arrival, value)
+    if reading[IS_FRAME] > 0.0:
+        _queue(state, reading)
     else:
-        _correct_clock(state, time - arrival)
-        newest = rows.put_in(state, time - state.fact[PHONE_AHEAD], value, rotation, force, known)
+        _correct_clock(state, reading[TIME] - reading[ARRIVAL])
+        newest = rows.put_in(model, state, phone, reading)
     before = state.fact[AT]
-    _take_waiting(model, state, arrival)
-    if state.count[ROWS] > 0 and state.count[TAKEN] > 0:
-        oldest = state.time[state.count[ROWS] - 1] - model.history_s
+    while _is_due(state, phone, reading[ARRIVAL]):
+        _take_first(model, state, phone)
+    count = state.count[ROWS]
+    if count > 0 and state.count[TAKEN] > 0:
+        oldest = phone.time[count - 1] - model.history_s
         if oldest > state.fact[AT]:
-            _advance(model, state, oldest)
-        if newest == state.count[ROWS] - 1 and newest > 0 and before == state.fact[AT]:
-            _extend_head(state)
+            _advance(model, state, phone, oldest)
+        if newest == count - 1 and newest > 0 and before == state.fact[AT] and phone.time[newest - 1] > before:
+            _extend_head(state, phone)
         else:
-            _rebuild_head(state)
-        if newest == state.count[ROWS] - 1:
-            shown.answer(model, state, state.time[newest], state.shown[newest])
+            rows.integrate(phone.time, count, phone.row, state.fact[AT], phone.time[count - 1], state.head)
+        if newest == count - 1:
+            shown.answer(model, state, phone, phone.time[newest], phone.shown[newest])
 
 
 @compiled
@@ -99,130 +134,138 @@ def _correct_clock(state: State, ahead_s: float) -> None:
 
 
 @compiled
-def _queue(model: Model, state: State, time: float, arrival: float, value: FloatArray) -> None:
-    """A frame among those that wait, in order of measurement."""
-    if state.count[WAITING] == len(state.waiting):
-        _take_first(model, state)
-    at = state.count[WAITING]
-    while at > 0 and state.waiting[at - 1, 0] > time:
-        state.waiting[at] = state.waiting[at - 1]
+def _queue(state: State, reading: FloatArray) -> None:
+    """A frame among those that wait, in order of measurement. There is room for one more than may wait."""
+    at, waiting = state.count[WAITING], state.waiting
+    while at > 0 and waiting[at - 1, 0] > reading[TIME]:
+        for column in range(5):
+            waiting[at, column] = waiting[at - 1, column]
         at -= 1
-    state.waiting[at, 0], state.waiting[at, 1] = time, arrival
-    for axis in range(model.dimension):
-        state.waiting[at, 2 + axis] = value[axis]
+    waiting[at, 0], waiting[at, 1] = reading[TIME], reading[ARRIVAL]
+    for axis in range(3):
+        waiting[at, 2 + axis] = reading[READ + axis]
     state.count[WAITING] += 1
 
 
 @compiled
-def _take_waiting(model: Model, state: State, now: float) -> None:
-    """The frames that need wait no longer: the phone has said what it felt up to then, or is not going to."""
-    while state.count[WAITING] > 0:
-        time = state.waiting[0, 0] + state.fact[CLOCK_S]
-        newest = state.time[state.count[ROWS] - 1] if state.count[ROWS] > 0 else -np.inf
-        if newest < time and newest >= time - _SILENT_S and now - state.waiting[0, 1] < _WAIT_S:
-            return
-        _take_first(model, state)
+def _is_due(state: State, phone: Phone, now: float) -> bool:
+    """Need the first frame wait no longer? The phone has said what it felt up to then, or is not going to."""
+    if state.count[WAITING] == 0 or state.count[WAITING] > MOST_WAITING:
+        return bool(state.count[WAITING] > 0)
+    time = state.waiting[0, 0] + state.fact[CLOCK_S]
+    newest = phone.time[state.count[ROWS] - 1] if state.count[ROWS] > 0 else -np.inf
+    return bool(newest >= time or newest < time - _SILENT_S or now - state.waiting[0, 1] >= _WAIT_S)
 
 
-@compiled
-def _take_first(model: Model, state: State) -> None:
+@compiled(inline="always")
+def _take_first(model: Model, state: State, phone: Phone) -> None:
     """The first of the frames that wait is taken in."""
-    time, value = state.waiting[0, 0], state.waiting[0, 2:].copy()
-    for at in range(1, state.count[WAITING]):
-        state.waiting[at - 1] = state.waiting[at]
+    stamp, value, waiting = state.waiting[0, 0], np.empty(3), state.waiting
+    for axis in range(3):
+        value[axis] = waiting[0, 2 + axis]
     state.count[WAITING] -= 1
+    for at in range(state.count[WAITING]):
+        for column in range(5):
+            waiting[at, column] = waiting[at + 1, column]
     if state.count[TAKEN] == 0:
-        _begin(model, state, time, value)
-    elif time + state.fact[CLOCK_S] < state.fact[AT] - _BACK_S:
+        _begin(model, state, stamp, value)
+    elif stamp + state.fact[CLOCK_S] < state.fact[AT] - _BACK_S:
         state.count[TOO_LATE] += 1
     else:
-        _take_in(model, state, time, time + state.fact[CLOCK_S], value)
+        _take_in(model, state, phone, stamp, value)
 
 
 @compiled
 def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
     """The first frame."""
-    moments.begin(model.dimension, state.mean, state.covariance, model.prior, value)
+    moments.begin(model, state, value)
     state.fact[AT], state.fact[BEGAN] = time, time
     bank.begin(model, state, value)
     clock.begin(model, state, value)
     state.fact[STAMP] = time
     state.count[TAKEN] = 1
-    for axis in range(model.dimension):
+    for axis in range(3):
         state.fact[LAST + axis] = value[axis]
 
 
 @compiled
-def _advance(model: Model, state: State, time: float) -> tuple[float, float, float]:
+def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[float, float, float]:
     """Everything moved to `time`; returns the duration, and what the small filters are to consider: a variance
     of positions and a density of accelerations."""
     dt = time - state.fact[AT]
     if dt <= 0.0:
         return 0.0, 0.0, 0.0
-    total, coupling, net = np.zeros((2, ROW)), np.zeros((2, 3, INPUTS)), np.zeros((2, 3))
-    count = state.count[ROWS]
-    unknown = rows.integrate(state.time[:count], state.row[:count], state.fact[AT], time, total)
+    total, coupling, net = np.empty((2, ROW)), np.empty((2, 3, INPUTS)), np.empty((2, 3))
+    unknown = rows.integrate(phone.time, state.count[ROWS], phone.row, state.fact[AT], time, total)
     for order in range(2):
-        rows.couple(state, total[order], dt if order == 0 else dt * dt / 2.0, model.dimension, coupling[order])
-        moments.inputs_of(state.mean, total[order], coupling[order], net[order])
+        rows.couple(state, phone, total, order, dt if order == 0 else dt * dt / 2.0, model.dimension, coupling)
+    moments.inputs_of(state, total, coupling, net)
     unknown += total[0, CLIPPED] / dt
-    trust, drift, drift_s = state.fact[TRUST], state.fact[NOISE_DRIFT], state.fact[NOISE_DRIFT_S]
-    moments.move(state.mean, state.covariance, dt, net, coupling, trust + unknown, model.walk)
-    moments.fade(state.mean, state.covariance, dt, drift, drift_s)
+    moments.move(model, state, dt, net, coupling, state.fact[TRUST] + unknown)
+    moments.fade(state, dt, state.fact[NOISE_DRIFT], state.fact[NOISE_DRIFT_S])
     state.fact[AT] = time
-    turned = np.zeros((3, 3))
-    if rows.turned_at(state, time, turned) and not state.count[KNOWS_ARM]:
+    turned = np.empty((3, 3))
+    if rows.turned_at(state, phone, time, turned) and not state.count[KNOWS_ARM]:
         state.count[KNOWS_ARM] = 1
-        moments.to_phone(state.mean, state.covariance, turned)
-    of_positions, of_accelerations = bank.considered(model, state, turned, coupling[0], dt)
+        moments.to_phone(state, turned)
+    of_positions, of_accelerations = bank.considered(model, state, turned, coupling, dt)
     bank.move(model, state, dt, net, unknown + of_accelerations)
     return dt, of_positions, unknown + of_accelerations
 
 
 @compiled
-def _take_in(model: Model, state: State, stamp: float, time: float, value: FloatArray) -> None:
-    """A frame measured at `time`, or a little before the state, if it is a measurement at all."""
+def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: FloatArray) -> None:
+    """A frame taken in, measured at its stamp by the tracker's clock, if it is a measurement at all."""
+    time = stamp + state.fact[CLOCK_S]
     ago = max(state.fact[AT] - time, 0.0)
-    dt, of_positions, of_accelerations = _advance(model, state, time)
+    dt, of_positions, of_accelerations = _advance(model, state, phone, time)
     of_positions += _of_clock(model, state)
     state.count[TAKEN] += 1
-    if not _is_news(model, state, value):
-        _move_clock(model, state, stamp, value, of_accelerations, 0.0, False)
-        return
-    turned, of_phone = np.zeros((3, 3)), value.copy()
-    if state.count[KNOWS_ARM]:
-        rows.turned_at(state, time, turned)
-        for axis in range(model.dimension):
-            for part in range(3):
-                of_phone[axis] -= turned[axis, part] * state.mean[ARM + part]
-    if _is_strange(model, state, of_phone, time):
-        _move_clock(model, state, stamp, value, of_accelerations, 0.0, False)
-        return
-    if state.count[STRANGE] > 0:
-        state.count[STRANGE] = 0
-        moments.begin_again(model.dimension, state.mean, state.covariance, model.prior, of_phone)
+    turned, of_phone = np.zeros((3, 3)), np.empty(3)
+    verdict = _judge(model, state, phone, time, value, turned, of_phone)
+    if verdict == _BELIEVED_AGAIN:
+        moments.begin_again(model, state, of_phone)
         bank.begin_again(model, state, of_phone)
         clock.begin_again(model, state, of_phone)
         state.fact[STAMP] = stamp
         return
-    if ago == 0.0:
-        shown.score(model, state, time, value)
+    news = 1 if verdict == _MEASURED and ago == 0.0 else 0
+    if news:
+        shown.score(model, state, phone, time, value)
         bank.take_in(model, state, of_phone, of_positions, max(dt, 1e-3))
         bank.judge(model, state)
-        _move_clock(model, state, stamp, value, of_accelerations, of_positions, True)
-    variance = state.fact[NOISE] + _of_clock(model, state)
-    moments.correct(model.dimension, state.mean, state.covariance, ago, turned, value, variance, model.surprise)
+    if news or verdict == _NOTHING:
+        clock.take_in(model, state, phone, stamp, value, of_accelerations, of_positions, news)
+    if verdict == _MEASURED:
+        moments.correct(model, state, ago, turned, value, state.fact[NOISE] + _of_clock(model, state))
 
 
 @compiled
-def _move_clock(
-    model: Model, state: State, stamp: float, value: FloatArray, more_psd: float, more: float, news: bool
-) -> None:
-    """The tries of the tracker's clock moved to a frame's stamp, and what they say of it."""
-    clock.take_in(model, state, state.fact[STAMP], stamp, value, more_psd, more, news)
-    state.fact[STAMP] = max(stamp, state.fact[STAMP])
-    if news:
-        clock.judge(state)
+def _judge(
+    model: Model,
+    state: State,
+    phone: Phone,
+    time: float,
+    value: FloatArray,
+    turned: FloatArray,
+    of_phone: FloatArray,
+) -> int:
+    """What a frame is to be taken for; the phone's rotation and position by it are written on the way."""
+    if not _is_news(model, state, value):
+        return _NOTHING
+    for axis in range(3):
+        of_phone[axis] = value[axis]
+    if state.count[KNOWS_ARM]:
+        rows.turned_at(state, phone, time, turned)
+        for axis in range(model.dimension):
+            for part in range(3):
+                of_phone[axis] -= turned[axis, part] * state.mean[ARM + part]
+    if _is_strange(model, state, of_phone, time):
+        return _NOTHING
+    if state.count[STRANGE] > 0:
+        state.count[STRANGE] = 0
+        return _BELIEVED_AGAIN
+    return _MEASURED
 
 
 @compiled
@@ -274,105 +317,32 @@ def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -
 
 
 @compiled
-def _extend_head(state: State) -> None:
+def _extend_head(state: State, phone: Phone) -> None:
     """The integrals from the state on go on to a new newest row."""
     newest = state.count[ROWS] - 1
-    begin, end = max(state.time[newest - 1], state.fact[AT]), state.time[newest]
-    if begin == state.fact[AT]:
-        _rebuild_head(state)
-        return
-    dt = end - begin
+    dt = phone.time[newest] - phone.time[newest - 1]
     for column in range(ROW):
-        first, last = state.row[newest - 1, column], state.row[newest, column]
+        first, last = phone.row[newest - 1, column], phone.row[newest, column]
         state.head[1, column] += dt * state.head[0, column] + dt * dt / 6.0 * (2.0 * first + last)
         state.head[0, column] += dt / 2.0 * (first + last)
 
 
 @compiled
-def _rebuild_head(state: State) -> None:
-    count = state.count[ROWS]
-    rows.integrate(state.time[:count], state.row[:count], state.fact[AT], state.time[count - 1], state.head)
-
-
-@compiled
-def oldest_needed(model: Model, state: State) -> int:
+def oldest_needed(models: Records, states: Records, phone: Phone) -> int:
     """The first row that a reading may still ask for."""
+    model, state = models[0], states[0]
     count, first = state.count[ROWS], 0
     if count > 0:
-        since = state.fact[AT] - _KEPT_S if state.count[TAKEN] else state.time[count - 1] - 2.0 * model.history_s
-        while first + 1 < count and state.time[first + 1] <= since:
+        since = state.fact[AT] - _KEPT_S if state.count[TAKEN] else phone.time[count - 1] - 2.0 * model.history_s
+        while first + 1 < count and phone.time[first + 1] <= since:
             first += 1
     return first
 
 
 @compiled
-def copied(model: Model, state: State, room: State) -> None:
-    """`state` into `room`, which has room for its rows, less those that are no longer needed."""
-    first, count = oldest_needed(model, state), state.count[ROWS]
-    kept = count - first
-    room.time[:kept], room.row[:kept] = state.time[first:count], state.row[first:count]
-    room.force[:kept], room.shown[:kept] = state.force[first:count], state.shown[first:count]
-    room.count[:], room.fact[:], room.mean[:], room.covariance[:] = (
-        state.count,
-        state.fact,
-        state.mean,
-        state.covariance,
-    )
-    room.head[:], room.weight[:], room.usual[:], room.waiting[:] = state.head, state.weight, state.usual, state.waiting
-    room.clock_mean[:], room.clock_covariance[:] = state.clock_mean, state.clock_covariance
-    room.clock_weight[:] = state.clock_weight
-    room.share[:], room.kept[:] = state.share, state.kept
-    room.bank_mean[:], room.bank_covariance[:] = state.bank_mean, state.bank_covariance
-    room.count[ROWS] = count - first
-
-
-@compiled
-def replay(
-    model: Model,
-    state: State,
-    is_frame: npt.NDArray[np.bool_],
-    time: FloatArray,
-    arrival: FloatArray,
-    value: FloatArray,
-    rotation: FloatArray,
-    force: FloatArray,
-    known: FloatArray,
-    times: FloatArray,
-    traced: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Mean and SD (n, dimension) at `times`, which rise, of readings in order of arrival.
-
-    `traced` (n, FACTS + 2 SIZE), unless it is empty, takes the facts, the mean and its SDs at each time.
-    """
-    mean = np.full((len(times), model.dimension), np.nan)
-    sd, upcoming = mean.copy(), 0
-    for index in range(len(times)):
-        while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
-            if state.count[ROWS] == len(state.time):
-                rows.let_go(state, oldest_needed(model, state))
-            arrive(
-                model,
-                state,
-                is_frame[upcoming],
-                time[upcoming],
-                arrival[upcoming],
-                value[upcoming],
-                rotation[upcoming],
-                force[upcoming],
-                known[upcoming],
-            )
-            upcoming += 1
-        shown.expect(model, state, times[index], mean[index], sd[index])
-        if len(traced):
-            _trace(state, traced[index])
-    return mean, sd
-
-
-@compiled
 def _trace(state: State, into: FloatArray) -> None:
-    facts, size = len(state.fact), len(state.mean)
-    for at in range(facts):
+    for at in range(FACTS):
         into[at] = state.fact[at]
-    for at in range(size):
-        into[facts + at] = state.mean[at]
-        into[facts + size + at] = np.sqrt(max(state.covariance[at, at], 0.0))
+    for at in range(SIZE):
+        into[FACTS + at] = state.mean[at]
+        into[FACTS + SIZE + at] = np.sqrt(max(state.covariance[at, at], 0.0))

@@ -132,7 +132,7 @@ def _steps(seconds: float) -> int:
 
 
 @compiled(forceinline=True)
-def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
+def sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
     position, velocity, drive = state[0, axis], state[1, axis], state[2, axis]
     for row in range(3):
         state[row, axis] = (
@@ -144,7 +144,7 @@ def _sway(motion: Sway, state: FloatArray, axis: int, draw: float) -> None:
 
 
 @compiled(forceinline=True)
-def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) -> None:
+def replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) -> None:
     """Plans a quintic from the planned motion now to rest at the goal, lasting T₀ + k·√distance."""
     goal = (to_x, to_y)
     distance = np.hypot(to_x - hand.planned[0, 0], to_y - hand.planned[0, 1])
@@ -164,7 +164,7 @@ def _replan(person: Person, hand: Hand, to_x: float, to_y: float, now: float) ->
 
 
 @compiled(forceinline=True)
-def _follow_plan(hand: Hand, now: float) -> None:
+def follow_plan(hand: Hand, now: float) -> None:
     """Sets the planned motion at `now`: along the polynomial, at rest after its end."""
     lasts = hand.clock[_PLAN_LASTS]
     part = (now - hand.clock[_PLAN_BEGAN]) / lasts if lasts > 0.0 else 1.0
@@ -309,8 +309,8 @@ def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, dra
         rested = now - hand.clock[_PLAN_BEGAN] >= person.refractory_s
         off = np.hypot(to_x - hand.planned_to[0], to_y - hand.planned_to[1])
         if wants and rested and off > person.dead_zone_mm:
-            _replan(person, hand, to_x, to_y, now)
-        _follow_plan(hand, now + STEP_S)
+            replan(person, hand, to_x, to_y, now)
+        follow_plan(hand, now + STEP_S)
     speed = np.hypot(hand.planned[1, 0], hand.planned[1, 1])
     along, across = draws.standard_normal() / np.sqrt(STEP_S), draws.standard_normal() / np.sqrt(STEP_S)
     along, across = along * person.noise_along_sqrt_s, across * person.noise_across_sqrt_s
@@ -324,8 +324,8 @@ def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, dra
         hand.noise[1, axis] += STEP_S / _MUSCLE_S * (hand.noise[0, axis] - before)
         hand.noise[0, axis] += STEP_S / _MUSCLE_S * (drive - hand.noise[0, axis])
         hand.noise[2, axis] += STEP_S * (before + hand.noise[1, axis]) / 2.0
-        _sway(tremor, hand.tremor, axis, draws.standard_normal())
-        _sway(drift, hand.drift, axis, draws.standard_normal())
+        sway(tremor, hand.tremor, axis, draws.standard_normal())
+        sway(drift, hand.drift, axis, draws.standard_normal())
 
 
 @compiled(forceinline=True)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from fusion_core.adaptive import layout
-from fusion_core.adaptive.layout import Model
+from fusion_core.adaptive.layout import Records
 from fusion_core.samples import Samples
 
 P, V, INPUT, ARM, DRIFT = slice(0, 3), slice(3, 6), slice(6, 17), slice(17, 20), slice(20, 23)
@@ -29,20 +29,20 @@ def cross(vector: np.ndarray) -> np.ndarray:
 class Dense:
     """State of 23 and bank; `take` moves to a frame and takes it in."""
 
-    def __init__(self, model: Model, imu: Samples, position: np.ndarray, time: float) -> None:
+    def __init__(self, model: Records, imu: Samples, position: np.ndarray, time: float) -> None:
         assert imu.rotation is not None
         assert imu.force is not None
-        self.model, self.imu, self.time, self.began = model, imu, time, time
-        self.mean, self.covariance = np.zeros(23), np.diag(model.prior)
+        self.model, self.imu, self.time, self.began = model[0], imu, time, time
+        self.mean, self.covariance = np.zeros(23), np.diag(self.model["prior"])
         self.mean[P] = position
         self.knows_arm = False
         self.usual = np.zeros((3, 14))
-        members = model.member.T
+        members = self.model["member"].T
         self.bank_mean = np.zeros((len(members), 4, 3))
         self.bank_mean[:, 0] = position
         self.bank = []
         for variance, _, _, phone, drift, _ in members:
-            own = np.diag([variance + drift, model.prior[3], (1000.0 if phone else 5000.0) ** 2, drift])
+            own = np.diag([variance + drift, self.model["prior"][3], (1000.0 if phone else 5000.0) ** 2, drift])
             own[0, 3] = own[3, 0] = -drift
             self.bank.append(own)
         self.weight = np.zeros(len(members))
@@ -98,7 +98,7 @@ class Dense:
 
     def _move(self, dt: float, first: np.ndarray, second: np.ndarray) -> None:
         kept = np.exp(-dt / self.scale[3]) if self.scale[3] > 0 else 0.0
-        transition, noise = np.eye(23), np.diag(self.model.walk * dt)
+        transition, noise = np.eye(23), np.diag(self.model["walk"] * dt)
         transition[P, V], transition[P, INPUT], transition[V, INPUT] = dt * np.eye(3), -second[:, 1:], -first[:, 1:]
         transition[DRIFT, DRIFT] = kept * np.eye(3)
         given = np.zeros(23)
@@ -127,7 +127,7 @@ class Dense:
             ]
         )
         observed = np.array([1.0, 0, 0, 1.0])
-        for index, (noise, trust, rate_psd, phone, drift, drift_s) in enumerate(self.model.member.T):
+        for index, (noise, trust, rate_psd, phone, drift, drift_s) in enumerate(self.model["member"].T):
             fade = np.exp(-dt / drift_s) if drift > 0 else 0.0
             transition = np.array([[1, dt, dt**2 / 2, 0], [0, 1, dt, 0], [0, 0, 1, 0], [0, 0, 0, fade]])
             added = block_diag(rate_psd * rate, (1 - fade**2) * drift)
@@ -136,8 +136,8 @@ class Dense:
             mean = transition @ self.bank_mean[index] + phone * np.array([net[1], net[0], np.zeros(3), np.zeros(3)])
             apart, spread = position - observed @ mean, observed @ own @ observed + noise + variance
             squared = apart @ apart / spread
-            surprised = max(squared / self.model.surprise, 1.0)
-            cost = min(squared, self.model.surprise) + 9.0 * np.log(surprised)
+            surprised = max(squared / self.model["surprise"], 1.0)
+            cost = min(squared, self.model["surprise"]) + 9.0 * np.log(surprised)
             self.weight[index] = kept * self.weight[index] - 0.5 * cost - 1.5 * np.log(spread)
             gain = own @ observed / (spread * surprised)
             self.bank_mean[index] = mean + np.outer(gain, apart)
@@ -145,8 +145,8 @@ class Dense:
 
     def judge(self) -> None:
         """Tracker variance, trust, variance and time of correlated noise."""
-        phone = self.model.member[layout.USES_PHONE] > 0
-        member, odds = self.model.member.T[phone], (self.weight + self.model.log_prior)[phone]
+        phone = self.model["member"][layout.USES_PHONE] > 0
+        member, odds = self.model["member"].T[phone], (self.weight + self.model["log_prior"])[phone]
         weight = np.exp(odds - odds.max())
         weight /= weight.sum()
         drifting = member[:, layout.DRIFT_VARIANCE] > 0
@@ -165,14 +165,14 @@ class Dense:
         own = observed @ self.covariance @ observed.T
         variance = self.scale[0] + of_clock
         squared = apart @ np.linalg.solve(own + variance * np.eye(3), apart)
-        if squared > self.model.surprise:
-            variance = squared / self.model.surprise * (np.trace(own) / 3 + variance) - np.trace(own) / 3
+        if squared > self.model["surprise"]:
+            variance = squared / self.model["surprise"] * (np.trace(own) / 3 + variance) - np.trace(own) / 3
         gain = self.covariance @ observed.T @ np.linalg.inv(own + variance * np.eye(3))
         self.mean = self.mean + gain @ apart
         self.covariance = self.covariance - gain @ observed @ self.covariance
 
 
-def taken(model: Model, tracker: Samples, imu: Samples, clock: np.ndarray) -> dict[str, Any]:
+def taken(model: Records, tracker: Samples, imu: Samples, clock: np.ndarray) -> dict[str, Any]:
     """A whole recording: the last mean, covariance and scales.
 
     `clock` (n, 2) is the offset of the tracker's clock and its variance after each frame: they are another filter's.

@@ -163,10 +163,10 @@ def test_a_plan_from_rest_to_rest_is_the_movement_of_least_jerk() -> None:
     """Flash and Hogan's polynomial, position and acceleration."""
     person = people.person(SelectionSimulation.model_validate(settings()["simulation"]), "P01")
     hand = hand_steps.hand_at(np.zeros(2), 0.0)
-    hand_steps._replan(person, hand, 120.0, -60.0, 1.0)
+    hand_steps.replan(person, hand, 120.0, -60.0, 1.0)
     lasts = person.base_time_s + person.time_per_sqrt_mm_s * np.sqrt(np.hypot(120.0, 60.0))
     for now in (1.0, 1.1, 1.0 + lasts / 2, 1.0 + lasts, 3.0):
-        hand_steps._follow_plan(hand, now)
+        hand_steps.follow_plan(hand, now)
         share, bend = minimum_jerk(np.array([now]), 1.0, lasts)
         np.testing.assert_allclose(hand.planned[0], np.array([120.0, -60.0]) * share, atol=1e-9)
         np.testing.assert_allclose(hand.planned[2], np.array([120.0, -60.0]) * bend, atol=1e-6)
@@ -176,13 +176,13 @@ def test_a_plan_begins_with_the_motion_there_is() -> None:
     """Position, velocity and acceleration go on without a jump where a movement is planned anew."""
     person = people.person(SelectionSimulation.model_validate(settings()["simulation"]), "P01")
     hand = hand_steps.hand_at(np.zeros(2), 0.0)
-    hand_steps._replan(person, hand, 200.0, 0.0, 0.0)
-    hand_steps._follow_plan(hand, 0.2)
+    hand_steps.replan(person, hand, 200.0, 0.0, 0.0)
+    hand_steps.follow_plan(hand, 0.2)
     before = hand.planned.copy()
-    hand_steps._replan(person, hand, -50.0, 80.0, 0.2)
-    hand_steps._follow_plan(hand, 0.2)
+    hand_steps.replan(person, hand, -50.0, 80.0, 0.2)
+    hand_steps.follow_plan(hand, 0.2)
     np.testing.assert_allclose(hand.planned, before, atol=1e-9)
-    hand_steps._follow_plan(hand, 5.0)
+    hand_steps.follow_plan(hand, 5.0)
     np.testing.assert_allclose(hand.planned, [[-50.0, 80.0], [0.0, 0.0], [0.0, 0.0]], atol=1e-9)
 
 
@@ -192,7 +192,7 @@ def test_sway_has_the_stated_spread() -> None:
     random = np.random.default_rng(1)
     positions = []
     for step in range(200_000):
-        hand_steps._sway(motion, state, 0, random.standard_normal())
+        hand_steps.sway(motion, state, 0, random.standard_normal())
         if step % 50 == 0:
             positions.append(state[0, 0])
     assert np.std(positions) == pytest.approx(0.1, rel=0.1)
