@@ -22,8 +22,13 @@ _SUDDEN = 4.0  # times as fast as the step before
 
 
 def jumps(recorded: Recorded) -> Iterator[Finding]:
-    """Steps of 20 cm and more, faster than 8 m/s and beyond the noise. A stream in another unit is one of *speed*'s."""
+    """Steps of 20 cm and more, faster than 8 m/s and beyond the noise. A stream in another unit is one of *speed*'s.
+
+    What was displayed is not judged: an estimator's output may leap after a pause of its tracker.
+    """
     for one in recorded.positions:
+        if one.kind == "display":
+            continue
         time, first = np.unique(one.times.stamp_s, return_index=True)
         value = one.value_mm[first]
         if len(time) < 50 or jumps_to_zero(value):

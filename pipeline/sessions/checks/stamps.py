@@ -175,7 +175,8 @@ def clock(recorded: Recorded) -> Iterator[Finding]:
             at_s = float(times.arrival_s[at] - times.arrival_s.min())
             message = (
                 f'{at_s:.0f} s into the session the recorder\'s clock goes back by {by_s:.2f} s ("{name}"): it was set '
-                "while recording; use a clock that is not set, or cut the log there"
+                "while recording, or parts of the file are in another order, as of joined logs; use a clock that "
+                "is not set, or cut the log there"
             )
             yield Finding(of(STEPS, name), "red", f"-{by_s:.2f} s at {at_s:.0f} s", expected, message)
         else:
