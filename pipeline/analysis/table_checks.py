@@ -39,6 +39,7 @@ _CENTRED = (-3.0, 3.0)  # answers of the UEQ that are coded around zero, and its
 _SCORE = {"percent": (0.0, 100.0), "centred": _CENTRED}
 _UNITS_APART = 50.0
 _FARTHEST_MM = 20_000.0
+_FAR_FROM_TARGET_MM, _UNDONE = 50.0, 0.2  # the middle distance, and how much of it a mistake leaves once undone
 _SAME_NS = 60e9  # logs of one minute were not recorded one after the other
 _NAMED_MAX = 3
 
@@ -166,7 +167,7 @@ def _weighs(scale: str) -> bool:
 
 
 def targets(selections: pd.DataFrame) -> Iterator[Finding]:
-    """Targets and selections of another unit, or beyond any room."""
+    """Targets and selections of another unit, with other axes, or beyond any room."""
     axes = [axis for axis in "xyz" if selections[f"target_{axis}_mm"].notna().any()]
     both = selections[[*(f"target_{axis}_mm" for axis in axes), *(f"{axis}_mm" for axis in axes)]].dropna()
     if len(both) < _OTHERS_MIN:
@@ -180,10 +181,29 @@ def targets(selections: pd.DataFrame) -> Iterator[Finding]:
         cause = f"{smaller} are probably in metres where {larger} are in millimetres; give both in millimetres"
     elif max(size, reached) > _FARTHEST_MM:
         cause = "no hand reaches so far: the unit is probably not millimetres; give millimetres"
+    elif len(axes) > 1:
+        cause = _of_axes(both.to_numpy(np.float64), len(axes))
     message = (
         f"in the table of trials targets reach {size:.3g} mm and selections {reached:.3g} mm: {cause}" if cause else ""
     )
     yield Finding(TARGETS, "amber" if cause else "green", found, expected, message)
+
+
+def _of_axes(both: FloatArray, axes: int) -> str:
+    """What makes most selections far from their targets and can be undone: an axis or another frame; "" if nothing."""
+    aimed, chosen = both[:, :2], both[:, axes : axes + 2]
+    here = float(np.median(np.linalg.norm(aimed - chosen, axis=1)))
+    shift = np.median(aimed - chosen, axis=0)
+    tried = {
+        "the targets' x and y are exchanged; give them in the order of the selections": aimed[:, ::-1],
+        "the targets' y points the other way; give it in the frame of the selections": aimed * np.array([1.0, -1.0]),
+        "the targets' x points the other way; give it in the frame of the selections": aimed * np.array([-1.0, 1.0]),
+        f"all targets are off by ({shift[0]:.0f}, {shift[1]:.0f}) mm; give them in the frame of the selections": aimed
+        - shift,
+    }
+    left = {cause: float(np.median(np.linalg.norm(points - chosen, axis=1))) for cause, points in tried.items()}
+    likely = min(left, key=lambda one: left[one])
+    return likely if here > _FAR_FROM_TARGET_MM and left[likely] < _UNDONE * here else ""
 
 
 def order_rows(orders: pd.DataFrame, starts_ns: pd.DataFrame) -> list[Row]:

@@ -21,7 +21,9 @@ from pipeline.study.settings import Study
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
+from pipeline.words import counted, listing
 
+_NAMED_MAX = 3
 _GRAVITY_OFF_MM_S2 = 500.0  # 3° of tilt
 
 
@@ -41,7 +43,8 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
             raise PipelineError(f"{folder}: {error}") from None
         folders = [result.entries["ingest"][session.id].folder for session in result.sessions]
         checks = list(tables.records("checks", tables.read("checks", folders)))
-        for line in (*_lines(result.study, result.name, fitted, first_s, recordings), *_of_checks(checks)):
+        lines = _lines(result.study, result.name, fitted, first_s, recordings)
+        for line in (*_in_doubt(checks, len(recordings)), *lines, *_of_checks(checks)):
             console.say(line)
         return result.exit_code
 
@@ -86,6 +89,16 @@ def _gravity(study: Study, stream: str, mean: FloatArray, half: float) -> Iterat
     else:
         cause = "gravity, orientation or accelerometer is wrong"
         yield f"#   and study.yaml has [{in_settings}], {off:.0f} mm/s² off: {cause}"
+
+
+def _in_doubt(rows: Sequence[Row], sessions: int) -> Iterator[str]:
+    """What to put right before any figure is copied."""
+    red = list(dict.fromkeys(str(row["session"]) for row in rows if row["status"] == "red"))
+    if red:
+        yield (
+            f"# {len(red)} of {counted(sessions, 'session')} with a red check ({listing(red[:_NAMED_MAX])}"
+            f"{', …' if len(red) > _NAMED_MAX else ''}), named below: put that right first, for the fit makes up for it"
+        )
 
 
 def _of_checks(rows: Sequence[Row]) -> Iterator[str]:

@@ -49,7 +49,7 @@ def _against_task(
     if wrong == 0:
         yield Finding(TARGETS, "green", found, expected)
         return
-    tried = _mistakes(there, px_per_mm)
+    tried = mistakes(there, px_per_mm)
     shift = np.unique(there, axis=0).mean(axis=0) - task.mean(axis=0)
     tried[f"all are off by ({shift[0]:.0f}, {shift[1]:.0f}) mm; log them in the tracker's frame"] = there - shift
     left = {cause: float(np.mean(_nearest_mm(points, task) > tolerance_mm)) for cause, points in tried.items()}
@@ -65,7 +65,7 @@ def _against_task(
     yield Finding(TARGETS, status, found, expected, message)
 
 
-def _mistakes(points: FloatArray, px_per_mm: float | None) -> dict[str, FloatArray]:
+def mistakes(points: FloatArray, px_per_mm: float | None) -> dict[str, FloatArray]:
     """Points (n, 2) with each mistake undone, by its words and remedy."""
     tried = {
         "they are in millimetres where metres are expected; log metres": points / 1e3,
@@ -166,7 +166,7 @@ def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: f
     """The mistake that explains most of the distance, in words; "" if none does."""
     shifts = np.array([float(np.mean(_apart(shown, time + shift, at))) for shift in _SHIFTS_S])
     best = _middle_of_lowest(shifts)
-    tried = _mistakes(at, px_per_mm)
+    tried = mistakes(at, px_per_mm)
     left = {cause: float(np.median(_apart(shown, time, points))) for cause, points in tried.items()}
     likely = min(left, key=lambda one: left[one])
     if left[likely] < min(_EXPLAINS * here, float(shifts[best]), _LEFT_MM):

@@ -9,11 +9,13 @@ from pipeline.sessions.checks.turns import turned
 from pipeline.sessions.logs.log import BoolArray, Log, Readings
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
+from pipeline.study.simulation import Task
 from pipeline.study.streams import AccelerationStream, DisplayStream, PositionStream, ReferenceStream, Stream
 from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
 _DAY_NS = 86_400e9
+_RING_STEP_MM = 5.0
 Placed = PositionStream | ReferenceStream | DisplayStream
 
 
@@ -37,11 +39,25 @@ def of_log(log: Log, study: Study) -> Recorded:
         tuple(positions),
         tuple(imus),
         None if happened is None or not happened.read else events(happened, origin_ns),
-        np.array(task.targets_mm) if task is not None and task.targets_mm else None,
-        task.target_diameter_mm if task is not None else 0.0,
+        task_targets_mm(task),
+        max((task.target_diameter_mm, *(ring.target_diameter_mm for ring in task.rings))) if task is not None else 0.0,
         study.display.px_per_mm if study.display is not None else None,
         tuple("xyz".index(axis) for axis in study.axes),
     )
+
+
+def task_targets_mm(task: Task | None) -> FloatArray | None:
+    """Where the task has targets (k, 2): each, or every 5 mm of its rings, which begin anywhere; None without one."""
+    if task is None:
+        return None
+    if task.targets_mm:
+        return np.array(task.targets_mm, dtype=np.float64)
+    circles = []
+    for ring in task.rings:
+        angle = np.linspace(0.0, 2 * np.pi, max(36, round(np.pi * ring.diameter_mm / _RING_STEP_MM)))
+        circle = np.column_stack([np.cos(angle), np.sin(angle)])
+        circles.append(np.array(ring.centre_mm) + ring.diameter_mm / 2 * circle)
+    return np.concatenate(circles)
 
 
 def times(readings: Readings, origin_ns: int, stream: Stream | None = None, left_out: int = 0) -> Times:

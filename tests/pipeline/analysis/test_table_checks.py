@@ -127,6 +127,21 @@ def test_targets_of_another_unit_than_the_selections_are_amber() -> None:
     assert alarms(typed("m", 1.0), chosen(1.0)) == []
 
 
+def test_targets_with_other_axes_than_the_selections_are_amber() -> None:
+    swapped = chosen(1.0)
+    swapped[["target_x_mm", "target_y_mm"]] = swapped[["target_y_mm", "target_x_mm"]].to_numpy()
+    (found,) = alarms(typed("m", 1.0), swapped)
+    assert "the targets' x and y are exchanged" in found["message"]
+    downwards = chosen(1.0)
+    downwards["target_y_mm"] *= -1
+    (found,) = alarms(typed("m", 1.0), downwards)
+    assert "the targets' y points the other way" in found["message"]
+    aside = chosen(1.0)
+    aside["target_x_mm"] += 400
+    (found,) = alarms(typed("m", 1.0), aside)
+    assert "all targets are off by (397, 2) mm" in found["message"]
+
+
 def orders(*periods: tuple[str, str, int]) -> pd.DataFrame:
     return pd.DataFrame(periods, columns=["participant", "condition", "period"]).assign(source="the measures")
 

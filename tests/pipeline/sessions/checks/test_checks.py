@@ -13,7 +13,7 @@ from pipeline.sessions.checks import Finding, checked
 from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.ingest import _CONTENT
 from pipeline.sessions.logs import read_log
-from pipeline.sessions.logs.log import Log, Wanted
+from pipeline.sessions.logs.log import Log, Readings, Wanted
 from pipeline.study.folder import find_sessions, load_study
 from pipeline.study.settings import Study
 from tests.benchmarks.checks import drawn
@@ -80,6 +80,29 @@ def test_a_stream_of_another_session_is_found(topic: str, check: str) -> None:
     found = alarms(*from_other(topic, other)(*simulated()))
     assert check in [one.check for one in found if one.status == "red"]
     assert check == "selections" or any("session" in one.message for one in found if one.check == check)
+
+
+def test_targets_off_the_rings_of_the_task_are_found() -> None:
+    log, study = simulated()
+    ring = {"centre_mm": [100, 400], "diameter_mm": 400, "targets": 9}
+    data = study.model_dump(exclude_none=True, exclude_defaults=True, mode="json")
+    ringed = Study.model_validate(data | {"task": {"rings": [ring]}})
+    (found,) = (one for one in alarms(log, ringed) if one.check == "targets")
+    assert "where the task has none" in found.message
+
+    def onto_ring(readings: Readings) -> Readings:
+        angles = np.linspace(0, 7, len(readings.events))
+        places = zip(readings.events, 0.1 + 0.2 * np.cos(angles), 0.4 + 0.2 * np.sin(angles), strict=True)
+        return replace(
+            readings,
+            events=tuple(
+                {**event, "target_x": float(x), "target_y": float(y)} if event.get("target_x") is not None else event
+                for event, x, y in places
+            ),
+        )
+
+    on_ring, _ = change(EVENTS, onto_ring)(log, ringed)
+    assert not any(one.check == "targets" for one in alarms(on_ring, ringed))
 
 
 def test_the_unit_alone_is_named_and_not_what_follows_from_it() -> None:
