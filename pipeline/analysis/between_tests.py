@@ -9,8 +9,9 @@ import numpy as np
 from pipeline.analysis import groups
 from pipeline.analysis.comparison_rows import Answer, group_pair_row, row_of
 from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.estimates import with_estimates
 from pipeline.analysis.ratios import follow_ups_of_logarithms, on_logarithms, results_of_logarithms
-from pipeline.statistics import mixed_anova, pairs
+from pipeline.statistics import estimation_groups, mixed_anova, pairs
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.logarithms import t_welch_ratio
 from pipeline.statistics.result import Result
@@ -27,9 +28,14 @@ def pairs_of_groups(test: Callable[[Request, FloatArray, FloatArray, str], Resul
 
     def answer(request: Request) -> Answer:
         cases = groups.by_group(request)
+        compared_pairs = pairs.of_groups(cases.groups, cases.names, cases.factor)
         rows = [
             group_pair_row(request, test(request, pair.first, pair.second, cases.factor), pair)
-            for pair in pairs.of_groups(cases.groups, cases.names, cases.factor)
+            for pair in compared_pairs
+        ]
+        rows = [
+            with_estimates(request, row, pair, estimation_groups)
+            for row, pair in zip(rows, compared_pairs, strict=True)
         ]
         if not rows:
             rows = [row_of(request, test(request, np.array([]), np.array([]), cases.factor))]

@@ -8,8 +8,9 @@ from itertools import groupby
 import numpy as np
 
 from pipeline.analysis import complete_cases, model_rows
-from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of, tested
+from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of
 from pipeline.analysis.complete_cases import CompleteCases, Request
+from pipeline.analysis.estimates import with_estimates
 from pipeline.analysis.ratios import on_logarithms, results_of_logarithms, with_ratio, with_ratio_of
 from pipeline.statistics import OK, estimation, pairs
 from pipeline.statistics.anova import rm_anova
@@ -17,7 +18,7 @@ from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.art import art_anova, art_contrasts
 from pipeline.statistics.crossover import crossover
 from pipeline.statistics.friedman import friedman
-from pipeline.statistics.logarithms import exponential, ratio_follow_ups, rm_anova_of_logarithms, t_paired_ratio
+from pipeline.statistics.logarithms import ratio_follow_ups, rm_anova_of_logarithms, t_paired_ratio
 from pipeline.statistics.mixed import Factor, cells_of, mixed_model
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.result import IntArray, Result
@@ -102,31 +103,10 @@ def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Calla
         cases = complete_cases.by_condition(request)
         of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
         rows = [pair_row(request, test(request, pair.first, pair.second), pair, cases) for pair in of_conditions]
-        if request.entry.bootstrap or request.entry.permutation:
-            rows = [_with_estimates(request, row, pair) for row, pair in zip(rows, of_conditions, strict=True)]
+        rows = [with_estimates(request, row, pair, estimation) for row, pair in zip(rows, of_conditions, strict=True)]
         return rows, cases.left_out
 
     return answer
-
-
-def _with_estimates(request: Request, row: Row, pair: pairs.Pair) -> Row:
-    """The row with a bootstrap interval and a permutation p of its mean difference, as far as the entry asks for them.
-
-    Both are of the differences alone, whatever the test: also where the ranks are tested, they are of the mean.
-    """
-    if row["status"] != OK:
-        return row
-    details = dict(row["details"])
-    first, second = tested(request, pair)
-    if request.entry.bootstrap:
-        details |= estimation.bootstrap(first, second, request.entry.seed)
-        if on_logarithms(request):
-            bounds = details.pop("bootstrap_ci_difference")
-            inverse = None if bounds is None else [exponential(-bound) for bound in reversed(bounds)]
-            details["bootstrap_ci_ratio_to_first"] = inverse
-    if request.entry.permutation:
-        details |= estimation.permutation(first, second, request.entry.seed)
-    return {**row, "details": details}
 
 
 def mixed_models(request: Request) -> Answer:

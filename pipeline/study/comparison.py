@@ -57,7 +57,9 @@ class Comparison(Frozen):
     def _fits_the_test(self) -> Comparison:
         for key in OPTIONS - set(TESTS[self.test].options):
             if getattr(self, key) != type(self).model_fields[key].default:
-                raise ValueError(f"{self.test} does not take {key}; it is for {' and '.join(tests_that_take(key))}")
+                *others, last = tests_that_take(key)
+                named = f"{', '.join(others)} and {last}" if others else last
+                raise ValueError(f"{self.test} does not take {key}; it is for {named}")
         if self.family is not None and self.adjust == "none":
             raise ValueError(f'family "{self.family}" needs an adjustment, such as adjust: holm')
         if self.test == "tost" and self.bounds is None:

@@ -190,7 +190,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Welch's t test",
             "Welch's t tests between groups (two-sided; d_av, over the root of the mean of the variances, with its"
             " noncentral-t interval)",
-            options=("between", "transform"),
+            options=("between", "transform", "bootstrap", "permutation", "seed"),
             assumes_normality=True,
             design="between",
             cite=("welch1947",),
@@ -201,7 +201,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             "Mann-Whitney",
             "Mann-Whitney test",
             "Mann-Whitney tests between groups (two-sided; rank-biserial correlation, Hodges-Lehmann shift)",
-            options=("between",),
+            options=("between", "bootstrap", "permutation", "seed"),
             symbol_names_test=True,
             design="between",
             cite=("mann1947",),

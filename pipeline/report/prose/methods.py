@@ -211,11 +211,16 @@ def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
     seed = f", seed {entry.seed}"
     of = "ratio of geometric means" if entry.transform == "log" else "mean difference"
     if entry.bootstrap:
-        yield f"BCa bootstrap intervals of the {of} ({RESAMPLES:,} resamples of participants{seed})"
+        by_group = "" if entry.is_within else " within their groups"
+        yield f"BCa bootstrap intervals of the {of} ({RESAMPLES:,} resamples of participants{by_group}{seed})"
     if entry.permutation:
         drawn = any((row["details"] or {}).get("permutation_exact") is False for row in rows)
         how = f"{PERMUTATIONS:,} exchanges drawn at random{seed}" if drawn else "all exchanges counted"
-        yield f"permutation p values of the {of} (conditions exchanged within participants, {how})"
+        if entry.is_within:
+            yield f"permutation p values of the {of} (conditions exchanged within participants, {how})"
+        else:
+            logarithms = " of the logarithms" if entry.transform == "log" else ""
+            yield f"permutation p values of Welch's t{logarithms} (participants exchanged between groups, {how})"
 
 
 def _follow_up(entry: Comparison, rows: Sequence[Row]) -> str:

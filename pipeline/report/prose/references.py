@@ -138,6 +138,8 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield "efron1987", "bootstrap intervals"
         if details.get("permutation_p") is not None:
             yield ("pitman1937" if details["permutation_exact"] else "phipson2010"), "permutation p values"
+            if test.design == "between":
+                yield "janssen1997", "permutation p values of Welch's t"
         if details.get("p_gg") is not None:
             yield "greenhouse1959", "correction for sphericity"
         if details.get("shapiro_w") is not None or details.get("residual_shapiro_w") is not None:

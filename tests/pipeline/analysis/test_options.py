@@ -136,6 +136,27 @@ def test_bootstrap_intervals_and_permutation_p_stand_beside_the_test(tmp_path: P
     assert "pitman1937" in bibliography
 
 
+def test_groups_have_bootstrap_intervals_and_permutation_p_values_too(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    values: Values = {"time_s": {"A": [12.1, 15.4, 9.8, 22.6, 14.0, 11.7], "B": [10.2, 8.9, 9.1, 11.3, 10.2, 9.9, 8]}}
+    options = "between: condition, bootstrap: true, permutation: true"
+    entries = [f"measure: time_s, test: {test}, {options}" for test in ("t_welch", "mann_whitney")]
+    page = read(steadyhand, study(tmp_path / "study", values, entries, apart=True))
+    welch, ranked = steadyhand.results()["comparisons"]
+    low, high = welch["details"]["bootstrap_ci_difference"]
+    assert 0 < low < welch["mean_difference"] < high
+    assert (welch["details"]["permutation_exact"], welch["details"]["permutation_count"]) == (True, math.comb(13, 6))
+    assert welch["details"]["permutation_p"] == ranked["details"]["permutation_p"] < 0.05
+    assert "(9,999 resamples of participants within their groups, seed 1)" in page
+    assert "permutation p values of Welch's t (participants exchanged between groups, all" in page
+    assert "janssen1997" in (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+
+
+def test_a_test_that_cannot_be_resampled_says_which_can(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: time_s, test: rm_anova, bootstrap: true"]))
+    assert ran.code == 2
+    assert "rm_anova does not take bootstrap; it is for t_paired, wilcoxon, t_welch and mann_whitney" in ran.err
+
+
 def test_the_seed_is_the_only_chance(tmp_path: Path, steadyhand: Steadyhand) -> None:
     entries = [f"measure: time_s, test: t_paired, bootstrap: true{seed}" for seed in ("", ", seed: 1", ", seed: 2")]
     rows = compared(steadyhand, study(tmp_path / "study", TIMES, entries))
