@@ -14,8 +14,10 @@ from pipeline.analysis import error_tests, families
 from pipeline.analysis.between_tests import all_groups, mixed_design, pairs_of_groups, welch_t
 from pipeline.analysis.comparison_rows import Answer
 from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.groups import one_condition_each
 from pipeline.analysis.within_tests import anova, art, crossover_design, friedman_test, mixed_models, paired_t, pairwise
 from pipeline.errors import PipelineError, did_you_mean
+from pipeline.statistics import NO_COMPLETE, ONE_CONDITION_EACH
 from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.equivalence import tost
 from pipeline.statistics.kruskal import kruskal_pairs, kruskal_wallis
@@ -72,11 +74,20 @@ def answered(
     answers: list[Answered] = []
     by_entry: list[tuple[Comparison, list[Row]]] = []
     for requests in all_requests(study, measures, observations, people):
-        of_entry = [Answered(request, *RUN[request.entry.test](request)) for request in requests]
+        of_entry = [_answer(request) for request in requests]
         answers += of_entry
         by_entry.append((requests[0].entry, [row for one in of_entry for row in one.rows]))
     families.adjust(by_entry)
     return answers
+
+
+def _answer(request: Request) -> Answered:
+    """A request's rows; where nobody is complete since each participant met one condition, that is the status."""
+    rows, exclusions = RUN[request.entry.test](request)
+    met = set(zip(request.measures["participant"], request.measures["condition"], strict=True))
+    if any(row["status"] == NO_COMPLETE for row in rows) and one_condition_each(request.study, met):
+        rows = [{**row, "status": ONE_CONDITION_EACH} if row["status"] == NO_COMPLETE else row for row in rows]
+    return Answered(request, rows, exclusions)
 
 
 def all_requests(

@@ -83,8 +83,8 @@ def _between(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
     remark = None
     if within:
         remark = (
-            f"{listing(within)} {'needs' if len(within) == 1 else 'need'} people who met several conditions; use"
-            " t_welch, mann_whitney, anova_welch or kruskal with between: condition"
+            f"{listing(within)} {'needs' if len(within) == 1 else 'need'} people who met several conditions; write"
+            " factors: {condition: between} and test: t_welch, mann_whitney, anova_welch or kruskal"
         )
     row = {"what": "participants of each condition, who met one each", "found": sizes, "expected": "the same in each"}
     yield {**row, "remark": remark}

@@ -8,6 +8,10 @@ ALL_ZERO = "undefined: all differences are zero"
 NO_ERROR = "undefined: all differences are equal, so there is no error to test against"
 NO_VARIATION = "undefined: no value varies"
 NO_COMPLETE = "undefined: no participant is complete"
+ONE_CONDITION_EACH = (
+    "undefined: each participant met one condition; write factors: {condition: between} and test: t_welch,"
+    " mann_whitney, anova_welch or kruskal"
+)
 ONE_COMPLETE = "undefined: only one participant is complete"
 CONFOUNDED = "undefined: nobody has values in two conditions, so the effect cannot be told from the participants"
 ALIASED = "undefined: the terms of the model cannot be told apart in these data"
@@ -38,6 +42,7 @@ STATUSES = (
     NO_ERROR,
     NO_VARIATION,
     NO_COMPLETE,
+    ONE_CONDITION_EACH,
     ONE_COMPLETE,
     CONFOUNDED,
     ALIASED,

@@ -45,6 +45,7 @@ class Registered(Frozen):
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05
     exclusions: tuple[Exclusion, ...] = ()
+    question: tuple[tuple[Id, Id], ...] | None = None  # None in files from before pairs were frozen
     preregistration: Preregistration = Preregistration()
 
 

@@ -49,7 +49,18 @@ def _settings(plan: Registered, now: Registered) -> Iterator[Row]:
         before, after = (_texts(getattr(one, name)) for one in (plan, now))
         for key in dict.fromkeys([*before, *after]):
             yield point(f"{what}: {key}", before.get(key, NOT_PLANNED), after.get(key, "dropped"))
+    if plan.question is not None:
+        yield point("pairs that are asked about", _pairs(plan), _pairs(now))
     yield point("level of significance", f"{plan.alpha:g}", f"{now.alpha:g}")
+
+
+def _pairs(registered: Registered) -> str:
+    """The pairs of `question`, in whichever order each is written; without any the baseline with each other one."""
+    if not registered.question:
+        return "the baseline with each other condition"
+    order = registered.conditions.index
+    pairs = {tuple(sorted(pair, key=order)) for pair in registered.question}
+    return ", ".join(" - ".join(pair) for pair in sorted(pairs, key=lambda pair: [*map(order, pair)]))
 
 
 def _texts(mapping: Mapping[str, Any]) -> dict[str, str]:

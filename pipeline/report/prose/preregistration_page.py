@@ -127,6 +127,8 @@ def _data(study: Study, now: Circumstances) -> list[str]:
 def _hypotheses(study: Study) -> list[str]:
     """The question, and of each comparison what is expected, with its direction."""
     lines = [_stated("Question", study.preregistration.question)]
+    if study.question:
+        lines.append(f"Pairs that are asked about: {listing([' versus '.join(pair) for pair in study.question])}.")
     for entry in study.comparisons:
         expected = hypothesis(entry, study.conditions)
         lines.append(f"{_entry_measures(entry)}: {expected or f'hypothesis and direction {NOT_STATED}'}")

@@ -75,6 +75,23 @@ def test_a_misspelt_level_is_named_and_leaves_the_others_in(results: Results) ->
     assert reasons == {"P01": 'rm_anova: only P01 has target "Easy", which is not used; check its spelling'}
 
 
+def test_one_condition_each_names_the_key_that_serves(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    study = tmp_path / "between"
+    study.mkdir()
+    rows = "".join(f"P{at:02},{'ab'[at % 2]},time_s,{10 + at}\n" for at in range(12))
+    (study / "measures.csv").write_text(f"participant,condition,measure,value\n{rows}", encoding="utf-8")
+    settings = "conditions: [a, b]\nmeasures: measures.csv\ncomparisons: [{measure: time_s, test: t_paired}]\n"
+    (study / "study.yaml").write_text(settings, encoding="utf-8")
+    ran = steadyhand("compare", study)
+    key = "write factors: {condition: between} and test: t_welch, mann_whitney, anova_welch or kruskal"
+    assert f"each participant met one condition; {key}" in ran.out
+    assert steadyhand.results()["design_check"][0]["remark"].endswith(key)
+    mended = settings.replace("t_paired", "t_welch") + "factors: {condition: between}\n"
+    (study / "study.yaml").write_text(mended, encoding="utf-8")
+    assert steadyhand("compare", study).code == 0
+    assert [row["n"] for row in steadyhand.results()["comparisons"]] == [12]
+
+
 def test_ids_that_look_alike_are_named(results: Results) -> None:
     found = [
         row["reason"] for row in results("idvariants")["exclusions"] if row["what"] == "participants with similar ids"

@@ -333,6 +333,30 @@ def test_every_deviation_is_named(
     assert deviations(steadyhand, changed(registered, **replaced))[what] == said
 
 
+def test_the_pairs_that_are_asked_about_are_frozen(folder: Folder, plan: Plan, steadyhand: Steadyhand) -> None:
+    three = SETTINGS.replace("[a, b]", "[a, b, c]").replace("direction: less, ", "")
+    root = folder(f"{three}question: [[c, a], [b, c]]\n")
+    assert plan(root, "--preregister").code == 0
+    assert "Pairs that are asked about: c versus a and b versus c." in (root / "preregistration.md").read_text()
+    of_c = [row.replace(",b,", ",c,") for row in MEASURES.splitlines() if ",b," in row]
+    (root / "measures.csv").write_text(MEASURES + "\n".join(of_c) + "\n")
+    (root / "study.yaml").write_text(f"{three}question: [[b, c], [a, c]]\n")  # the same, written otherwise
+    assert deviations(steadyhand, root) == {}
+    (root / "study.yaml").write_text(f"{three}question: [[b, c]]\n")
+    (planned, done, verdict) = deviations(steadyhand, root)["pairs that are asked about", None]
+    assert (planned, done, verdict) == ("a - c, b - c", "b - c", "deviation")
+
+
+def test_a_file_from_before_pairs_were_frozen_says_nothing_of_them(registered: Path) -> None:
+    frozen = read_preregistered(registered)
+    assert frozen is not None
+    before = frozen.registered.model_copy(update={"question": None})
+    rows = plan_and_done(
+        FrozenFile(before, frozen.digest, frozen.digest), load_study(registered), Done(["time_s"], 10, [])
+    )
+    assert "pairs that are asked about" not in {row["what"] for row in rows}
+
+
 def test_who_is_on_the_list_and_did_not_come_is_missing(folder: Folder, plan: Plan, steadyhand: Steadyhand) -> None:
     """participants.csv may hold the plan: 12 people, of whom 10 have values."""
     people = "participant\n" + "".join(f"P{number:02d}\n" for number in range(1, 13))
