@@ -21,7 +21,7 @@ from pipeline.study.settings import Study
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
-from pipeline.words import counted, listing
+from pipeline.words.phrases import counted, listing
 
 _NAMED_MAX = 3
 _GRAVITY_OFF_MM_S2 = 500.0  # 3° of tilt

@@ -32,7 +32,8 @@ def test_bootstrap_against_rs_boot(case: str) -> None:
 
 @pytest.mark.parametrize("case", CASES)
 def test_permutation_over_all_splits(case: str) -> None:
-    found = permutation(*groups(case), seed=0)
+    first, second = groups(case)
+    found = permutation(first, second, seed=0)
     assert found["permutation_p"] == pytest.approx(EXPECTED[case]["permutation_p"], rel=1e-9)
     assert (found["permutation_exact"], found["permutation_count"]) == (True, EXPECTED[case]["splits"])
 
