@@ -20,7 +20,7 @@ from pipeline.report.document.model import (
 from pipeline.words.phrases import listing
 
 _ANNEX = "annex"
-_ANNEX_ROWS = 100  # of folded tables in all: two pages
+_ANNEX_ROWS = 60  # of folded tables in all: with their captions, two pages
 
 
 def for_print(document: Document, names: Mapping[str, str]) -> Document:

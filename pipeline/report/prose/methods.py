@@ -104,7 +104,7 @@ def _estimators(study: Study) -> Iterator[str]:
     for name, settings in study.estimators.items():
         built = build_estimator(study, name)
         values = [
-            f"{field.name} = {_value(getattr(built, field.name))}"
+            setting_in_words(field.name, getattr(built, field.name))
             for field in fields(built)  # type: ignore[arg-type]
             if field.name != "sensors"
         ]
@@ -129,11 +129,30 @@ def _stated(stream: Sensing) -> Iterator[str]:
     yield stream.kind
     for name, value in stream:
         if name.startswith("noise_sd") or name == "latency_s":
-            yield f"{name} = {_value(value)}"
+            yield setting_in_words(name, value)
 
 
-def _value(value: object) -> str:
-    return f"{value:g}".replace("e+0", "e") if isinstance(value, float) else str(value)
+_UNITS = (
+    ("_mm_s2_per_sqrt_s", "mm/s²/√s"),
+    ("_mm_per_sqrt_s", "mm/√s"),
+    ("_mm2_s5", "mm²/s⁵"),
+    ("_mm_s2", "mm/s²"),
+    ("_mm_s", "mm/s"),
+    ("_mm2", "mm²"),
+    ("_hz", "Hz"),
+    ("_deg", "°"),
+    ("_mm", "mm"),
+    ("_ms", "ms"),
+    ("_s", "s"),
+)
+
+
+def setting_in_words(name: str, value: object) -> str:
+    """`noise_sd_mm`, 8.0 as `noise SD 8 mm`: a paper's reader knows none of our names, and their ends are units."""
+    end, unit = next(((end, unit) for end, unit in _UNITS if name.endswith(end)), ("", ""))
+    words = name.removesuffix(end).replace("_", " ").replace(" sd", " SD")
+    shown = f"{value:g}".replace("e+0", "e") if isinstance(value, float) else str(value).replace("_", " ")
+    return f"{words} {shown}{f' {unit}' if unit else ''}"
 
 
 def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:

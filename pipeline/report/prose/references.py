@@ -40,6 +40,7 @@ _OF_PACKAGE = {
     "pingouin": "vallat2018",
     "statsmodels": "seabold2010",
 }
+_PACKAGE = "package_"  # begins the key of a program without a publication
 _ENTRY = re.compile(r"@(\w+)\{([\w.-]+),\n(.*?)\n\}", re.DOTALL)
 _FIELD = re.compile(r"  (\w+) = \{(.*)\},?")
 _DOI = re.compile(r"10\.\d{4,9}/[A-Za-z0-9./()-]*[A-Za-z0-9]")
@@ -64,6 +65,11 @@ class Reference:
     key: str
     fields: Mapping[str, str]
     used_for: str = ""
+
+    @property
+    def is_package(self) -> bool:
+        """Is it a program without a publication?"""
+        return self.key.startswith(_PACKAGE)
 
     @property
     def bibtex(self) -> str:
@@ -179,7 +185,7 @@ def _package(name: str, version: str, listed: Mapping[str, object]) -> Reference
     key = _OF_PACKAGE.get(name)
     if key is not None and key not in listed:
         return _with(entries()[key], name, note=f"{name}, version {version}")
-    return Reference("software", f"package_{name}", {"title": name, "version": version}, "software")
+    return Reference("software", f"{_PACKAGE}{name}", {"title": name, "version": version}, "software")
 
 
 def escaped(text: str) -> str:

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
 
 from pipeline.report import figures
-from pipeline.report.document.model import Block, Column, Paragraph, Section, Strong, Table, columns
+from pipeline.report.document.model import (
+    Block,
+    Column,
+    CrossReference,
+    Paragraph,
+    Section,
+    Strong,
+    Table,
+    Text,
+    columns,
+)
 from pipeline.report.figures.selections import offsets_mm
 from pipeline.report.prose.families import families
 from pipeline.report.sections import overview
@@ -19,10 +28,10 @@ from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.comparison import contrast
 from pipeline.words.effect_sizes import effect_size
-from pipeline.words.evidence import evidence, statistic
+from pipeline.words.evidence import statistic
 from pipeline.words.names import measure_label, short_label
 from pipeline.words.numbers import NO_VALUE, interval, number, p_value
-from pipeline.words.phrases import capitalized, listing
+from pipeline.words.phrases import capitalized, counted, listing
 from pipeline.words.sentences import brief_sentence, with_article
 
 _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
@@ -129,8 +138,8 @@ def _figure_and_tests(material: Material, measure: str) -> list[Block]:
     blocks: list[Block] = []
     if measure != overview.drawn_measure(material):
         blocks.append(material.drawn(f"measure-{safe_name(measure)}", figures.paired, *shown))
-    for sentence in _sentences(material.comparisons_of(measure)):
-        blocks.append(Paragraph((Strong(f"{label}: "), f"{sentence}.")))
+    for statement in _statements(material.comparisons_of(measure)):
+        blocks.append(Paragraph((Strong(f"{label}: "), *statement)))
     return blocks
 
 
@@ -159,22 +168,19 @@ def _selections(material: Material) -> list[Block]:
     return blocks
 
 
-def _sentences(rows: Sequence[Row]) -> Iterator[str]:
-    """One sentence per comparison; its follow-up pairs share one."""
-    omnibus = {
+def _statements(rows: Sequence[Row]) -> Iterator[Text]:
+    """A sentence for each comparison of all conditions, and where the pairs that follow it up are to be found."""
+    whole = {
         (row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] in ("F", "Q")
     }
-
-    def follows_up(row: Row) -> bool:
-        return row["contrast"] is not None and (row["test"], row["effect"]) in omnibus
-
-    for (test, _, follows), group in groupby(rows, key=lambda row: (row["test"], row["effect"], follows_up(row))):
-        pairs = list(group)
-        if not follows:
-            yield from (brief_sentence(row) for row in pairs)
-            continue
-        pair_texts = [f"{contrast(row)}, {evidence(row) if row['status'] == 'ok' else row['status']}" for row in pairs]
-        yield f"follow-up of {with_article(TESTS[test].label)}, n = {pairs[0]['n']}: {'; '.join(pair_texts)}"
+    follow_ups = [row for row in rows if row["contrast"] is not None and (row["test"], row["effect"]) in whole]
+    for row in rows:
+        if row not in follow_ups:
+            yield (f"{brief_sentence(row)}.",)
+    if follow_ups:
+        tests = listing(list(dict.fromkeys(with_article(TESTS[row["test"]].label) for row in follow_ups)))
+        text = f"{counted(len(follow_ups), 'pair')} followed up {tests}: see the "
+        yield (text, CrossReference("table of all comparisons", "comparisons"), ".")
 
 
 def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:

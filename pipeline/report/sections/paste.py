@@ -8,7 +8,6 @@ from itertools import groupby
 from pipeline.report.document.model import (
     Block,
     CrossReference,
-    Folded,
     Paragraph,
     Section,
     Strong,
@@ -25,7 +24,7 @@ from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import statistics_libraries, used_versions
 from pipeline.statistics import WILSON
 from pipeline.words.condition_means import means_sentence, states_means, study_facts
-from pipeline.words.phrases import counted
+from pipeline.words.phrases import counted, listing
 from pipeline.words.sentences import finds_nothing_of_a_pair, full_sentence, no_difference_sentence
 
 BIBLIOGRAPHY = "references.bib"
@@ -44,7 +43,7 @@ def section(material: Material) -> Section:
     results = list(_results(material))
     if results:
         blocks.append(ToPaste("Results", ((Strong("Results. "), *results[0]), *results[1:])))
-    return Section("paste", "To paste", (*blocks, Folded(_what_to_cite(material), (_references(material),))))
+    return Section("paste", "To paste", (*blocks, _references(material)))
 
 
 def references(material: Material) -> list[Reference]:
@@ -101,9 +100,14 @@ def _what_to_cite(material: Material) -> str:
 
 def _references(material: Material) -> Table:
     listed = references(material)
+    works = [reference for reference in listed if not reference.is_package]
+    packages = [
+        f"{reference.fields['title']} {reference.fields['version']}" for reference in listed if reference.is_package
+    ]
     return Table(
         "table-references",
         f"What was used and should be cited; {BIBLIOGRAPHY} beside this report holds the same entries for BibTeX.",
-        columns(("Key", "Reference", "Used for"), 3),
-        tuple((reference.key, reference.text, reference.used_for) for reference in listed),
+        columns(("Reference", "Used for", "Key"), 3),
+        tuple((reference.text, reference.used_for, reference.key) for reference in works),
+        f"Packages without a publication of their own: {listing(packages)}." if packages else "",
     )
