@@ -104,7 +104,10 @@ def test_a_changed_input_is_named_with_the_numbers_it_moved(study: Path, diff: D
     assert shown[-1].startswith("measures.csv ")
     _, told = diff.told(one, other)
     (mean,) = [
-        one for one in told["numbers"] if one["figure"] == "mean" and one["row"] == {"measure": "m", "condition": "a"}
+        one
+        for one in told["numbers"]
+        if (one["table"], one["figure"]) == ("descriptives", "mean")
+        and one["row"] == {"measure": "m", "condition": "a"}
     ]
     assert mean == {
         "table": "descriptives",
