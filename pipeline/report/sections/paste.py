@@ -24,7 +24,7 @@ from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import statistics_libraries, used_versions
 from pipeline.statistics import WILSON
 from pipeline.words.condition_means import means_sentence, states_means, study_facts
-from pipeline.words.phrases import counted, listing
+from pipeline.words.phrases import listing
 from pipeline.words.sentences import finds_nothing_of_a_pair, full_sentence, no_difference_sentence
 
 BIBLIOGRAPHY = "references.bib"
@@ -92,10 +92,6 @@ def _results(material: Material) -> Iterator[Text]:
         for (at, _), part in zip(together, no_difference_sentence([row for _, row in together], facts), strict=True):
             words += [part, " ", CrossReference("[row]", anchor(at))]
         yield (*words, ".") if together else tuple(words)
-
-
-def _what_to_cite(material: Material) -> str:
-    return f"What to cite: {counted(len(references(material)), 'reference')}, also in {BIBLIOGRAPHY} for BibTeX"
 
 
 def _references(material: Material) -> Table:

@@ -1,0 +1,72 @@
+"""What of a document is printed, and how tables that are folded away share the annex."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.report.document.for_print import for_print
+from pipeline.report.document.model import (
+    CrossReference,
+    Document,
+    Figure,
+    Folded,
+    Link,
+    Pages,
+    Paragraph,
+    Section,
+    Table,
+    ToPaste,
+    columns,
+    numbered,
+)
+
+
+def a_table(name: str, rows: int) -> Table:
+    return Table(name, f"About {name}.", columns(("Row",), 1), tuple((f"{row}",) for row in range(rows)))
+
+
+def printed(*blocks: Folded | Paragraph | Pages | ToPaste | Table) -> tuple[Section, ...]:
+    document = Document("T", "", "Recorded data", (Section("s", "S", blocks),))
+    return for_print(document, numbered(document)).sections
+
+
+def test_a_fold_is_a_line_that_says_where_the_rest_is() -> None:
+    picture = Figure("figure-a", "a.svg", "A.", "A")
+    (section, annex) = printed(
+        Folded("Each session's lights", (a_table("lights", 3),)),
+        Folded("What arrived when", (picture,)),
+        Pages("Participants", (Link("P01", "p01.html"),)),
+    )
+    assert [block.text for block in section.blocks if isinstance(block, Paragraph)] == [
+        ("Each session's lights (Table 1 in the annex)",),
+        ("What arrived when (figures/a.svg in report.html)",),
+    ]
+    assert len(section.blocks) == 2
+    assert annex.blocks == (a_table("lights", 3),)
+
+
+def test_without_folds_there_is_no_annex() -> None:
+    assert len(printed(Paragraph(("All.",)))) == 1
+
+
+def test_words_to_paste_have_no_links_to_rows() -> None:
+    ((section,),) = [printed(ToPaste("Results", (("It differed ", CrossReference("[row]", "comparison-1"), "."),)))]
+    assert section.blocks == (ToPaste("Results", (("It differed ", "."),)),)
+
+
+@given(st.lists(st.integers(1, 400), min_size=1, max_size=12))
+def test_the_annex_never_outgrows_two_pages_and_says_what_it_left_out(lengths: list[int]) -> None:
+    tables = [a_table(f"t{place}", rows) for place, rows in enumerate(lengths)]
+    (_, annex) = printed(Folded("All", tuple(tables)))
+    shown = [block for block in annex.blocks if isinstance(block, Table)]
+    assert sum(len(table.rows) for table in shown) == min(60, sum(lengths))
+    by_id = {table.id: table for table in shown}
+    for table in tables:
+        mine = by_id[table.id]
+        assert mine.rows == table.rows[: len(mine.rows)]
+        cut = f" In print, the first {len(mine.rows)} of {len(table.rows)} rows; all of these are in report.html."
+        assert mine.caption == table.caption + (cut if len(mine.rows) < len(table.rows) else "")
+    longest_cut = max((len(by_id[t.id].rows) for t in tables if len(by_id[t.id].rows) < len(t.rows)), default=0)
+    shortest_whole = [len(t.rows) for t in tables if len(by_id[t.id].rows) == len(t.rows)]
+    assert all(rows <= longest_cut + 1 for rows in shortest_whole) or not longest_cut
