@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from pipeline.analysis import orders, table_checks
+from pipeline.analysis.copied_logs import copied_rows
 from pipeline.analysis.missing import check_exclusion, excludable, finite_values, gaps, incomplete_trials, matches
 from pipeline.analysis.scores import instruments, items_of, reliability, score_values
 from pipeline.analysis.values import (
@@ -71,6 +72,7 @@ def run(work: Work) -> Outcome:
     exclusions += gaps(work, measures)
     order_rows, sequences = _orders(work, tabled)
     checked += table_checks.order_rows(order_rows, _starts(work))
+    checked += copied_rows(work.sessions, work.entries["ingest"])
     tables.write("checks", tables.frame("checks", checked), work.out)
     _write_values(study, measures, orders.with_periods(values, order_rows, sequences), score_names, work.out)
     if study.exclusions:

@@ -44,6 +44,17 @@ def study_of(folder: Folder, fault: str | None) -> Path:
     return made
 
 
+def test_one_log_under_two_names_is_said(folder: Folder, steadyhand: Steadyhand) -> None:
+    study = folder(SETTINGS)
+    for name, seed in (("P01_a", 0), ("P02_a", 1), ("P03_a", 0)):
+        write_session(study / "data" / f"{name}.mcap", messages(session(Hand(seed=seed, seconds=20.0))[0]))
+    ran = steadyhand("compare", study)
+    assert ran.code == 0, ran.err
+    (row,) = (row for row in steadyhand.results()["checks"] if row["check"] == "copied logs")
+    assert (row["session"], row["status"]) == (None, "amber")
+    assert "the logs of P01_a and P03_a hold the same readings" in row["message"]
+
+
 @pytest.mark.usefixtures("blank_figures")
 def test_a_contradiction_stands_on_the_first_page_and_the_exit_code_is_as_before(
     folder: Folder, steadyhand: Steadyhand
