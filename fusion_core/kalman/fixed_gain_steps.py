@@ -54,12 +54,12 @@ def settled_gains(schedule: Schedule, dimension: int) -> Gains:
     """The gains of a schedule, found by repeating its cycle until the covariance no longer changes."""
     count = schedule.per_frame + int(np.ceil(_WITHOUT_FRAMES_S / schedule.period_s))
     gain, covariance = np.empty((count + 1, STATES)), np.empty((count + 1, STATES, STATES))
-    _settle(schedule, gain, covariance)
+    settle(schedule, gain, covariance)
     return Gains((0,) * dimension, gain, covariance, schedule.jerk_psd_mm2_s5)
 
 
 @compiled
-def _settle(schedule: Schedule, gain: FloatArray, covariance: FloatArray) -> None:
+def settle(schedule: Schedule, gain: FloatArray, covariance: FloatArray) -> None:
     """Fills the table of `Gains`."""
     of_position, of_acceleration = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0, 1.0])
     now = np.diag(np.array([schedule.tracker_variance, 250e3, 25e6, 90e3]))

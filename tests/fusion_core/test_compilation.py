@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import numba
 import pytest
 
 import fusion_core
+import pipeline
 
 # The position filter's step is in one file and calls the process noise, in another. What it prints: the noise that a
 # second adds to the position, and how often the step was taken from kept machine code.
@@ -71,6 +73,31 @@ def test_a_package_that_cannot_be_written_to_compiles_in_memory(package: Path) -
     for _ in range(2):
         assert noise_and_hits(package) == pytest.approx((1 / 20, 0))
     assert sorted(package.parent.rglob("*")) == before
+
+
+def is_compiled(function: ast.FunctionDef) -> bool:
+    names = (mark.func if isinstance(mark, ast.Call) else mark for mark in function.decorator_list)
+    return any(isinstance(name, ast.Name) and name.id == "compiled" for name in names)
+
+
+SOURCES = sorted(
+    path for package in (fusion_core, pipeline) for path in Path(str(package.__file__)).parent.rglob("*.py")
+)
+
+
+def test_python_calls_no_function_that_has_no_entry_from_python() -> None:
+    """That would end the process: a compiled function whose name begins with an underscore is for compiled ones."""
+    calls = []
+    for path in SOURCES:
+        functions = [
+            node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.FunctionDef)
+        ]
+        inner = {function.name for function in functions if is_compiled(function) and function.name.startswith("_")}
+        for function in functions:
+            if not is_compiled(function):
+                used = {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
+                calls += [(path.name, function.name, name) for name in sorted(used & inner)]
+    assert calls == []
 
 
 def test_numbas_own_setting_stays_the_users() -> None:

@@ -9,6 +9,7 @@ from pipeline.report.document.model import (
     Block,
     Column,
     CrossReference,
+    Folded,
     Paragraph,
     Section,
     Strong,
@@ -137,7 +138,10 @@ def _figure_and_tests(material: Material, measure: str) -> list[Block]:
     label, shown = measure_label(measure), (wide, measure, material.of_shares(measure))
     blocks: list[Block] = []
     if measure != overview.drawn_measure(material):
-        blocks.append(material.drawn(f"measure-{safe_name(measure)}", figures.paired, *shown))
+        drawn = material.drawn(f"measure-{safe_name(measure)}", figures.paired, *shown)
+        # Where some measures are tested, those that are not are what most readers pass over.
+        passed_over = material.rows("comparisons") and not material.comparisons_of(measure)
+        blocks.append(Folded(f"{label} by participant", (drawn,)) if passed_over else drawn)
     for statement in _statements(material.comparisons_of(measure)):
         blocks.append(Paragraph((Strong(f"{label}: "), *statement)))
     return blocks
