@@ -20,6 +20,8 @@ from pipeline.report.document.model import (
 from pipeline.words.phrases import listing
 
 _ANNEX = "annex"
+_ROWS_MAX = 250  # of a table: five pages
+_TEXTS_MAX = 60  # of words to paste
 _ANNEX_ROWS = 60  # of folded tables in all: with their captions, two pages
 
 
@@ -40,7 +42,13 @@ def _blocks(blocks: Sequence[Block], names: Mapping[str, str]) -> Iterator[Block
         elif isinstance(block, ToPaste):
             # A link to a row of the report is of use on a page only, and belongs to no paper.
             texts = (tuple(part for part in text if not isinstance(part, CrossReference)) for text in block.texts)
-            yield ToPaste(block.label, tuple(texts))
+            yield ToPaste(block.label, tuple(texts)[:_TEXTS_MAX])
+            if len(block.texts) > _TEXTS_MAX:
+                yield Paragraph(
+                    (f"The first {_TEXTS_MAX} of {len(block.texts)} paragraphs; report.html has them all.",)
+                )
+        elif isinstance(block, Table):
+            yield _first_rows(block, _ROWS_MAX)
         elif not isinstance(block, Pages):
             yield block
 
@@ -61,9 +69,13 @@ def _shortened(tables: Sequence[Table]) -> Iterator[Table]:
         room[table.id] = min(len(table.rows), left // (len(tables) - place))
         left -= room[table.id]
     for table in tables:
-        rows, all_rows = room[table.id], len(table.rows)
-        if rows < all_rows:
-            caption = f"{table.caption} In print, the first {rows} of {all_rows} rows; all of these are in report.html."
-            table = replace(table, caption=caption, rows=table.rows[:rows], anchors=table.anchors[:rows])  # noqa: PLW2901
         if table.rows:
-            yield table
+            yield _first_rows(table, room[table.id])
+
+
+def _first_rows(table: Table, rows: int) -> Table:
+    """The table, or as much of it as is printed, which its caption says then."""
+    if len(table.rows) <= rows:
+        return table
+    caption = f"{table.caption} In print, the first {rows} of {len(table.rows)} rows; all of these are in report.html."
+    return replace(table, caption=caption, rows=table.rows[:rows], anchors=table.anchors[:rows])

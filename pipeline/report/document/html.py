@@ -12,7 +12,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
-from pipeline.report.document.model import CrossReference, Document, Link, Strong, numbered
+from pipeline.report.document.model import CrossReference, Document, Figure, Link, Strong, numbered, unfolded
+from pipeline.report.document.pictures import pictures
 from pipeline.report.document.typography import Run, Style, typeset, typeset_heading
 
 # Direction controls would reverse the text and numbers that follow.
@@ -25,11 +26,9 @@ _HERE = Path(__file__).parent
 def render(document: Document, figures: Path, path: Path) -> None:
     """Write the page; `figures` is the folder of the SVG files it shows."""
 
-    def picture(name: str) -> str:
-        """An SVG as a data URL. As an image of its own its ids cannot clash with those of another figure."""
-        return "data:image/svg+xml;base64," + base64.b64encode((figures / name).read_bytes()).decode()
-
-    values = {"document": document, "names": numbered(document), "picture": picture}
+    blocks = (block for section in document.sections for block in unfolded(section.blocks))
+    shown = pictures(figures, [block.file for block in blocks if isinstance(block, Figure)])
+    values = {"document": document, "names": numbered(document), "pictures": shown}
     write_page("report.html.jinja", "report.js", path, document.origin, **values)
 
 

@@ -7,6 +7,7 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report.document.model import (
     Block,
+    CrossReference,
     Figure,
     KeyFigure,
     KeyFigures,
@@ -38,6 +39,7 @@ from pipeline.words.sentences import brief_sentence, verdict
 
 _KEY_FIGURES_MAX = 3
 _SENTENCES = 2
+_FURTHER_MAX = 8  # on the first page, below the table of pairs
 
 
 def section(material: Material) -> Section:
@@ -56,7 +58,11 @@ def section(material: Material) -> Section:
     careful = cautions(material)
     if careful:
         blocks.append(Notice("To be careful about", tuple(careful)))
-    blocks += [Paragraph(text) for text in _further_results(material)]
+    further = _further_results(material)
+    blocks += [Paragraph(text) for text in further[:_FURTHER_MAX]]
+    if len(further) > _FURTHER_MAX:
+        text = f"{counted(len(further) - _FURTHER_MAX, 'more result')}: see the "
+        blocks.append(Paragraph((text, CrossReference("table of all comparisons", "comparisons"), ".")))
     if material.sessions:
         text = "Look at every session closely, as the tracker recorded it and as each estimator reconstructed it: "
         blocks.append(Paragraph((text, Link(traces.PAGE, traces.PAGE), ".")))
@@ -206,7 +212,8 @@ def _headline_rows(material: Material) -> list[Row]:
     ]
     first = {row["measure"]: row for row in reversed(rows)}
     known = headlines(first)
-    return [first[name] for name in [*known, *sorted(set(first) - set(known))]]
+    in_order = dict.fromkeys(row["measure"] for row in rows)
+    return [first[name] for name in [*known, *(name for name in in_order if name not in known)]]
 
 
 def _key_figures(material: Material) -> list[KeyFigure]:

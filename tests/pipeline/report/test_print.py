@@ -55,6 +55,17 @@ def test_words_to_paste_have_no_links_to_rows() -> None:
     assert section.blocks == (ToPaste("Results", (("It differed ", "."),)),)
 
 
+def test_a_long_table_and_many_words_are_cut_in_print_and_say_so() -> None:
+    ((section,),) = [printed(a_table("pairs", 1770), ToPaste("Results", tuple((f"{n}",) for n in range(61))))]
+    table, words, note = section.blocks
+    assert isinstance(table, Table)
+    assert len(table.rows) == 250
+    assert table.caption.endswith(" In print, the first 250 of 1770 rows; all of these are in report.html.")
+    assert isinstance(words, ToPaste)
+    assert len(words.texts) == 60
+    assert note == Paragraph(("The first 60 of 61 paragraphs; report.html has them all.",))
+
+
 @given(st.lists(st.integers(1, 400), min_size=1, max_size=12))
 def test_the_annex_never_outgrows_two_pages_and_says_what_it_left_out(lengths: list[int]) -> None:
     tables = [a_table(f"t{place}", rows) for place, rows in enumerate(lengths)]

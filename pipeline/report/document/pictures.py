@@ -1,0 +1,69 @@
+"""Figures as data URLs within a page's budget: as they were drawn, and where all of these are too many, as pixels.
+
+An SVG of many marks is large: forty measures of three hundred people are fifteen megabytes, which no mail takes and no
+phone scrolls. So the largest figures of a page become pictures of pixels, one after the other, until the page is
+within its budget. Their files beside the page stay as they were drawn, and so do they in print.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from pipeline.report.glyphs import font_folder
+
+BUDGET_BYTES = 3_500_000
+"""Of all figures of a page; its text and tables come to less than a megabyte."""
+_PIXELS_PER_INCH = 150
+_COLOURS = 128  # of a figure with a handful of colours and their mixtures at edges
+_SAFE = " '()*,;:@&=+$/?!~-_.[]{}|^\\`\n"  # what a URL of data in an attribute may hold as it is, for it to stay short
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure in a page, and whether it is drawn as pixels."""
+
+    url: str
+    is_pixels: bool
+
+
+def pictures(figures: Path, names: Sequence[str], budget_bytes: int = BUDGET_BYTES) -> dict[str, Picture]:
+    """The figures of these file names in a folder, each for a page; together within the budget if pixels can do it."""
+    found = {name: Picture(_vector_url((figures / name).read_text(encoding="utf-8")), False) for name in names}
+    total = sum(len(picture.url) for picture in found.values())
+    for name in sorted(found, key=lambda name: -len(found[name].url)):
+        if total <= budget_bytes:
+            break
+        pixels = Picture(_pixel_url(figures, name), True)
+        if len(pixels.url) < len(found[name].url):
+            total += len(pixels.url) - len(found[name].url)
+            found[name] = pixels
+    return found
+
+
+def _vector_url(svg: str) -> str:
+    """As an image of its own the ids in it cannot clash with those of another figure."""
+    return "data:image/svg+xml;charset=utf-8," + quote(svg, safe=_SAFE)
+
+
+def _pixel_url(figures: Path, name: str) -> str:
+    """A PNG, made by the program that sets the PDF, with the same fonts."""
+    import typst
+    from PIL import Image
+
+    compiler = typst.Compiler(
+        f'#set page(width: auto, height: auto, margin: 0pt, fill: white)\n#image("/{name}")'.encode(),
+        root=figures.resolve(),
+        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
+        ignore_system_fonts=True,
+    )
+    drawn = compiler.compile(format="png", ppi=_PIXELS_PER_INCH)
+    assert isinstance(drawn, bytes)  # noqa: S101 - one figure gives one page
+    few_colours = Image.open(io.BytesIO(drawn)).convert("RGB").quantize(_COLOURS)
+    written = io.BytesIO()
+    few_colours.save(written, format="PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(written.getvalue()).decode()
