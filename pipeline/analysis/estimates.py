@@ -1,4 +1,4 @@
-"""Rows with what an entry asks for beside its test: bootstrap intervals and permutation p values."""
+"""Rows with what an entry asks for beside its test: bootstrap intervals, permutation p values, one-sided evidence."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from pipeline.analysis.comparison_rows import tested
 from pipeline.analysis.complete_cases import Request
 from pipeline.analysis.ratios import on_logarithms
 from pipeline.statistics import OK
+from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.logarithms import exponential
 from pipeline.statistics.pairs import Pair
 from pipeline.tables.table import Row
+
+_OF_PAIRED_MEANS = ("t_paired", "bayes_t")
 
 
 def with_estimates(request: Request, row: Row, pair: Pair, estimation: ModuleType) -> Row:
@@ -32,3 +35,22 @@ def with_estimates(request: Request, row: Row, pair: Pair, estimation: ModuleTyp
     if request.entry.permutation:
         details |= estimation.permutation(first, second, request.entry.seed)
     return {**row, "details": details}
+
+
+def with_direction(request: Request, row: Row, pair: Pair) -> Row:
+    """The row of a test of paired means with the one-sided Bayes factor of the direction that its entry expects.
+
+    The p stays two-sided, whatever is expected; the Bayes factor says how far the data speak for the direction.
+    """
+    direction = request.entry.direction
+    if direction is None or row["status"] != OK or request.entry.test not in _OF_PAIRED_MEANS:
+        return row
+    found = bayes_t(*tested(request, pair), request.entry.prior_scale, alternative=direction)
+    sign = "minus" if direction == "less" else "plus"
+    details = {
+        "expected": direction,
+        "one_sided_bf": found.statistic,
+        "one_sided_log_bf": found.details[f"log_bf_{sign}0"],
+        "one_sided_prior_scale": request.entry.prior_scale,
+    }
+    return {**row, "details": {**row["details"], **details}}

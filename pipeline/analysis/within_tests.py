@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.analysis import complete_cases, model_rows
 from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair_row, row_of
 from pipeline.analysis.complete_cases import CompleteCases, Request
-from pipeline.analysis.estimates import with_estimates
+from pipeline.analysis.estimates import with_direction, with_estimates
 from pipeline.analysis.ratios import on_logarithms, results_of_logarithms, with_ratio, with_ratio_of
 from pipeline.statistics import OK, estimation, pairs
 from pipeline.statistics.anova import rm_anova
@@ -103,7 +103,10 @@ def pairwise(test: Callable[[Request, FloatArray, FloatArray], Result]) -> Calla
         cases = complete_cases.by_condition(request)
         of_conditions = pairs.of_conditions(cases.values, cases.levels[0])
         rows = [pair_row(request, test(request, pair.first, pair.second), pair, cases) for pair in of_conditions]
-        rows = [with_estimates(request, row, pair, estimation) for row, pair in zip(rows, of_conditions, strict=True)]
+        rows = [
+            with_direction(request, with_estimates(request, row, pair, estimation), pair)
+            for row, pair in zip(rows, of_conditions, strict=True)
+        ]
         return rows, cases.left_out
 
     return answer

@@ -7,6 +7,7 @@ from pipeline.words.effect_sizes import effect_size
 from pipeline.words.names import adjustment_label
 from pipeline.words.numbers import NO_VALUE, fixed_decimals, fraction, interval, number, p_phrase
 
+_LEAST_FACTOR = 0.005  # a smaller Bayes factor is no number with two decimals
 _STATISTICS = {"chi2": "χ²", "BF10": "BF₁₀", "W+": "W₊"}
 
 
@@ -21,7 +22,7 @@ def evidence(row: Row, digits: int = 4, before_interval: str = " ") -> str:
         parts.append(p_phrase(row["p_adjusted"], f"{adjustment_label(row['adjust'])}-adjusted p", digits))
     if row["effect_size"] is not None or row["ci_low"] is not None:
         parts.append(effect_size(row, before_interval))
-    parts += [text for text in (permutation(row, digits), bootstrap(row)) if text]
+    parts += [text for text in (permutation(row, digits), bootstrap(row), one_sided(row)) if text]
     return ", ".join(parts)
 
 
@@ -96,3 +97,21 @@ def bootstrap(row: Row) -> str:
         return f"bootstrap 95 % CI of the ratio {interval(*of_ratio)}"
     mean = f"mean difference = {number(row['mean_difference'])}, bootstrap 95 % CI "
     return mean + interval(*of_difference) if of_difference else str(details["no_bootstrap"])
+
+
+def one_sided(row: Row) -> str:
+    """`one-sided BF₋₀ = 12.30 (p is two-sided)` where a direction was expected; empty where no factor was computed."""
+    factor = one_sided_factor(row)
+    if not factor:
+        return ""
+    name = "BF₋₀" if (row["details"] or {})["expected"] == "less" else "BF₊₀"
+    return f"one-sided {name} {factor}" + (" (p is two-sided)" if row["p"] is not None else "")
+
+
+def one_sided_factor(row: Row) -> str:
+    """`= 12.30`, or `> 10³⁰⁸` where it is larger than any number a computer holds; empty where none was computed."""
+    details = row["details"] or {}
+    if "one_sided_log_bf" not in details:
+        return ""
+    factor = details["one_sided_bf"]
+    return "> 10³⁰⁸" if factor is None else f"= {number(factor)}" if factor >= _LEAST_FACTOR else "< .005"

@@ -145,6 +145,11 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         r"BF₁₀|Bayes factor",
         "How many times as likely the data are if there is a difference (with the stated prior) as if there is none.",
     ),
+    (
+        "One-sided Bayes factor, BF₊₀ or BF₋₀",
+        r"BF[₊₋]₀|One-sided Bayes factor",
+        "The same for the expected direction alone: the first condition's values are greater (+) or less (−).",
+    ),
     ("Effect size", r"[Ee]ffect size", "How large a difference is, whatever the number of participants."),
     ("η²G", r"η²G", "Generalized eta squared: the share of all variance that the condition explains, from 0 to 1."),
     (

@@ -220,6 +220,12 @@ def test_in_words(entry: Comparison, rows: Sequence[Row]) -> str:
         zeros = "Pratt" if entry.zeros == "pratt" else "dropped"
         parts += dict.fromkeys(row["method"] for row in rows if zeros in row["method"])
     parts += _estimates(entry, rows)
+    if entry.direction is not None and TESTS[entry.test].question == "difference":
+        parts.append("p two-sided although a direction was expected")
+    if any("one_sided_log_bf" in (row["details"] or {}) for row in rows) and entry.direction is not None:
+        side = "below" if entry.direction == "less" else "above"
+        prior = f"Cauchy prior of scale {entry.prior_scale:g} on d_z, {side} zero only"
+        parts.append(f"one-sided JZS Bayes factors of the expected direction ({prior})")
     if entry.adjust != "none":
         parts.append(f"p {adjustment_label(entry.adjust)}-adjusted")
     return ", ".join(parts)

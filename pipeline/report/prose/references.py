@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from pipeline.study.measures import measure
 from pipeline.study.settings import Study
@@ -140,18 +141,26 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield ADJUSTMENTS[row["adjust"]].cite, "adjusted p values"
         if uses_logarithms(row):
             yield "bland1996", "ratios of geometric means"
-        if "bootstrap_seed" in details:
-            yield "efron1987", "bootstrap intervals"
-        if details.get("permutation_p") is not None:
-            yield ("pitman1937" if details["permutation_exact"] else "phipson2010"), "permutation p values"
-            if test.design == "between":
-                yield "janssen1997", "permutation p values of Welch's t"
+        yield from _of_estimates(details, test.design)
         if details.get("p_gg") is not None:
             yield "greenhouse1959", "correction for sphericity"
         if details.get("shapiro_w") is not None or details.get("residual_shapiro_w") is not None:
             yield "shapiro1965", "normality of differences"
         if "outlier_rule" in details:
             yield "iglewicz1993", "outliers"
+
+
+def _of_estimates(details: Mapping[str, Any], design: str) -> Iterator[tuple[str, str]]:
+    """What an entry asks for beside its test."""
+    if "bootstrap_seed" in details:
+        yield "efron1987", "bootstrap intervals"
+    if details.get("permutation_p") is not None:
+        yield ("pitman1937" if details["permutation_exact"] else "phipson2010"), "permutation p values"
+        if design == "between":
+            yield "janssen1997", "permutation p values of Welch's t"
+    if "one_sided_log_bf" in details:
+        yield "rouder2009", "one-sided Bayes factors"
+        yield "morey2014", "one-sided Bayes factors"
 
 
 def _of_measures(measures: Iterable[str]) -> Iterator[tuple[str, str]]:

@@ -14,7 +14,7 @@ from pipeline.tables.table import Row
 from pipeline.words.change import meaningful_reduction
 from pipeline.words.comparison import contrast, test_label, uses_logarithms
 from pipeline.words.effect_sizes import effect_size
-from pipeline.words.evidence import degrees_of_freedom, statistic_name, statistic_value
+from pipeline.words.evidence import degrees_of_freedom, one_sided_factor, statistic_name, statistic_value
 from pipeline.words.names import adjustment_label, measure_label
 from pipeline.words.numbers import NO_VALUE, fraction, interval, number, p_value, percent
 from pipeline.words.phrases import capitalized, counted, listing
@@ -146,6 +146,7 @@ def _bootstrap(row: Row) -> str:
 ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Bootstrap 95 % interval", _bootstrap),
     ("Permutation p", lambda row: p_value((row["details"] or {}).get("permutation_p"))),
+    ("One-sided Bayes factor", lambda row: one_sided_factor(row).removeprefix("= ") or NO_VALUE),
 )
 """Columns of the bootstrap and permutation estimates that an entry of study.yaml may ask for beside its test."""
 

@@ -165,6 +165,27 @@ def test_the_seed_is_the_only_chance(tmp_path: Path, steadyhand: Steadyhand) -> 
     assert default != other
 
 
+def test_an_expected_direction_has_a_one_sided_bayes_factor_and_p_stays_two_sided(
+    tmp_path: Path, steadyhand: Steadyhand
+) -> None:
+    """BayesFactor 0.9.12-4.4 in R: ttestBF(A, B, paired = TRUE, nullInterval = c(0, Inf), rscale = 0.707)."""
+    entries = [
+        f"measure: time_s, test: {test}, direction: {side}"
+        for test, side in (("t_paired", "greater"), ("t_paired", "less"), ("bayes_t", "greater"), ("wilcoxon", "less"))
+    ]
+    page = read(steadyhand, study(tmp_path / "study", TIMES, entries))
+    expected, against, bayes, ranked = steadyhand.results()["comparisons"]
+    assert expected["details"]["one_sided_bf"] == pytest.approx(BF_PLUS, rel=1e-6)
+    assert against["details"]["one_sided_bf"] == pytest.approx(BF_MINUS, rel=1e-6)
+    assert bayes["details"]["one_sided_bf"] == expected["details"]["one_sided_bf"]
+    assert expected["p"] == against["p"]
+    assert "one_sided_bf" not in ranked["details"]
+    assert f"one-sided BF₊₀ = {BF_PLUS:.2f} (p is two-sided)" in page
+    assert "p two-sided although a direction was expected" in page
+    assert "one-sided JZS Bayes factors of the expected direction (Cauchy prior of scale 0.707 on" in page
+    assert "morey2014" in (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+
+
 def test_too_few_to_resample_is_said(tmp_path: Path, steadyhand: Steadyhand) -> None:
     values: Values = {"m": {"A": [1, 2, 5], "B": [3, 1, 9]}}
     page = read(steadyhand, study(tmp_path / "study", values, ["measure: m, test: t_paired, bootstrap: true"]))
@@ -180,6 +201,7 @@ def test_a_seed_without_chance_is_an_error(tmp_path: Path, steadyhand: Steadyhan
 THREE: Values = {"time_s": {**TIMES["time_s"], "C": [11.0, 15.0, 9.9, 19.0, 13.2, 12.0, 30.0, 12.5, 10.1, 17.0]}}
 LOGS: Values = {"time_s": {name: [math.log(value) for value in values] for name, values in THREE["time_s"].items()}}
 PEOPLE = "participant,group\n" + "".join(f"P{at + 1:02},{'young' if at < 4 else 'old'}\n" for at in range(10))
+BF_PLUS, BF_MINUS = 9.109517942761954, 0.110446381828998
 FIGURES = ("statistic", "df1", "df2", "p")
 
 
@@ -278,7 +300,7 @@ def test_skewed_times_are_cautioned_of_and_other_scales_are_not(tmp_path: Path, 
 def test_a_rank_test_takes_no_transform(tmp_path: Path, steadyhand: Steadyhand) -> None:
     ran = steadyhand("compare", study(tmp_path / "study", TIMES, ["measure: doubt, test: wilcoxon, transform: log"]))
     assert ran.code == 2
-    assert "wilcoxon does not take transform; it is for rm_anova and t_paired" in ran.err
+    assert "wilcoxon does not take transform; it is for rm_anova, t_paired" in ran.err
 
 
 def test_other_programs_are_given_the_logarithms(

@@ -175,7 +175,7 @@ def test_settings_that_cannot_be_are_named(folder: Folder, steadyhand: Steadyhan
         ("test: t_paired, bounds: [-5, 5]", "t_paired does not take bounds; it is for tost"),
         (
             "test: friedman, within: [condition, task]",
-            "friedman does not take within; it is for rm_anova and art_anova",
+            "friedman does not take within; it is for rm_anova, art_anova",
         ),
         ("test: rm_anova, within: [task]", 'within of "m" must contain "condition", and no name twice'),
         (
