@@ -9,6 +9,7 @@ import pandas as pd
 
 from pipeline.analysis.kinds_of_values import are_answers
 from pipeline.statistics import T_OF_SHARES, WILSON
+from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.descriptive import described, interval_method, summarize
 from pipeline.statistics.estimation import within_intervals
 from pipeline.study.measures import measure, measure_order
@@ -21,7 +22,7 @@ def descriptives(study: Study, measures: pd.DataFrame, observations: pd.DataFram
     """n, mean, SD, median and the interval of the mean, one row per measure and condition."""
     rows: list[Row] = []
     for name, wide, method in _by_measure(study, measures, observations):
-        everything = wide.stack().to_numpy(np.float64)
+        everything = _all_of(wide)
         within_unit = not measure(name).unit and bool(((everything >= 0) & (everything <= 1)).all())
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
@@ -71,7 +72,13 @@ def _by_measure(
     for name in sorted(set(measures["measure"]), key=measure_order):
         wide = tables.participant_means(measures, name, study.conditions)
         shares = are_answers(observations[observations["measure"] == name])
-        yield name, wide, interval_method(wide.stack().to_numpy(np.float64), shares, measure(name).unit != "")
+        yield name, wide, interval_method(_all_of(wide), shares, measure(name).unit != "")
+
+
+def _all_of(wide: pd.DataFrame) -> FloatArray:
+    """The values of all conditions that are there (n,): who met one condition has gaps in the others."""
+    values = wide.to_numpy(np.float64)
+    return values[~np.isnan(values)]
 
 
 def _root_rows(rows: Iterable[Row]) -> list[Row]:

@@ -113,6 +113,7 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
     """Participants without a condition, and cells without a measure that others have."""
     listed = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     rows: list[Row] = []
+    without: list[str] = []
     path = table_path(work, "participants")
     if path is not None:
         named = study_tables.read_participants(path)["participant"]
@@ -120,10 +121,17 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
             hint = did_you_mean(participant, sorted(named)) if len(named) else ""
             reason = f"kept; check its spelling{hint}"
             rows.append({"participant": participant, "what": "not in participants", "reason": reason})
+        without = sorted(set(named) - listed)
         listed |= set(named)
     seen = set(zip(measures["participant"], measures["condition"], strict=True))
     seen |= {(session.participant, session.condition) for session in work.sessions}
     if one_condition_each(work.study, seen):
+        reason = "the participant is listed in participants.csv and has no data"
+        rows += [
+            {"participant": participant, "what": "no data", "reason": reason}
+            for participant in without
+            if not _excluded(work.study, participant, None, None)
+        ]
         return [*rows, *_look_alikes(listed, seen, ()), *_missing_cells(work.study, measures, seen)]
     for participant in sorted(listed):
         for condition in work.study.conditions:
@@ -146,7 +154,7 @@ def _look_alikes(people: Iterable[str], seen: AbstractSet[tuple[Any, Any]], cond
             yield {"participant": ids[0], "what": "participants with similar ids", "reason": reason}
 
 
-def _excluded(study: Study, participant: str, condition: str, measure: str | None) -> bool:
+def _excluded(study: Study, participant: str, condition: str | None, measure: str | None) -> bool:
     """Is the cell empty because study.yaml excludes it?"""
     return any(
         excluded.session is None and excluded.covers(participant=participant, condition=condition, measure=measure)

@@ -26,6 +26,12 @@ def measure_as_subject(name: str) -> str:
     return f"{head} ({kind})" if comma and name in MEASURES else label
 
 
+def was(label: str) -> str:
+    """The verb after a measure: `time was`, `errors were`."""
+    last = label.partition(" per ")[0].rpartition(" ")[2].lower()
+    return "were" if last.endswith("s") and not last.endswith(("ss", "us", "is")) else "was"
+
+
 def unit_of(name: str) -> str:
     """A measure's unit; empty for a measure without one."""
     return measure(name).unit

@@ -26,7 +26,7 @@ from pipeline.words.comparison import (
 from pipeline.words.condition_means import StudyFacts, means_of_conditions
 from pipeline.words.effect_sizes import effect_size, ratio_to_first
 from pipeline.words.evidence import evidence, statistic, statistic_value
-from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
+from pipeline.words.names import adjustment_label, measure_as_subject, unit_of, was
 from pipeline.words.numbers import interval, number, p_phrase, percent
 from pipeline.words.phrases import listing
 
@@ -139,6 +139,8 @@ def _test_name(row: Row) -> str:
     name = TESTS[row["test"]].long_name
     if row["contrast"] is not None:
         name = {"rm_anova": "follow-up t test", "cochran_q": "follow-up, McNemar's test"}.get(row["test"], name)
+        if row["test"] in ("mixed_anova", "anova_welch"):
+            name = f"follow-up, {row['method'].partition(',')[0]}"
     return f"{name} of the logarithms" if uses_logarithms(row) else name
 
 
@@ -154,7 +156,7 @@ def _pair_sentence(row: Row, facts: StudyFacts, what: str, pair: _Pair, differen
     if difference:
         side = f"{'lower' if difference > 0 else 'higher'} {pair.preposition} {pair.second}"
     if _significant(row, facts.alpha) and difference:
-        head = f"{what} was significantly {side} than {pair.preposition} {pair.first}{pair.where}"
+        head = f"{what} {was(what)} significantly {side} than {pair.preposition} {pair.first}{pair.where}"
         figures = [amount, *means_of_conditions(row, facts)]
     else:
         head = f"{what} did not differ significantly between {pair.first} and {pair.second}{pair.where}"

@@ -24,6 +24,7 @@ from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_value, p
 LINES_MAX = 12
 """As many lines fit on the first page, with all else that belongs there."""
 
+_RATIOS = ("odds ratio", "rate ratio")
 _SIGNED = ("Cohen's d_z", "Cohen's d_av", "matched-pairs rank-biserial", "rank-biserial")
 
 HEADER = ("Measure", "Pair", "Means", "Difference [95 % interval]", "Effect size", "p")
@@ -108,7 +109,9 @@ def notes(results: Mapping[str, Any]) -> str:
     adjusted = any(row["p_adjusted"] is not None for row in rows)
     kind = "p: adjusted over its family where one is stated" if adjusted else "p: not adjusted"
     level = f"level of significance {100 * results['study']['alpha']:g} %"
-    return f"Differences and effect sizes: the first named minus the other.{people} {kind}; {level}."
+    has_ratios = any(row["effect_size_name"] in _RATIOS for row in rows)
+    ratios = "; ratios: the first named over the other" if has_ratios else ""
+    return f"Differences and effect sizes: the first named minus the other{ratios}.{people} {kind}; {level}."
 
 
 def _pairs_in_question(
@@ -155,6 +158,11 @@ def _line(
 
 def _of_second_minus_first(row: Row) -> Row:
     """The row with its effect size the other way round, where that has a sign."""
+    if row["effect_size_name"] in _RATIOS and row["effect_size"] is not None:
+        low, high = (1 / bound if bound else None for bound in (row["ci_high"], row["ci_low"]))
+        if row["effect_size"] == 0:  # the ratio is infinite this way round, as a division by nobody is
+            return {**row, "effect_size": None}
+        return {**row, "effect_size": 1 / row["effect_size"], "ci_low": low, "ci_high": high}
     if row["effect_size_name"] not in _SIGNED or row["effect_size"] is None:
         return row
     low, high = (None if bound is None else -bound for bound in (row["ci_high"], row["ci_low"]))
@@ -167,7 +175,10 @@ def _means(row: Row, one: Row | None, other: Row | None) -> str:
     No means where they are of other people than the test, or where a model estimates the difference from unequal
     numbers of rows: they could contradict the difference beside them.
     """
-    if one is None or other is None or not one["n"] == other["n"] == row["n"] or row["effect_size_name"] == "estimate":
+    if one is None or other is None or row["effect_size_name"] == "estimate":
+        return NO_VALUE
+    tested = [one["n"] + other["n"]] if TESTS[row["test"]].design == "between" else [one["n"], other["n"]]
+    if any(n != row["n"] for n in tested):
         return NO_VALUE
     first, second, unit = one["mean"], other["mean"], measure(row["measure"]).unit
     if unit.endswith("²") and first >= 0 and second >= 0:

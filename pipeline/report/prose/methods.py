@@ -52,7 +52,9 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
         yield f"There were {people} and one condition, {conditions[0]}."
         return
     designs = {TESTS[row["test"]].design for row in results["comparisons"]}
-    if designs == {"between"} and {row["effect"] for row in results["comparisons"]} == {"condition"}:
+    if "condition" in study.factors or (
+        designs == {"between"} and {row["effect"] for row in results["comparisons"]} == {"condition"}
+    ):
         how = "each participant met one"
     elif designs == {"either"}:
         how = "compared with participants as clusters"
@@ -66,7 +68,7 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     yield f"There were {people} and {comparison}; {conditions[0]} was the baseline."
     groups = [factor for factor in study.factors if factor != "condition"]
     if groups and designs - {"within"}:
-        yield f"Participants were in groups by {listing(groups)}, compared between participants."
+        yield f"Participants were compared between the levels of {listing(groups)}."
 
 
 def _sex_and_age(facts: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from pipeline.statistics import T_BEYOND
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import reference_phrase
-from pipeline.words.comparison import no_variance_between_participants
+from pipeline.words.comparison import decisive_p, no_variance_between_participants
 from pipeline.words.names import measure_label
 from pipeline.words.phrases import counted, listing
 
@@ -111,6 +111,7 @@ def _assumptions(material: Material) -> Iterator[Text]:
             f"in {_measures_of(shaped)}: transform: log in study.yaml tests the logarithms and says by what factor the"
         )
         yield (Strong("Skewed values "), f"{text} geometric means differ; see whether it gives the same result.")
+    yield from _interactions(rows, alpha)
     yield from _outliers(assuming_normality)
     yield from _aligned_ranks(rows)
     singular = [row for row in rows if no_variance_between_participants(row)]
@@ -133,6 +134,19 @@ def _narrow_intervals(material: Material) -> Iterator[Text]:
         standard = reference_phrase(row["reference"] for row in material.rows("accuracy"))
         text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain"
         yield (Strong("Stated uncertainty too small "), f"{text} {standard} in less than 90 % of instants.")
+
+
+def _interactions(rows: list[Row], alpha: float) -> Iterator[Text]:
+    """Differences between conditions that depend on another factor, so that no single number tells them."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        parts = row["effect"].split(":")
+        p = decisive_p(row)
+        if "condition" in parts and len(parts) > 1 and row["contrast"] is None and p is not None and p < alpha:
+            found.setdefault(listing([part for part in parts if part != "condition"]), []).append(row)
+    for others, rows_of in found.items():
+        text = f"in {_measures_of(rows_of)} it is not the same at each level of {others} (the interaction is"
+        yield (Strong("The difference depends: "), f"{text} significant); see the pairs at each level.")
 
 
 def _left_out_intercepts(rows: list[Row]) -> Iterator[Text]:

@@ -57,8 +57,9 @@ def _reduction_of_logarithms(rows: Sequence[Row]) -> str:
 
 
 def _meaning_of_n(tests: Sequence[str]) -> str:
-    if {TESTS[name].design for name in tests} == {"between"}:
-        return "n: every participant with a value."
+    designs = {TESTS[name].design for name in tests}
+    if "between" in designs and designs <= {"between", "either"}:
+        return "n: every participant with a value, in a test of two groups those of the two."
     text = "n: participants with a value in every condition"
     of_everybody = [TESTS[name].label for name in tests if not TESTS[name].complete_cases]
     return f"{text}; in the {listing(of_everybody)}, all participants." if of_everybody else f"{text}."

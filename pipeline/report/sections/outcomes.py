@@ -116,7 +116,7 @@ def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Ta
         )
         for row in rows
     )
-    caption = "Means over participants; each participant has one value in each condition."
+    caption = "Means over participants; each participant has one value in each condition that they met."
     return Table(table_id, caption, columns(titles, 2), cells, interval_note(rows))
 
 

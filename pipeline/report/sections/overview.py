@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pandas as pd
 
 from pipeline.report import figures
@@ -28,11 +30,11 @@ from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.study.measures import headlines
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words.change import amount_of_change, direction
+from pipeline.words.change import amount_of_change, difference_phrase, direction
 from pipeline.words.comparison import EFFECTS_OF_CONDITION, decisive_p
 from pipeline.words.effect_sizes import ratio_to_first
 from pipeline.words.evidence import statistic
-from pipeline.words.names import adjustment_label, measure_label, short_label, unit_of
+from pipeline.words.names import adjustment_label, measure_label, short_label, unit_of, was
 from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_phrase
 from pipeline.words.phrases import counted, listing, participants_counted
 from pipeline.words.sentences import brief_sentence, verdict
@@ -111,20 +113,30 @@ def _sentence(material: Material, row: Row) -> str:
     if row["mean_difference"] is not None and set(study.conditions) <= set(described):
         first, second = study.conditions
         change = f"{amount_of_change(row)} {direction(row)}" if row["mean_difference"] else "the same"
-        means = f"{_mean(described[second])} with {second} against {_mean(described[first])} with {first}"
+        means = f"on average {_mean(described[second])} with {second} against {_mean(described[first])} with {first}"
+        if not _of_those_tested(row, (described[first], described[second])):
+            means = f"a mean difference of {difference_phrase(row)}"
         sure = "" if significant else ", a difference that is not statistically significant"
-        return f"{label} was {change} with {second} than with {first}{sure}: on average {means} ({evidence})."
+        than = "than" if row["mean_difference"] else "as"
+        return f"{label} {was(label)} {change} with {second} {than} with {first}{sure}: {means} ({evidence})."
     if ratio_to_first(row):
         first, second = study.conditions
         sure = "" if significant else ", a difference that is not statistically significant"
         side = "lower" if row["details"]["ratio_to_first"] < 1 else "higher"
-        return f"{label} was {side} with {second} than with {first}{sure}: its {ratio_to_first(row)} ({evidence})."
+        ratio = f"{ratio_to_first(row)} ({evidence})"
+        return f"{label} {was(label)} {side} with {second} than with {first}{sure}: its {ratio}."
     ranked = sorted((one for one in described.values() if one["mean"] is not None), key=lambda one: one["mean"])
-    verb = "differs" if significant else "does not differ statistically significantly"
-    if len(ranked) < 2:
-        return f"{label} {verb} between the conditions ({evidence})."
+    verb = "differ" if significant else "do not differ statistically significantly"
+    if len(ranked) < 2 or not _of_those_tested(row, ranked):
+        return f"{label}: the conditions {verb} ({evidence})."
     ends = f"{_mean(ranked[0])} with {ranked[0]['condition']} to {_mean(ranked[-1])} with {ranked[-1]['condition']}"
-    return f"{label} {verb} between the conditions: means run from {ends} ({evidence})."
+    return f"{label}: the conditions {verb}; means run from {ends} ({evidence})."
+
+
+def _of_those_tested(row: Row, described: Sequence[Row]) -> bool:
+    """Are these means of the people of the test? Others could contradict its difference."""
+    counts = [one["n"] for one in described]
+    return row["n"] == sum(counts) or set(counts) == {row["n"]}
 
 
 def _mean(row: Row) -> str:

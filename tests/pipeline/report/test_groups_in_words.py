@@ -1,0 +1,95 @@
+"""What the reports of between-subjects and mixed studies say of their participants, pairs and directions."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pipeline.report.prose.answer import answer, notes
+from pipeline.words.names import was
+from tests.pipeline.analysis.test_options import Values, read, study
+from tests.pipeline.helpers import Steadyhand
+
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
+BETWEEN: Values = {
+    "completion_time_s": {
+        "mouse": [11.0, 10.2, 12.5, 9.8, 13.1, 11.7, 10.9],
+        "touch": [8.1, 9.4, 7.9, 8.8, 10.2, 9.1],
+        "gaze": [14.2, 12.9, 15.8, 13.3, 16.0],
+    },
+    "errors": {"mouse": [2, 1, 3, 2, 4, 2, 3], "touch": [3, 2, 4, 3, 2, 5], "gaze": [5, 4, 6, 3, 7]},
+    "success": {"mouse": [1, 1, 1, 1, 1, 0, 1], "touch": [1, 1, 0, 1, 0, 1], "gaze": [0, 1, 0, 1, 0]},
+}
+ENTRIES = [
+    "measure: completion_time_s, test: anova_welch",
+    "measure: errors, test: gee_poisson",
+    "measure: success, test: gee_logit",
+]
+
+
+def between(folder: Path) -> Path:
+    rows = "".join(f"{name}-{at + 1:02}\n" for name, values in BETWEEN["errors"].items() for at in range(len(values)))
+    declared = "factors: {condition: between}\n"
+    return study(folder, BETWEEN, ENTRIES, declared, people=f"participant\n{rows}spare\n", apart=True)
+
+
+def test_a_between_subjects_report_says_who_met_what(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    page = read(steadyhand, between(tmp_path / "s"))
+    assert "18 participants analysed of 19 listed" in page
+    assert "3 conditions, each participant met one: mouse, touch and gaze" in page
+    assert "met by every participant" not in page
+    assert "n: every participant with a value, in a test of two groups those of the two." in page
+    assert "Nothing was left out" not in page
+    missing = [row for row in steadyhand.results()["exclusions"] if row["participant"] == "spare"]
+    assert [row["reason"] for row in missing] == ["the participant is listed in participants.csv and has no data"]
+    follow_up = re.search(r"follow-up of Welch's ANOVA: .*?\. ", page)
+    assert follow_up is not None
+    assert re.findall(r"n = (\d+)", page[follow_up.start() : follow_up.start() + 400])[:3] == ["13", "12", "11"]
+    assert "follow-up, Games and Howell's test" in page
+    assert "the conditions differ; means run from 8.92 s" in page
+    assert {row["interval"] for row in steadyhand.results()["descriptives"] if row["measure"] == "success"} == {
+        "Wilson"
+    }
+
+
+def test_ratios_and_means_stand_the_way_round_that_the_differences_do(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    assert steadyhand("compare", between(tmp_path / "s")).code == 0
+    results = steadyhand.results()
+    lines = {(line.measure.split(",")[0], line.pair): line for line in answer(results)}
+    assert "ratios: the first named over the other" in notes(results)
+    assert lines["Completion time (s)", "touch − mouse"].means == "11.31 → 8.92 s"
+    for measure in ("Errors", "Success"):
+        line = lines[measure, "gaze − mouse"]
+        ratio = float(re.findall(r"= ([\d.]+)", line.effect_size)[0])
+        assert ("higher" in line.difference) == (ratio > 1), line
+    (row,) = (one for one in results["comparisons"] if one["contrast"] == "mouse - gaze" and one["measure"] == "errors")
+    assert f"= {1 / row['effect_size']:.2f} [{1 / row['ci_high']:.2f}, {1 / row['ci_low']:.2f}]" in (
+        lines["Errors", "gaze − mouse"].effect_size
+    )
+
+
+def test_a_difference_that_depends_on_the_group_is_a_caution(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    values: Values = {
+        "time_s": {
+            "A": [20.0, 21, 19, 22, 20.5, 14, 15, 13.5, 14.2, 15.1],
+            "B": [15.0, 16.5, 14.2, 16.4, 15.9, 14.1, 14.8, 13.6, 14.5, 15.0],
+        }
+    }
+    people = "participant,group\n" + "".join(f"P{at:02},{'new' if at <= 5 else 'old'}\n" for at in range(1, 11))
+    entry = ["measure: time_s, test: mixed_anova"]
+    page = read(steadyhand, study(tmp_path / "s", values, entry, "factors: {group: between}\n", people=people))
+    assert "The difference depends: in Time (s) it is not the same at each level of group" in page
+    assert "Participants were compared between the levels of group." in page
+    assert "follow-up, paired t test, t(4)" in page
+    assert "follow-up, Welch's t test, t(" in page
+
+
+@pytest.mark.parametrize(
+    ("label", "verb"),
+    [("Time", "was"), ("Errors", "were"), ("Corrections per trial", "were"), ("Success", "was"), ("Axis", "was")],
+)
+def test_the_verb_fits_the_measure(label: str, verb: str) -> None:
+    assert was(label) == verb
