@@ -78,7 +78,8 @@ def _by_measure(
 def _all_of(wide: pd.DataFrame) -> FloatArray:
     """The values of all conditions that are there (n,): who met one condition has gaps in the others."""
     values = wide.to_numpy(np.float64)
-    return values[~np.isnan(values)]
+    known: FloatArray = values[~np.isnan(values)]
+    return known
 
 
 def _root_rows(rows: Iterable[Row]) -> list[Row]:

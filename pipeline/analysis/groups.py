@@ -11,12 +11,13 @@ import pandas as pd
 
 from pipeline.analysis import complete_cases
 from pipeline.analysis.complete_cases import Request, left_out, levels_of, rows_and_factors
-from pipeline.analysis.factors import parsed
+from pipeline.analysis.factors import folded, parsed
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.result import IntArray
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
+from pipeline.words.phrases import listing
 
 CONDITION = "condition"
 
@@ -113,7 +114,9 @@ def group_of_each(request: Request, factor: str, rows: pd.DataFrame) -> dict[str
     if factor == CONDITION:
         return _one_level_each(request, factor, zip(rows["participant"], rows["condition"], strict=True))
     if factor in request.people:
-        return {str(person): str(level) for person, level in request.people[factor].items() if level}
+        members = {str(person): str(level) for person, level in request.people[factor].items() if level}
+        _refuse_look_alikes(factor, members)
+        return members
     facts = parsed(rows["factors"])
     pairs = [(person, fact[factor]) for person, fact in zip(rows["participant"], facts, strict=True) if factor in fact]
     if not pairs:
@@ -122,7 +125,9 @@ def group_of_each(request: Request, factor: str, rows: pd.DataFrame) -> dict[str
             f'study.yaml: comparisons: neither participants.csv nor the measures have a column "{factor}"'
             f"{did_you_mean(factor, known)}"
         )
-    return _one_level_each(request, factor, pairs)
+    members = _one_level_each(request, factor, pairs)
+    _refuse_look_alikes(factor, members)
+    return members
 
 
 def _one_level_each(request: Request, factor: str, pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
@@ -135,6 +140,20 @@ def _one_level_each(request: Request, factor: str, pairs: Iterable[tuple[str, st
                 " such as t_paired or rm_anova"
             )
     return members
+
+
+def _refuse_look_alikes(factor: str, members: Mapping[str, str]) -> None:
+    """Raise PipelineError for two groups whose names differ in case, spaces or invisible characters only."""
+    by_name: dict[str, str] = {}
+    counts = Counter(members.values())
+    for name in sorted(counts, key=lambda level: (-counts[level], level)):
+        usual = by_name.setdefault(folded(name), name)
+        if usual != name:
+            people = sorted(person for person, level in members.items() if level == name)
+            raise PipelineError(
+                f'study.yaml: comparisons: the groups "{usual}" and "{name}" of {factor} differ only in case, spaces or'
+                f' invisible characters; write "{usual}" for {listing(people)}, or give the groups names of their own'
+            )
 
 
 def _names(request: Request, factor: str, members: Mapping[str, str], people: Iterable[str]) -> list[str]:
