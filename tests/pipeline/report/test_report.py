@@ -278,7 +278,7 @@ def test_the_page_is_whole_without_network_and_runs_nothing_but_its_own_script(r
     assert "default-src 'none'; img-src data:; style-src 'sha256-" in page
     assert f"script-src 'sha256-{digest}'" in page
     assert found.pictures_without_alt == 0
-    ours = ("#", "data:image/svg+xml;base64,", "traces.html")
+    ours = ("#", "data:image/svg+xml;charset=utf-8,", "traces.html")
     assert all(reference.startswith(ours) for reference in found.references)
     assert "url(" not in page.split("</style>")[0]
     assert found.tags.count("h1") == 1
