@@ -47,11 +47,12 @@ LAST = 16  # the newest frame (3)
 LARGEST = 19  # the largest component of specific force so far
 STRANGE_MM = 20  # how far off the first strange frame was
 AT_LARGEST = 21  # how often the largest component came again
-FACTS = 22
+EXPECTED = 22  # the squared error that the fusion expected of itself
+FACTS = 23
 
 # A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
-# position (3) and its variance as the filters state it.
-FUSED, AHEAD, HELD, MIXED, STATED, SHOWN = 0, 3, 6, 9, 12, 13
+# position (3) and its variance as the filters state it, and the variance of the fusion's alone.
+FUSED, AHEAD, HELD, MIXED, STATED, OWN, SHOWN = 0, 3, 6, 9, 12, 13, 14
 
 MEMBERS = 81  # of the bank
 OFFSETS = 11  # of the tracker's clock, that are tried

@@ -2,8 +2,11 @@
 
 Three answers stand beside each other: the fusion's, and what positions alone say, gone on with along their motion or
 held. Whatever was shown for the time of a frame is compared with the frame once that arrives, a latency later; the
-squared errors of the last seconds weigh the answers (in all ordinary cases that is the fusion alone), and where errors
-are larger than stated, the stated SD grows by as much.
+squared errors of the last seconds weigh the answers, and where errors are larger than stated, the stated SD grows by as
+much.
+
+The fusion gives way only as far as it errs more than it expects to. While a hand rests, the position held is a better
+answer than any filter's, by a little, and a bad one as soon as the hand moves: what did best is not enough.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from fusion_core.adaptive.layout import (
     CLIPPED,
     DRIFT,
     ERROR,
+    EXPECTED,
     FUSED,
     HELD,
     INPUTS,
@@ -28,6 +32,7 @@ from fusion_core.adaptive.layout import (
     NOISE,
     NOISE_DRIFT,
     ORIENTED,
+    OWN,
     POSITION,
     ROW,
     ROWS,
@@ -51,8 +56,8 @@ _ANSWERS = 3
 _SCORES = 150  # over how many frames errors are averaged
 _SURPRISES = 300  # and surprises, which are noisier
 _ENOUGH = 60  # frames scored, before which nothing is made of it
-_SHARPNESS = 20.0  # ten independent errors of three axes in the time that is averaged over
-_DOUBT = 3.0  # log odds against the answers of positions alone
+_SHARPNESS = 20.0  # thirteen independent errors of three axes in the time that is averaged over
+_DOUBT = 5.0  # log odds against the answers of positions alone
 _MOST_SURPRISE = 9.0  # of one frame, three SDs: a stray one says little about the others
 _LEAST_OF_NOISE = 0.2  # of the noise's variance, in positions alone: five frames averaged
 
@@ -101,9 +106,10 @@ def answer(model: Model, state: State, phone: Phone, time: float, answers: Float
     for axis in range(3):
         answers[FUSED + axis] = 0.0
     own, weight = fused(model, state, phone, time, answers), np.empty(_ANSWERS)
+    answers[OWN] = own
     bank.by_positions(model, state, max(time - state.fact[AT], 0.0), answers)
     _add_arm(state, phone, answers)
-    _weights(state, weight)
+    _weights(model, state, weight)
     answers[STATED] = own * weight[0]
     for other in range(1, _ANSWERS):
         seen = state.fact[ERROR + other] - _noise(state)
@@ -127,15 +133,18 @@ def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
 
 
 @compiled
-def _weights(state: State, weight: FloatArray) -> None:
-    """The answers' weights by their squared errors: as of normal errors whose variance is what was seen."""
+def _weights(model: Model, state: State, weight: FloatArray) -> None:
+    """The answers' weights by their squared errors: as of normal errors whose variance is what was seen.
+
+    No answer counts for better than the fusion expects of itself. As many errors as were seen, in as many axes, speak.
+    """
     weight[0], weight[1], weight[2] = 1.0, 0.0, 0.0
     if state.fact[SCORED] < _ENOUGH:
         return
-    total = 1.0
+    total, sharpness = 1.0, _SHARPNESS * min(state.fact[SCORED] / _SCORES, 1.0) * model.dimension / 3.0
     for other in range(1, _ANSWERS):
-        worse = np.log(state.fact[ERROR] / max(state.fact[ERROR + other], 1e-12))
-        weight[other] = np.exp(min(_SHARPNESS * worse - _DOUBT, 50.0))
+        worse = np.log(state.fact[ERROR] / max(state.fact[ERROR + other], state.fact[EXPECTED], 1e-12))
+        weight[other] = np.exp(min(sharpness * worse - _DOUBT, 50.0))
         total += weight[other]
     for one in range(_ANSWERS):
         weight[one] /= total
@@ -152,6 +161,7 @@ def score(model: Model, state: State, phone: Phone, time: float, position: Float
     share = (time - phone.time[row]) / (phone.time[row + 1] - phone.time[row])
     state.fact[SCORED] += 1.0
     newer = max(1.0 / state.fact[SCORED], 1.0 / _SCORES)
+    state.fact[EXPECTED] += newer * (shown[row, OWN] + _noise(state) - state.fact[EXPECTED])
     for one in range(_ANSWERS + 1):
         squared = 0.0
         for axis in range(model.dimension):
