@@ -2,6 +2,7 @@
 
 All have one covariance, since the same readings reach each, only elsewhere in time; they differ in their means. Their
 log likelihoods, with forgetting, are a parabola about the true offset, whose vertex and bend are the offset and its SD.
+A hand at rest says nothing of it; the prior then mostly believes the stated latency, or each start would be uncertain.
 As a state of the large filter the offset would hang on an estimated velocity, and what is wrong with that (noise that
 is heavier or longer than thought) pulls it away; a likelihood is not pulled.
 
@@ -37,7 +38,8 @@ from fusion_core.samples import FloatArray
 STEP_S = 0.02  # between the offsets tried: less than the width of the likelihood of any motion but a thrust
 FIRST_S = -0.14  # the tracker is later than stated by so much, at the most; and up to 60 ms earlier
 _FORGET_S = 10.0  # as the bank does
-_PRIOR_SD_S = 0.02  # of a stated latency: trackers' own figures are right within a frame or so
+_EXACT, _EXACT_SD_S = 0.7, 0.005  # so often a stated latency is right as far as any latency is constant
+_PRIOR_SD_S = 0.02  # else it is right within a frame or so
 _LEAST_SD_S = 0.002  # the past is forgotten so far as to leave no more certainty: a latency wanders
 _RATE_SD, _RATE_PSD = 1000.0, 900.0  # of the acceleration error, as in the bank
 
@@ -162,11 +164,11 @@ def _correct(model: Model, state: State, apart: FloatArray, more: float, dt: flo
 
 @compiled
 def judge(state: State) -> None:
-    """The offset and its variance: the vertex and bend of the log weights about the highest, with the prior's."""
-    prior, best, highest = 1.0 / _PRIOR_SD_S**2, 0, -np.inf
+    """The offset and its variance: the parabola of the log weights about the highest, with the prior."""
+    broad, best, highest = 1.0 / _PRIOR_SD_S**2, 0, -np.inf
     for one in range(1, OFFSETS - 1):
         offset = FIRST_S + one * STEP_S
-        log_weight = state.clock_weight[one] - 0.5 * prior * offset * offset
+        log_weight = state.clock_weight[one] - 0.5 * broad * offset * offset
         if log_weight > highest:
             best, highest = one, log_weight
     before, here, after = state.clock_weight[best - 1], state.clock_weight[best], state.clock_weight[best + 1]
@@ -175,8 +177,23 @@ def judge(state: State) -> None:
     if bend > most:
         for one in range(OFFSETS):
             state.clock_weight[one] *= most / bend
-    slope = (after - before) / (2.0 * STEP_S)
     offset = FIRST_S + best * STEP_S
-    vertex = (bend * offset + slope) / (bend + prior)
-    state.fact[CLOCK_S] = min(max(vertex, offset - STEP_S), offset + STEP_S)
-    state.fact[CLOCK_VARIANCE] = 1.0 / (bend + prior)
+    _add_prior(state, bend, bend * offset + (after - before) / (2.0 * STEP_S))
+    state.fact[CLOCK_S] = min(max(state.fact[CLOCK_S], offset - STEP_S), offset + STEP_S)
+
+
+@compiled
+def _add_prior(state: State, bend: float, pull: float) -> None:
+    """Mean and variance of an offset o whose log likelihood is pull·o − bend·o²/2, by a prior of two normals.
+
+    With precision λ a normal gives it the mean pull / (bend + λ), the variance 1 / (bend + λ) and the evidence
+    √(λ / (bend + λ)) exp(pull² / (bend + λ) / 2); the two are mixed by their evidence.
+    """
+    exact, broad = 1.0 / _EXACT_SD_S**2, 1.0 / _PRIOR_SD_S**2
+    first, second = pull / (bend + exact), pull / (bend + broad)
+    log_odds = np.log(_EXACT / (1.0 - _EXACT)) + 0.5 * pull * (first - second)
+    log_odds += 0.5 * np.log(exact / (bend + exact) * (bend + broad) / broad)
+    share = 1.0 / (1.0 + np.exp(-log_odds))
+    state.fact[CLOCK_S] = share * first + (1.0 - share) * second
+    variance = share / (bend + exact) + (1.0 - share) / (bend + broad)
+    state.fact[CLOCK_VARIANCE] = variance + share * (1.0 - share) * (first - second) ** 2
