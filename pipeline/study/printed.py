@@ -257,6 +257,29 @@ class Parts(Frozen):
     total: Annotated[int, Field(ge=0)]
 
 
+class Peak(Frozen):
+    """The peak of the cross-correlation of two equally long signals, and the lag it is printed to stand for.
+
+    `at` is its place, from 1 on, in the sequence of `of` lags, in whose middle the lag is zero.
+    """
+
+    label: str
+    at: Count
+    of: Count
+    rate_hz: Number
+    lag_s: Number
+
+    @model_validator(mode="after")
+    def _lies_within(self) -> Peak:
+        if self.of % 2 == 0:
+            raise ValueError("of: two signals of n samples have 2 n − 1 lags, an odd number")
+        if self.at > self.of:
+            raise ValueError(f"at: should be at most {self.of}, the number of lags")
+        if self.rate_hz.value <= 0:
+            raise ValueError("rate_hz: should be more than 0")
+        return self
+
+
 class Family(Frozen):
     """Tests that belong together; `adjust` is how the publication judged them, from p values printed unadjusted."""
 
@@ -278,6 +301,7 @@ class Publication(Frozen):
     totals: tuple[Total, ...] = ()
     shares: tuple[Share, ...] = ()
     counts: tuple[Parts, ...] = ()
+    peaks: tuple[Peak, ...] = ()
     families: tuple[Family, ...] = ()
 
     @model_validator(mode="after")

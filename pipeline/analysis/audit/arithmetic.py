@@ -1,4 +1,4 @@
-"""Printed reductions, totals, percentages and counts against the figures they are computed from."""
+"""Printed reductions, totals, percentages, counts and lags against the figures they are computed from."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from operator import add
 
 from pipeline.analysis.audit.cells import printed_cell
 from pipeline.analysis.audit.finding import Finding, Statement
-from pipeline.study.printed import Measure, Parts, Publication, Reduction, Share, Total
+from pipeline.study.printed import Measure, Parts, Peak, Publication, Reduction, Share, Total
 from pipeline.study.rounded import Interval, Rounded
 
 _FIGURES = {"mean": "mean", "median": "median", "sd": "SD", "rmse": "RMSE", "participants": "mean"}
@@ -117,3 +117,15 @@ def count_finding(parts: Parts) -> Finding:
     printed = f"{' + '.join(map(str, parts.parts))} = {parts.total}"
     total = sum(parts.parts)
     return Statement("count", parts.label, printed).judge(total == parts.total, str(total), "the sum of the parts")
+
+
+def peak_finding(peak: Peak) -> Finding:
+    """The lag of a cross-correlation's peak: its distance from the middle, in samples."""
+    samples = peak.at - (peak.of + 1) // 2
+    rate = peak.rate_hz.interval
+    ends = (Fraction(samples) / rate.low, Fraction(samples) / rate.high)
+    possible = Interval(min(ends), max(ends))
+    statement = Statement("lag", peak.label, f"{peak.lag_s.text} s for the peak at {peak.at} of {peak.of}")
+    explanation = f"{samples} samples from the middle at {peak.rate_hz.text} Hz"
+    follows = f"{peak.lag_s.like(Fraction(samples) / peak.rate_hz.value)} s"
+    return statement.judge(possible.meets(peak.lag_s.interval), follows, explanation)

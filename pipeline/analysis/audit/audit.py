@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from pipeline.analysis.audit.arithmetic import count_finding, reduction_findings, share_finding, total_finding
+from pipeline.analysis.audit.arithmetic import (
+    count_finding,
+    peak_finding,
+    reduction_findings,
+    share_finding,
+    total_finding,
+)
 from pipeline.analysis.audit.cells import cell_findings
 from pipeline.analysis.audit.claims import claim_findings, family_findings
 from pipeline.analysis.audit.degrees_of_freedom import degrees_of_freedom_findings
@@ -21,7 +27,7 @@ from pipeline.study.printed import Measure, PrintedTest, Publication
 
 
 def audit(publication: Publication) -> list[Finding]:
-    """Findings in the file's order: measures, then totals, percentages, counts, claims and families.
+    """Findings in the file's order: measures, then totals, percentages, counts, lags, claims and families.
 
     The explanation of a contradiction says so where it would be none if figures were cut off instead of rounded.
     """
@@ -48,6 +54,7 @@ def _findings(publication: Publication) -> Iterator[Finding]:
     yield from (total_finding(publication, total) for total in publication.totals)
     yield from map(share_finding, publication.shares)
     yield from map(count_finding, publication.counts)
+    yield from map(peak_finding, publication.peaks)
     yield from claim_findings(publication)
     for family in publication.families:
         yield from family_findings(publication, family)
