@@ -1,4 +1,4 @@
-"""The event-time path over whole streams, compiled: what would have been shown at each time, or a fixed lag later."""
+"""The event-time path over whole streams, compiled: what would have been shown at each time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from fusion_core.compilation import compiled
 from fusion_core.kalman.event_history import JERK_PSD, History, Model, Readings
 from fusion_core.kalman.event_steps import begin, insert, oldest_needed, write_prediction
 from fusion_core.kalman.motion import position_step
-from fusion_core.kalman.smoothing_steps import smoothed_at
 from fusion_core.samples import FloatArray
 
 
@@ -62,12 +61,10 @@ def replay(
     times: FloatArray,
     history: History,
     history_s: float,
-    lag_s: float,
     constants: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (n, dimension) at rising `times`, from readings in order of arrival, the first of them a position.
 
-    With `lag_s` above 0 each estimate is of the position `lag_s` before its time, given all that has arrived.
     Unless they are empty, `constants` are filled with the mean (n, constants) and covariance (n, constants, constants)
     of the constants. `history` is working memory: it needs more rows than there are readings in any `history_s`.
     """
@@ -86,12 +83,10 @@ def replay(
                 begins = len(model.states) * dimension
                 constants[0][index] = history.mean[count - 1, begins:]
                 constants[1][index] = history.covariance[count - 1, begins:, begins:]
-            wanted, row = times[index] - lag_s, count - 1
-            if wanted < recent[row] and lag_s > 0.0:
-                if wanted >= recent[oldest]:
-                    mean[index], sd[index] = smoothed_at(model, history, oldest, count, wanted)
-                continue
-            noise = position_step(model.motion, max(wanted - recent[row], 0.0), adapted[row, JERK_PSD], of_position)
+            row = count - 1
+            noise = position_step(
+                model.motion, max(times[index] - recent[row], 0.0), adapted[row, JERK_PSD], of_position
+            )
             write_prediction(
                 model.states, model.axes, history.mean, history.covariance, row, of_position, noise, mean, sd, index
             )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fusion_core.estimator import unknown
-from fusion_core.kalman import event_replay, event_steps
+from fusion_core.kalman import event_replay, event_steps, smoothing_steps
 from fusion_core.kalman.event_history import History, Model, Readings, empty_history
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
@@ -142,9 +142,22 @@ class EventTime:
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray, lag_s: float = 0.0) -> Track:
         """The same steps in one compiled loop; with `lag_s` above 0, of the position `lag_s` before each time."""
+        if lag_s > 0.0:
+            return Track(times, *self._run_late(samples, times, lag_s))
         biases = len(self.model.constants)
         nothing = np.empty((0, biases)), np.empty((0, biases, biases))
-        return Track(times, *self._run(*self._readings(samples), times, lag_s, nothing))
+        return Track(times, *self._run(*self._readings(samples), times, nothing))
+
+    def _run_late(
+        self, samples: Mapping[str, Samples], times: FloatArray, lag_s: float
+    ) -> tuple[FloatArray, FloatArray]:
+        order = np.argsort(times, kind="stable")
+        mean, sd = np.full((2, len(times), self.dimension), np.nan)
+        rising, (readings, arrival) = np.asarray(times, dtype=np.float64)[order], self._readings(samples)
+        mean[order], sd[order] = smoothing_steps.replay_late(
+            self.model, readings, arrival, rising, self._room(readings), self.history_s, lag_s
+        )
+        return mean, sd
 
     def constants(
         self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray], times: FloatArray
@@ -156,7 +169,7 @@ class EventTime:
         """
         count = len(self.model.constants)
         mean, covariance = np.full((len(times), count), np.nan), np.full((len(times), count, count), np.nan)
-        self._run(*self._readings(samples, couplings), times, 0.0, (mean, covariance))
+        self._run(*self._readings(samples, couplings), times, (mean, covariance))
         return mean, covariance
 
     def _run(
@@ -164,7 +177,6 @@ class EventTime:
         readings: Readings,
         arrival: FloatArray,
         times: FloatArray,
-        lag_s: float,
         constants: tuple[FloatArray, FloatArray],
     ) -> tuple[FloatArray, FloatArray]:
         """Mean and SD (n, d) at `times`, in any order; fills `constants` unless they are empty (rising times only)."""
@@ -172,7 +184,7 @@ class EventTime:
         mean, sd = np.full((2, len(times), self.dimension), np.nan)
         room, rising = self._room(readings), np.asarray(times, dtype=np.float64)[order]
         mean[order], sd[order] = event_replay.replay(
-            self.model, readings, arrival, rising, room, self.history_s, lag_s, constants
+            self.model, readings, arrival, rising, room, self.history_s, constants
         )
         return mean, sd
 
