@@ -14,7 +14,7 @@ from tests.conftest import write_session
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.report.test_checks import SETTINGS, text_of
 from tests.pipeline.sessions.checks.hand import Hand, messages, session
-from tests.pipeline.sessions.checks.spoilt import IMU
+from tests.pipeline.sessions.checks.ways_to_spoil import IMU
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 

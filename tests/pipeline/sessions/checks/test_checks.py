@@ -19,14 +19,12 @@ from pipeline.study.settings import Study
 from tests.benchmarks.checks import drawn
 from tests.conftest import real
 from tests.pipeline.sessions.checks.hand import Hand, session
-from tests.pipeline.sessions.checks.spoilt import (
-    EVENT_FAULTS,
+from tests.pipeline.sessions.checks.spoilt import EVENT_FAULTS, FAULTS, Fault
+from tests.pipeline.sessions.checks.ways_to_spoil import (
     EVENTS,
-    FAULTS,
     IMU,
     REFERENCE,
     TRACKER,
-    Fault,
     change,
     from_other,
     later,
