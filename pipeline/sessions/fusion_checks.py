@@ -18,6 +18,8 @@ from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
 
 USED, WORSE = "accelerations used", "fusion against tracker"
+_ADAPTIVE = "fusion_adaptive"
+_ITS_SENSORS = ["acceleration", "position"]
 _LEFT_OUT = 0.01  # of the accelerations
 _PLAIN, _RED = 1.15, 1.5  # times the tracker's own error; between 1 and the first, an interval decides
 _BLOCK_S = 2.0  # errors of instants further apart than a reach have little to do with each other
@@ -85,20 +87,26 @@ def against_tracker(
             if not helping:
                 status = "red" if one.rmse_mm > _RED * one.alone_mm else "amber"
             how = f"{name} is {one.rmse_mm:.3g} mm off and its tracker alone {one.alone_mm:.3g}"
-            message = f"{how}: {_cause(name, helping)}"
+            message = f"{how}: {_cause(study, name, helping)}"
         expected = f"{one.alone_mm:.3g} mm" + (f", or {helping[0]} to be better" if message and helping else "")
         yield Finding(of(WORSE, name), status, f"{one.rmse_mm:.3g} mm", expected, message)
 
 
-def _cause(name: str, helping: Sequence[str]) -> str:
+def _cause(study: Study, name: str, helping: Sequence[str]) -> str:
     if helping:
         return (
             f"its settings do not suit the movement, for {helping[0]} does better than the tracker with the same"
             f" readings; change the settings of {name}, or show people {helping[0]}"
         )
+    finds_out = ""
+    if (
+        study.estimators[name].type != _ADAPTIVE
+        and sorted(one.kind for one in study.sensor_streams.values()) == _ITS_SENSORS
+    ):
+        finds_out = f", or an estimator of type {_ADAPTIVE}, which finds these out from the readings"
     return (
         f"noise, latency, gravity or orientation are not as stated, or the settings of {name} do not suit the movement;"
-        " put the other checks right, then try steadyhand fit"
+        f" put the other checks right, then try steadyhand fit{finds_out}"
     )
 
 
