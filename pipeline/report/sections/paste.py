@@ -103,7 +103,7 @@ def _references(material: Material) -> Table:
     return Table(
         "table-references",
         f"What was used and should be cited; {BIBLIOGRAPHY} beside this report holds the same entries for BibTeX.",
-        columns(("Reference", "Used for", "Key"), 3),
+        columns(("Publication", "Used for", "Key"), 3),
         tuple((reference.text, reference.used_for, reference.key) for reference in works),
         f"Packages without a publication of their own: {listing(packages)}." if packages else "",
     )

@@ -61,7 +61,8 @@ DEGENERATE = {
     "no_complete_case_n6": {
         **dict.fromkeys(
             ("rm_anova", "friedman", "t_paired", "wilcoxon", "bayes_t", "art_anova", "tost"),
-            "undefined: no participant is complete",
+            "undefined: each participant met one condition; write factors: {condition: between} and test: t_welch,"
+            " mann_whitney, anova_welch or kruskal",
         ),
         "mixed_model": (
             "undefined: nobody has values in two conditions, so the effect cannot be told from the participants"
