@@ -11,10 +11,13 @@ from pipeline.report.document.model import (
     Document,
     Figure,
     Folded,
+    Link,
     Pages,
     Paragraph,
     Section,
+    Strong,
     Table,
+    Text,
     ToPaste,
 )
 from pipeline.words.phrases import listing
@@ -29,7 +32,7 @@ def for_print(document: Document, names: Mapping[str, str]) -> Document:
     """The document without `Folded` and `Pages`; `names` has the number of every table and figure."""
     sections = [replace(section, blocks=tuple(_blocks(section.blocks, names))) for section in document.sections]
     folded = [block for section in document.sections for block in section.blocks if isinstance(block, Folded)]
-    tables = [block for fold in folded for block in fold.blocks if isinstance(block, Table)]
+    tables = [block for fold in folded for block in fold.blocks if isinstance(block, Table) and block.rows]
     if tables:
         sections.append(Section(_ANNEX, "Annex: the tables folded away above", tuple(_shortened(tables))))
     return replace(document, sections=tuple(sections))
@@ -38,11 +41,11 @@ def for_print(document: Document, names: Mapping[str, str]) -> Document:
 def _blocks(blocks: Sequence[Block], names: Mapping[str, str]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Folded):
-            yield Paragraph((f"{block.summary} {_places(block, names)}",))
+            yield Paragraph((f"{block.summary} {_places(block, names)}".rstrip(),))
         elif isinstance(block, ToPaste):
             # A link to a row of the report is of use on a page only, and belongs to no paper.
-            texts = (tuple(part for part in text if not isinstance(part, CrossReference)) for text in block.texts)
-            yield ToPaste(block.label, tuple(texts)[:_TEXTS_MAX])
+            texts = tuple(_without_links(text) for text in block.texts[:_TEXTS_MAX])
+            yield ToPaste(block.label, texts)
             if len(block.texts) > _TEXTS_MAX:
                 yield Paragraph(
                     (f"The first {_TEXTS_MAX} of {len(block.texts)} paragraphs; report.html has them all.",)
@@ -53,13 +56,25 @@ def _blocks(blocks: Sequence[Block], names: Mapping[str, str]) -> Iterator[Block
             yield block
 
 
+def _without_links(text: Text) -> Text:
+    """The text without its links to rows and the spaces that set these off."""
+    kept: list[str | Strong | Link] = []
+    for part in text:
+        if isinstance(part, CrossReference):
+            if kept and isinstance(kept[-1], str):
+                kept[-1] = kept[-1].rstrip(" ")
+        else:
+            kept.append(part)
+    return tuple(kept)
+
+
 def _places(block: Folded, names: Mapping[str, str]) -> str:
     """Where what is folded is to be found."""
-    tables = [names[one.id] for one in block.blocks if isinstance(one, Table)]
+    tables = [names[one.id] for one in block.blocks if isinstance(one, Table) and one.rows]
     figures = [f"figures/{one.file}" for one in block.blocks if isinstance(one, Figure)]
     places = [f"{listing(tables)} in the annex"] if tables else []
     places += [f"{listing(figures)} in report.html"] if figures else []
-    return f"({'; '.join(places)})"
+    return f"({'; '.join(places)})" if places else ""
 
 
 def _shortened(tables: Sequence[Table]) -> Iterator[Table]:
@@ -69,8 +84,7 @@ def _shortened(tables: Sequence[Table]) -> Iterator[Table]:
         room[table.id] = min(len(table.rows), left // (len(tables) - place))
         left -= room[table.id]
     for table in tables:
-        if table.rows:
-            yield _first_rows(table, room[table.id])
+        yield _first_rows(table, room[table.id])
 
 
 def _first_rows(table: Table, rows: int) -> Table:

@@ -36,6 +36,7 @@ function makeSortable(table) {
       const next = { ascending: "descending", descending: null }[heading.getAttribute("aria-sort")];
       const way = next === undefined ? "ascending" : next;
       headings.forEach((other) => other.removeAttribute("aria-sort"));
+      table.classList.toggle("sorted", Boolean(way));
       if (way) heading.setAttribute("aria-sort", way);
       const sign = { ascending: 1, descending: -1 }[way] || 0;
       table.tBodies[0].append(...sorted(rows, column, heading.classList.contains("number"), sign));
@@ -47,7 +48,8 @@ function makeSortable(table) {
 function wordsToPaste(block) {
   const copy = block.querySelector(".words").cloneNode(true);
   copy.querySelectorAll("a[href^='#']").forEach((link) => link.remove());
-  const texts = [...copy.querySelectorAll("p")].map((text) => text.textContent.replace(/\s+/g, " ").trim());
+  const tidy = (text) => text.replace(/[ \n\t]+/g, " ").replace(/ ([,.;])/g, "$1").trim(); // keeps spaces of no break
+  const texts = [...copy.querySelectorAll("p")].map((text) => tidy(text.textContent));
   return texts.join("\n\n");
 }
 
@@ -92,5 +94,22 @@ function followSections(links) {
 
 document.querySelectorAll("main table").forEach(makeSortable);
 document.querySelectorAll(".paste").forEach(makeCopyable);
-addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((one) => { one.open = true; }));
+// A link may lead into what is folded away, which not every browser opens by itself.
+function openAround(hash) {
+  const target = hash && document.getElementById(decodeURIComponent(hash.slice(1)));
+  const fold = target && target.closest("details:not([open])");
+  if (!fold) return;
+  fold.open = true;
+  target.scrollIntoView();
+}
+
+// What is folded away is printed, and folded again afterwards.
+let opened = [];
+addEventListener("beforeprint", () => {
+  opened = [...document.querySelectorAll("details:not([open])")];
+  opened.forEach((one) => { one.open = true; });
+});
+addEventListener("afterprint", () => opened.splice(0).forEach((one) => { one.open = false; }));
+addEventListener("hashchange", () => openAround(location.hash));
+openAround(location.hash);
 followSections([...document.querySelectorAll("#contents a")]);

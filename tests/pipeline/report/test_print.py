@@ -19,6 +19,7 @@ from pipeline.report.document.model import (
     ToPaste,
     columns,
     numbered,
+    plain,
 )
 
 
@@ -52,7 +53,22 @@ def test_without_folds_there_is_no_annex() -> None:
 
 def test_words_to_paste_have_no_links_to_rows() -> None:
     ((section,),) = [printed(ToPaste("Results", (("It differed ", CrossReference("[row]", "comparison-1"), "."),)))]
-    assert section.blocks == (ToPaste("Results", (("It differed ", "."),)),)
+    assert section.blocks == (ToPaste("Results", (("It differed", "."),)),)
+
+
+def test_no_space_is_left_before_a_comma_where_a_link_was() -> None:
+    link = CrossReference("[row]", "comparison-1")
+    ((section,),) = [
+        printed(ToPaste("Results", (("Not a and b (n = 10)", " ", link, ", nor c (n = 9)", " ", link, "."),)))
+    ]
+    (words,) = section.blocks
+    assert isinstance(words, ToPaste)
+    assert plain(words.texts[0]) == "Not a and b (n = 10), nor c (n = 9)."
+
+
+def test_no_line_promises_an_empty_table() -> None:
+    (section,) = printed(Folded("Remarks: none.", (a_table("remarks", 0),)))
+    assert section.blocks == (Paragraph(("Remarks: none.",)),)
 
 
 def test_a_long_table_and_many_words_are_cut_in_print_and_say_so() -> None:
