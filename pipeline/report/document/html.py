@@ -12,7 +12,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
-from pipeline.report.document.model import CrossReference, Document, Figure, Link, Strong, numbered, unfolded
+from pipeline.report.document.model import CrossReference, Document, Figure, Link, Strong, numbered, repeats, unfolded
 from pipeline.report.document.pictures import pictures
 from pipeline.report.document.typography import Run, Style, typeset, typeset_heading
 
@@ -85,6 +85,7 @@ def _environment() -> jinja2.Environment:
     environment.tests["link"] = lambda part: isinstance(part, Link)
     environment.tests["cross_reference"] = lambda part: isinstance(part, CrossReference)
     environment.filters["kind"] = lambda block: type(block).__name__
+    environment.filters["repeats"] = lambda table: tuple(repeats(table))
     environment.filters["typeset"] = lambda text: _marked(typeset(text))
     environment.filters["typeset_heading"] = lambda text: _marked(typeset_heading(text))
     return environment

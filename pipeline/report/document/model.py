@@ -98,6 +98,14 @@ class Table:
     anchors: tuple[str, ...] = ()
 
 
+def repeats(table: Table) -> Iterator[bool]:
+    """Of each row, whether its first cell says the same as the one above, and may be shown quietly."""
+    above = None
+    for row in table.rows:
+        yield len(table.columns) > 1 and row[0] == above
+        above = row[0]
+
+
 @dataclass(frozen=True)
 class Figure:
     """A picture by its file name among the report's figures, with what to see in it and a text alternative."""

@@ -24,12 +24,18 @@ from pipeline.report.document.model import (
     Text,
     ToPaste,
     numbered,
+    repeats,
 )
 from pipeline.report.document.typography import Run, typeset, typeset_heading
 from pipeline.report.glyphs import font_folder, showable
 
 _HERE = Path(__file__).parent
 _UNBROKEN = 24  # characters: a longer word in a table may break after punctuation
+_LINE = 148  # digits of the smallest type in a table's line
+_TEXT_MAX = 100  # characters that a column of text is wide: else its neighbours are left a word a line
+_PADDING = 2.5  # characters between columns
+_NARROW = frozenset(" .,;:'|!ijl[]()\u00a0\u2009\u202f_")
+_BOLD = 1.2  # the width of bold letters in that of numbers
 _HEAD = 70  # characters of the title that fit at the head of a page beside the section's
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
@@ -122,6 +128,7 @@ def _table(table: Table) -> dict[str, Any]:
             {"title": _runs(typeset_heading(column.title)), "numeric": column.numeric} for column in table.columns
         ],
         "rows": [[_runs(typeset(cell)) for cell in row] for row in table.rows],
+        "again": list(repeats(table)),
         "note": _runs(typeset(table.note)) if table.note else [],
         "anchors": list(table.anchors),
         "shares": _shares(table),
@@ -134,17 +141,37 @@ def _runs(runs: Iterable[Run]) -> list[list[str]]:
 
 
 def _shares(table: Table) -> list[float]:
-    """Relative widths of the columns, from their longest cells: text may wrap, but not within numbers or words."""
-    widths = []
-    for index, column in enumerate(table.columns):
-        texts = [row[index] for row in table.rows]
-        cells = [len(text) for text in texts]
-        longest, heading = max(cells, default=1), _longest_word([column.title])
-        typical = sum(cells) / max(len(cells), 1)
-        width = longest if column.numeric else min(longest, max(12, 1.6 * typical))
-        widths.append(float(max(width, heading, min(_longest_word(texts), _UNBROKEN)) + 3))
-    return widths
+    """Relative widths of the columns, about the characters they hold: text may wrap, but not within numbers or words.
+
+    Where all columns are wider than a line of the smallest type, text wraps sooner, so that numbers keep their width.
+    """
+    widest = [_widest(table, index) for index in range(len(table.columns))]
+    least = [_least(table, index) for index in range(len(table.columns))]
+    slack = sum(widest) - sum(least)
+    too_wide = max(sum(widest) - _LINE, 0.0)
+    given_up = min(too_wide / slack, 1.0) if slack else 0.0
+    return [wide - given_up * (wide - narrow) for wide, narrow in zip(widest, least, strict=True)]
 
 
-def _longest_word(texts: Sequence[str]) -> int:
-    return max((len(word) for text in texts for word in text.split()), default=1)
+def _widest(table: Table, index: int) -> float:
+    """A column's width where there is room: numbers whole, text in few lines."""
+    cells = [_width(row[index]) for row in table.rows]
+    longest, typical = max(cells, default=1), sum(cells) / max(len(cells), 1)
+    width = longest if table.columns[index].numeric else min(longest, max(12, 1.6 * typical), _TEXT_MAX)
+    return max(float(width + _PADDING), _least(table, index))
+
+
+def _least(table: Table, index: int) -> float:
+    """The width below which a number or a word would be broken, or a heading, which is bold, overprint the next."""
+    texts, column = [row[index] for row in table.rows], table.columns[index]
+    whole = max(map(_width, texts), default=1) if column.numeric else min(_longest_word(texts), _UNBROKEN)
+    return max(whole, _BOLD * _longest_word([column.title])) + _PADDING
+
+
+def _width(text: str) -> float:
+    """A text's width in that of a digit: spaces and marks are narrower."""
+    return sum(0.6 if character in _NARROW else 1.0 for character in text)
+
+
+def _longest_word(texts: Sequence[str]) -> float:
+    return max((_width(word) for text in texts for word in text.split()), default=1.0)

@@ -31,7 +31,9 @@ def section(material: Material) -> Section | None:
     if not rows:
         return None
     tests = list(dict.fromkeys(row["test"] for row in rows))
-    shown_columns = [(title, cell) for title, cell in _COLUMNS if any(cell(row) not in (NO_VALUE, "") for row in rows)]
+    shown_columns = [
+        (title, cell) for title, cell in _columns(rows) if any(cell(row) not in (NO_VALUE, "") for row in rows)
+    ]
     table = Table(
         "table-comparisons",
         f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
@@ -128,6 +130,15 @@ def _statistic(row: Row) -> str:
     return f"{statistic_name(row)} = {statistic_value(row)}" if row["status"] == "ok" else str(row["status"])
 
 
+def _columns(rows: Sequence[Row]) -> list[tuple[str, Callable[[Row], str]]]:
+    """The table's columns; where all rows are adjusted in one way, the heading says which, once."""
+    methods = {adjustment_label(row["adjust"]) for row in rows if row["p_adjusted"] is not None}
+    if len(methods) != 1:
+        return list(_COLUMNS)
+    one = (f"p ({methods.pop()})", lambda row: p_value(row["p_adjusted"]))
+    return [one if title == _ADJUSTED else (title, cell) for title, cell in _COLUMNS]
+
+
 def _adjusted_p(row: Row) -> str:
     adjusted = row["p_adjusted"]
     return NO_VALUE if adjusted is None else f"{p_value(adjusted)} ({adjustment_label(row['adjust'])})"
@@ -151,6 +162,9 @@ ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
 )
 """Columns of the bootstrap and permutation estimates that an entry of study.yaml may ask for beside its test."""
 
+_EMPTY = (NO_VALUE, "")
+_ADJUSTED = "p adjusted"
+
 _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Measure", lambda row: measure_label(row["measure"])),
     ("Test", test_label),
@@ -160,7 +174,7 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("df", degrees_of_freedom),
     ("p", lambda row: p_value(row["p"])),
     ("p corrected", _corrected_p),
-    ("p adjusted", _adjusted_p),
+    (_ADJUSTED, _adjusted_p),
     ("Effect size [95 % interval]", effect_size),
     ("Mean difference", lambda row: number(row["mean_difference"])),
     *ESTIMATES,

@@ -80,9 +80,9 @@ def _design_check(material: Material) -> list[Block]:
         note if any(row["expected"] == "none" for row in rows) else "",
     )
     remarks = [
-        Paragraph((f"{cell[0]}{f' ({cell[1]})' if cell[1] else ''}: {cell[2]}. {cell[4]}",))
+        Paragraph((f"{cell[0]}{f' ({cell[1]})' if cell[1] else ''}: {cell[2]}; {cell[4]}.",))
         for cell in cells
         if cell[4]
     ]
-    summary = f"Design check: all {counted(len(rows), 'figure')} of it"
+    summary = f"The whole design check: {counted(len(rows), 'row')}"
     return [Paragraph((Strong("Design: "), text)), *remarks, Folded(summary, (table,))]

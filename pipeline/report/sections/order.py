@@ -27,6 +27,16 @@ from pipeline.report.sections import (
 )
 from pipeline.report.sections.material import Material
 
+
+def _paste_after_people(material: Material) -> Section | None:
+    return paste.section(material) if material.rows("comparisons") else None
+
+
+def _paste_after_accuracy(material: Material) -> Section | None:
+    """Where nothing was compared, accuracy is the result, and comes first."""
+    return None if material.rows("comparisons") else paste.section(material)
+
+
 SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     # The answer, and the results it rests on.
     overview.section,
@@ -37,12 +47,13 @@ SECTIONS: tuple[Callable[[Material], Section | None], ...] = (
     practice.section,
     fitts_law.section,
     comparisons.section,
-    paste.section,
+    _paste_after_people,
     # How they came about: who met what when, what was planned, and how well the hand was followed.
     design.section,
     preregistration.section,
     accuracy.section,
     paths.section,
+    _paste_after_accuracy,
     simulation.section,
     printed.section,
     # What most readers pass over, unless something is wrong.
