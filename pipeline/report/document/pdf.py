@@ -170,7 +170,7 @@ def _least(table: Table, index: int) -> float:
 
 def _width(text: str) -> float:
     """A text's width in that of a digit: spaces and marks are narrower."""
-    return sum(0.6 if character in _NARROW else 1.0 for character in text)
+    return sum(0.55 if character in _NARROW else 1.0 for character in text)
 
 
 def _longest_word(texts: Sequence[str]) -> float:

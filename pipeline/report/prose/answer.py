@@ -1,7 +1,7 @@
 """The answer of a study: by how much each measure differs between the pairs of conditions in question.
 
 The first page and the console print these lines, so that both say the same. A line is a row of `comparisons`, and of
-`descriptives` for its means; nothing is computed here but the root of a mean squared error.
+`descriptives` for its means; nothing is computed here but the root of a mean squared error, and a percentage.
 """
 
 from __future__ import annotations
@@ -70,6 +70,28 @@ def answer(results: Mapping[str, Any]) -> list[Line]:
     ]
 
 
+def with_difference(row: Row, first: Row | None) -> Row:
+    """The row with the difference that its test has among its details only, as a mixed ANOVA of two conditions has.
+
+    That one is averaged over the groups. Its share of the `first` condition's mean, a row of `descriptives`, is known
+    where the groups are equally large, and that mean is their average too.
+    """
+    details = row["details"] or {}
+    if row["mean_difference"] is not None or row["contrast"] is not None or details.get("difference") is None:
+        return row
+    difference, sizes = details["difference"], details.get("n_groups", [])
+    is_average = first is not None and first["n"] == row["n"] and len(set(sizes)) <= 1
+    mean = first["mean"] if first is not None and is_average else None
+    positive = mean is not None and mean > 0 and mean - difference > 0
+    return {**row, "mean_difference": difference, "reduction": difference / mean if positive else None}
+
+
+def averages_unequal_groups(row: Row) -> bool:
+    """Is the row's difference another than that of all participants' means?"""
+    details = row["details"] or {}
+    return "difference" in details and len(set(details.get("n_groups", []))) > 1
+
+
 def rows_beside_the_answer(results: Mapping[str, Any]) -> list[Row]:
     """The rows of `comparisons` that say something and have no line in the answer.
 
@@ -103,12 +125,14 @@ def lines_for_first_page(lines: Sequence[Line], most: int = LINES_MAX) -> list[L
 
 def notes(results: Mapping[str, Any]) -> str:
     """The note below the table: which way differences go, how many participants, which p is shown, and its level."""
-    rows = [row for row in results["comparisons"] if row["status"] == OK]
+    study = results["study"]
+    pairs = _pairs_in_question(results["comparisons"], study["conditions"], study["question"])
+    rows = [row for row, _ in pairs if row["status"] == OK]
     counts = sorted({row["n"] for row in rows})
     people = "" if not counts else f" n = {counts[0]}" + (f" to {counts[-1]}" if len(counts) > 1 else "") + "."
     adjusted = any(row["p_adjusted"] is not None for row in rows)
     kind = "p: adjusted over its family where one is stated" if adjusted else "p: not adjusted"
-    level = f"level of significance {100 * results['study']['alpha']:g} %"
+    level = f"level of significance {100 * study['alpha']:g} %"
     has_ratios = any(row["effect_size_name"] in _RATIOS for row in rows)
     ratios = "; ratios: the first named over the other" if has_ratios else ""
     return f"Differences and effect sizes: the first named minus the other{ratios}.{people} {kind}; {level}."
@@ -145,6 +169,7 @@ def _line(
     row: Row, pair: tuple[str, str], described: Mapping[tuple[str, str], Row], alpha: float, names_test: bool
 ) -> Line:
     first, second = pair
+    row = with_difference(row, described.get((row["measure"], first)))
     name = measure_label(row["measure"]) + (f", {test_label(row)}" if names_test else "")
     compared = f"{second} {MINUS} {first}"
     means = _means(row, described.get((row["measure"], first)), described.get((row["measure"], second)))
@@ -172,13 +197,13 @@ def _of_second_minus_first(row: Row) -> Row:
 def _means(row: Row, one: Row | None, other: Row | None) -> str:
     """`43.2 → 31.4 s`; of squared errors the roots, in millimetres or pixels: `104 → 79 px (root)`.
 
-    No means where they are of other people than the test, or where a model estimates the difference from unequal
-    numbers of rows: they could contradict the difference beside them.
+    No means where they are of other people than the test, where a model estimates the difference from unequal
+    numbers of rows, or where groups of unequal size are averaged: they could contradict the difference beside them.
     """
     if one is None or other is None or row["effect_size_name"] == "estimate":
         return NO_VALUE
     tested = [one["n"] + other["n"]] if TESTS[row["test"]].design == "between" else [one["n"], other["n"]]
-    if any(n != row["n"] for n in tested):
+    if any(n != row["n"] for n in tested) or averages_unequal_groups(row):
         return NO_VALUE
     first, second, unit = one["mean"], other["mean"], measure(row["measure"]).unit
     if unit.endswith("²") and first >= 0 and second >= 0:

@@ -23,7 +23,14 @@ from pipeline.report.document.model import (
     columns,
 )
 from pipeline.report.figures.rainclouds import interval_words, one_condition_each
-from pipeline.report.prose.answer import HEADER, answer, lines_for_first_page, notes
+from pipeline.report.prose.answer import (
+    HEADER,
+    answer,
+    averages_unequal_groups,
+    lines_for_first_page,
+    notes,
+    with_difference,
+)
 from pipeline.report.sections import overview_estimators, preregistration, traces
 from pipeline.report.sections.cautions import cautions
 from pipeline.report.sections.material import ORIGINS, Material
@@ -113,12 +120,13 @@ def _sentence(material: Material, row: Row) -> str:
     if row["mean_difference"] is not None and set(study.conditions) <= set(described):
         first, second = study.conditions
         change = f"{amount_of_change(row)} {direction(row)}" if row["mean_difference"] else "the same"
-        means = f"on average {_mean(described[second])} with {second} against {_mean(described[first])} with {first}"
-        if not _of_those_tested(row, (described[first], described[second])):
-            means = f"a mean difference of {difference_phrase(row)}"
+        means = f": on average {_mean(described[second])} with {second} against {_mean(described[first])} with {first}"
+        if averages_unequal_groups(row) or not _of_those_tested(row, (described[first], described[second])):
+            said = difference_phrase(row) == amount_of_change(row)
+            means = "" if said else f": a mean difference of {difference_phrase(row)}"
         sure = "" if significant else ", a difference that is not statistically significant"
         than = "than" if row["mean_difference"] else "as"
-        return f"{label} {was(label)} {change} with {second} {than} with {first}{sure}: {means} ({evidence})."
+        return f"{label} {was(label)} {change} with {second} {than} with {first}{sure}{means} ({evidence})."
     if ratio_to_first(row):
         first, second = study.conditions
         sure = "" if significant else ", a difference that is not statistically significant"
@@ -222,6 +230,9 @@ def _headline_rows(material: Material) -> list[Row]:
     rows = [
         row for row in _of_conditions(material) if "/" not in row["measure"] and TESTS[row["test"]].tests_difference
     ]
+    baseline = material.study.conditions[0]
+    means = {row["measure"]: row for row in material.rows("descriptives") if row["condition"] == baseline}
+    rows = [with_difference(row, means.get(row["measure"])) for row in rows]
     first = {row["measure"]: row for row in reversed(rows)}
     known = headlines(first)
     in_order = dict.fromkeys(row["measure"] for row in rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.report.prose.answer import answer, notes
@@ -82,6 +83,35 @@ def test_a_difference_that_depends_on_the_group_is_a_caution(steadyhand: Steadyh
     assert "Participants were compared between the levels of group." in page
     assert "follow-up, paired t test, t(4)" in page
     assert "follow-up, Welch's t test, t(" in page
+
+
+@pytest.mark.parametrize("of_new", [5, 4])
+def test_a_mixed_anova_of_two_conditions_answers_by_their_difference(
+    steadyhand: Steadyhand, tmp_path: Path, of_new: int
+) -> None:
+    """It is averaged over the groups, so that of unequal ones the means of everybody are another difference."""
+    a = np.array([20.0, 21, 19, 22, 20.5, 14, 15, 13.5, 14.2, 15.1])
+    b = np.array([15.0, 16.5, 14.2, 16.4, 15.9, 14.1, 14.8, 13.6, 14.5, 15.0])
+    people = "participant,group\n" + "".join(f"P{at:02},{'new' if at <= of_new else 'old'}\n" for at in range(1, 11))
+    folder = study(
+        tmp_path / "s",
+        {"completion_time_s": {"A": a.tolist(), "B": b.tolist()}},
+        ["measure: completion_time_s, test: mixed_anova"],
+        "factors: {group: between}\n",
+        people=people,
+    )
+    page = read(steadyhand, folder)
+    (line,) = answer(steadyhand.results())
+    amount = ((b - a)[:of_new].mean() + (b - a)[of_new:].mean()) / 2
+    assert line.difference.startswith(f"−{-amount:.2f} s [")
+    assert "n = 10." in notes(steadyhand.results())  # of the pair, not of its follow-ups within a group
+    share = f"{100 * (1 - b.mean() / a.mean()):.1f} %"
+    if of_new == 5:
+        assert line.means == f"{a.mean():.2f} → {b.mean():.2f} s"
+        assert f"Completion time was {share} lower (better) with B than with A: on average" in page
+    else:
+        assert line.means == "–"
+        assert f"Completion time was {-amount:.2f} s lower (better) with B than with A (p" in page
 
 
 @pytest.mark.parametrize(
