@@ -174,4 +174,6 @@ def _width(text: str) -> float:
 
 
 def _longest_word(texts: Sequence[str]) -> float:
-    return max((_width(word) for text in texts for word in text.split()), default=1.0)
+    """The widest of what typesetting keeps on one line."""
+    lines = ("".join(run.text for run in typeset(text)) for text in texts)
+    return max((_width(word) for line in lines for word in line.split(" ")), default=1.0)

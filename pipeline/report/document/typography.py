@@ -22,6 +22,7 @@ _RELATION = re.compile(
     rf"(?<![\w-])((?:{_LETTER}|[χηωε]²?[Gp]?|df|BF₁₀|[dr]_[a-z]+)₊?(?:{_FREEDOM})?) ([=<>≥≤]) (?=[−.\d])"
 )
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|mm|cm|px|ms|s|Hz)(?!\w))")
+_INTERVAL = re.compile(r"\[[−+]?[\d.][^][, ]*, [−+]?[\d.][^][, ]*\]")  # both bounds stay on one line
 _SYMBOL = re.compile(
     rf"(?<![\w-])(?P<letter>{_LETTER})(?=₊?{_FREEDOM}[ {_NO_BREAK}][=<>]|₊?{_NO_BREAK}[=<>≥≤])"
     r"|(?<![\w-])(?P<effect>[dr])_(?P<of>rb|rm|av|z|s)(?!\w)"
@@ -42,6 +43,7 @@ class Run:
 def typeset(text: str) -> tuple[Run, ...]:
     """A text in runs. Joined they are the text, but for the underscores of subscripts and for spaces of no break."""
     kept_together = _UNIT.sub(_NO_BREAK, _RELATION.sub(rf"\1{_NO_BREAK}\2{_NO_BREAK}", text))
+    kept_together = _INTERVAL.sub(lambda bounds: bounds[0].replace(" ", _NO_BREAK), kept_together)
     return tuple(run for run in _runs(kept_together) if run.text)
 
 

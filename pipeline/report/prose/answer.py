@@ -70,7 +70,7 @@ def answer(results: Mapping[str, Any]) -> list[Line]:
     ]
 
 
-def with_difference(row: Row, first: Row | None) -> Row:
+def with_difference(row: Row, first: Row | None) -> dict[str, Any]:
     """The row with the difference that its test has among its details only, as a mixed ANOVA of two conditions has.
 
     That one is averaged over the groups. Its share of the `first` condition's mean, a row of `descriptives`, is known
@@ -78,7 +78,7 @@ def with_difference(row: Row, first: Row | None) -> Row:
     """
     details = row["details"] or {}
     if row["mean_difference"] is not None or row["contrast"] is not None or details.get("difference") is None:
-        return row
+        return dict(row)
     difference, sizes = details["difference"], details.get("n_groups", [])
     is_average = first is not None and first["n"] == row["n"] and len(set(sizes)) <= 1
     mean = first["mean"] if first is not None and is_average else None

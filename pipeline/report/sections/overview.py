@@ -268,7 +268,7 @@ def _further_results(material: Material) -> list[Text]:
     the estimators.
     """
     answers: list[Text] = []
-    for row in _headline_rows(material):
+    for row in _headline_rows(material)[_SENTENCES:]:  # the first ones are said at the top of the page
         if row["contrast"] is None and row["mean_difference"] is None and not ratio_to_first(row):
             text = brief_sentence(row)
             if row["status"] == "ok":

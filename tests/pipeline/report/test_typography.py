@@ -22,7 +22,7 @@ def marked(text: str) -> str:
         ("t(11) = 2.52, p = .0286, n = 12", "*t*(11)~=~2.52, *p*~=~.0286, *n*~=~12"),
         ("F(1.32, 14.6) = 35.06, p < .0001", "*F*(1.32, 14.6)~=~35.06, *p*~<~.0001"),
         ("kinect: M = 42.54, SD = 8.79", "kinect: *M*~=~42.54, *SD*~=~8.79"),
-        ("d_z = −0.73 [−1.35, −0.07]", "*d*_[z]~=~−0.73 [−1.35, −0.07]"),
+        ("d_z = −0.73 [−1.35, −0.07]", "*d*_[z]~=~−0.73 [−1.35,~−0.07]"),
         ("r_rb = .82, η²G = .10, η²p = .34", "*r*_[rb]~=~.82, *η*²_[G]~=~.10, *η*²_[p]~=~.34"),
         ("W₊ = 59, Greenhouse-Geisser ε = .662", "*W*₊~=~59, Greenhouse-Geisser ε~=~.662"),
         ("lower by 6.10 s, 26.7 %", "lower by 6.10~s, 26.7~%"),
@@ -50,3 +50,10 @@ def test_only_underscores_and_spaces_change(text: str) -> None:
         return words.replace("_", "").replace("\u00a0", " ")
 
     assert bare("".join(run.text for run in typeset(text))) == bare(text)
+
+
+def test_an_interval_stays_on_one_line_and_a_list_in_brackets_does_not() -> None:
+    (run,) = typeset("it was 1.54 [−0.68, 2.38] and 47 [27\u2009727, 66\u2009538]")
+    assert run.text == "it was 1.54 [−0.68,\u00a02.38] and 47 [27\u2009727,\u00a066\u2009538]"
+    (run,) = typeset("conditions: [kinect, fusion]")
+    assert "\u00a0" not in run.text
