@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +23,7 @@ from pipeline.statistics.kruskal import kruskal_pairs, kruskal_wallis
 from pipeline.statistics.mann_whitney import mann_whitney
 from pipeline.statistics.welch import anova_welch, games_howell
 from pipeline.statistics.wilcoxon import wilcoxon
-from pipeline.study.comparison import Comparison
+from pipeline.study.comparison import Comparison, matching_measures
 from pipeline.study.csv_tables import read_participants
 from pipeline.study.measures import has_total, measure_order
 from pipeline.study.settings import Study
@@ -101,12 +100,8 @@ def all_requests(
 
 
 def _matching(wanted: str, known: Sequence[str]) -> list[str]:
-    """The measures an entry names; `*` stands for scales, never for a total."""
-    if "*" in wanted:
-        pattern = ".*".join(re.escape(piece) for piece in wanted.split("*"))
-        matching = [name for name in known if re.fullmatch(pattern, name) and not name.endswith("/total")]
-    else:
-        matching = [name for name in known if name == wanted]
+    """The measures an entry names; PipelineError where there are none."""
+    matching = matching_measures(wanted, known)
     if not matching and wanted.endswith("/total"):
         matching = _only_score(wanted.removesuffix("total"), known)
     if not matching:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -130,3 +132,10 @@ class Comparison(Frozen):
     def period_is_slope(self) -> bool:
         """Whether the period is a number, with the same effect from each period to the next, rather than a factor."""
         return _PERIOD_AS_FACTOR not in self.fixed
+
+
+def matching_measures(wanted: str, known: Iterable[str]) -> list[str]:
+    """The measures that a name or pattern of an entry stands for; `*` stands for anything, but never for a total."""
+    expression = re.compile(".*".join(re.escape(piece) for piece in wanted.split("*")))
+    is_pattern = "*" in wanted
+    return [name for name in known if expression.fullmatch(name) and not (is_pattern and name.endswith("/total"))]

@@ -29,7 +29,7 @@ def measure_as_subject(name: str) -> str:
 def was(label: str) -> str:
     """The verb after a measure: `time was`, `errors were`."""
     last = label.partition(" per ")[0].rpartition(" ")[2].lower()
-    return "were" if last.endswith("s") and not last.endswith(("ss", "us", "is")) else "was"
+    return "were" if last.endswith("s") and not last.endswith(("ss", "us", "is", "bias")) else "was"
 
 
 def unit_of(name: str) -> str:

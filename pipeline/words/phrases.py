@@ -16,6 +16,16 @@ def counted(count: int, noun: str, plural: str | None = None) -> str:
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
+def all_of(count: int, noun: str) -> str:
+    """`The 1 comparison`, `All 3 comparisons`."""
+    return f"{'The' if count == 1 else 'All'} {counted(count, noun)}"
+
+
+def there_were(facts: Mapping[str, Any], who: str = "") -> str:
+    """`There was 1 participant`, `There were 12 participants`; `who` tells of them."""
+    return f"There {'was' if facts['n'] == 1 else 'were'} {participants_counted(facts, who)}"
+
+
 def capitalized(sentence: str) -> str:
     """The sentence with a capital letter first. The rest is left alone: names such as NASA-TLX keep their capitals."""
     return sentence[:1].upper() + sentence[1:]

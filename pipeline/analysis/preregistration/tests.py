@@ -6,11 +6,10 @@ measure stands in; measures of which the same is to be said share a row again.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from pipeline.analysis.preregistration.verdicts import AS_PLANNED, DEVIATION, EXPLORATORY, NOT_PLANNED, as_text, point
-from pipeline.study.comparison import Comparison
+from pipeline.study.comparison import Comparison, matching_measures
 from pipeline.study.preregistration import Registered
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
@@ -33,9 +32,7 @@ def entries_of(comparisons: Iterable[Comparison], known: Sequence[str]) -> dict[
 
 def measures_of(pattern: str, known: Sequence[str]) -> list[str]:
     """The measures a pattern stands for, never a total; itself where the data have none."""
-    expression = ".*".join(re.escape(piece) for piece in pattern.split("*"))
-    found = [name for name in known if re.fullmatch(expression, name) and not name.endswith("/total")]
-    return (found if "*" in pattern else []) or [pattern]
+    return matching_measures(pattern, known) or [pattern]
 
 
 _Pair = tuple[str, Comparison | None, Comparison | None]

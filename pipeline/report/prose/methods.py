@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.sessions.estimators import build_estimator
 from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON
 from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES
-from pipeline.study.comparison import Comparison
+from pipeline.study.comparison import Comparison, matching_measures
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
@@ -17,12 +17,14 @@ from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
 from pipeline.words.numbers import number
-from pipeline.words.phrases import counted, listing, participants_counted
+from pipeline.words.phrases import counted, listing, there_were
 
 _ORIGINS = {
     "simulated": "The data were simulated by a model, not measured with people.",
     "reconstructed": "The data were reconstructed to fit printed figures; they are not anybody's measurements.",
 }
+_NAMED_MAX = 8
+"""More measures than these under one pattern are counted, not named."""
 
 
 def methods(study: Study, results: Mapping[str, Any], versions: Mapping[str, str]) -> str:
@@ -47,9 +49,9 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     if study.data_origin in _ORIGINS:
         yield _ORIGINS[study.data_origin]
     facts, conditions = results["study"]["participants"], list(study.conditions)
-    people = participants_counted(facts, _sex_and_age(facts))
+    there_are = there_were(facts, _sex_and_age(facts))
     if len(conditions) == 1:
-        yield f"There were {people} and one condition, {conditions[0]}."
+        yield f"{there_are} and one condition, {conditions[0]}."
         return
     designs = {TESTS[row["test"]].design for row in results["comparisons"]}
     if "condition" in study.factors or (
@@ -65,7 +67,7 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     else:
         how = "not compared"
     comparison = f"{counted(len(conditions), 'condition')}, {how}: {listing(conditions)}"
-    yield f"There were {people} and {comparison}; {conditions[0]} was the baseline."
+    yield f"{there_are} and {comparison}; {conditions[0]} was the baseline."
     groups = [factor for factor in study.factors if factor != "condition"]
     if groups and designs - {"within"}:
         yield f"Participants were compared between the levels of {listing(groups)}."
@@ -163,8 +165,8 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
         return
     measures_by_test: dict[str, list[str]] = {}
     for entry in study.comparisons:
-        measures_text = listing([_measures_named(pattern) for pattern in entry.measures])
         tested = [row for row in rows if row["test"] == entry.test]
+        measures_text = listing([_measures_named(pattern, tested) for pattern in entry.measures])
         measures_by_test.setdefault(test_in_words(entry, tested) + _follow_up(entry, tested), []).append(measures_text)
     for test, measures in measures_by_test.items():
         yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
@@ -191,9 +193,16 @@ def _intervals(rows: Sequence[Row]) -> Iterator[str]:
         yield f"The t interval of {of(T_BEYOND)} reaches beyond 0 to 1, where all values are."
 
 
-def _measures_named(pattern: str) -> str:
-    """`Completion time`, or of a pattern such as `nasa_tlx/*` the scales together, `NASA-TLX scales`."""
-    return measure_as_subject(pattern).replace(" *", " scales") if "*" in pattern else measure_as_subject(pattern)
+def _measures_named(pattern: str, rows: Sequence[Row]) -> str:
+    """`Completion time`; of `nasa_tlx/*` the scales together, `NASA-TLX scales`; of another pattern each measure."""
+    if "*" not in pattern:
+        return measure_as_subject(pattern)
+    if pattern.partition("/")[2] == "*" and "*" not in pattern.partition("/")[0]:
+        return measure_as_subject(pattern).replace(" *", " scales")
+    tested = matching_measures(pattern, dict.fromkeys(row["measure"] for row in rows))
+    if len(tested) > _NAMED_MAX:
+        return f"{len(tested)} measures"
+    return listing([measure_as_subject(name) for name in tested] or [pattern])
 
 
 def _level(alpha: float) -> str:

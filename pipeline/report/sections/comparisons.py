@@ -17,7 +17,7 @@ from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import degrees_of_freedom, one_sided_factor, statistic_name, statistic_value
 from pipeline.words.names import adjustment_label, measure_label
 from pipeline.words.numbers import NO_VALUE, fraction, interval, number, p_value, percent
-from pipeline.words.phrases import capitalized, counted, listing
+from pipeline.words.phrases import all_of, capitalized, listing
 
 
 def anchor(at: int) -> str:
@@ -30,18 +30,16 @@ def section(material: Material) -> Section | None:
     rows = material.rows("comparisons")
     if not rows:
         return None
-    tests = list(dict.fromkeys(row["test"] for row in rows))
     shown_columns = [
         (title, cell) for title, cell in _columns(rows) if any(cell(row) not in (NO_VALUE, "") for row in rows)
     ]
     table = Table(
         "table-comparisons",
-        f"All {counted(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
+        f"{all_of(len(rows), 'comparison')} of the study. p is the probability of a difference at least as large"
         f" if there were none; the study's level of significance is {100 * material.study.alpha:g} %.",
         columns([title for title, _ in shown_columns], 3),
         tuple(tuple(cell(row) for _, cell in shown_columns) for row in rows),
-        f"{_meaning_of_n(tests)} Mean difference: first minus second condition. Reduction: relative to the first, for"
-        f" measures whose zero means none{_reduction_of_logarithms(rows)}.",
+        _note(rows, [title for title, _ in shown_columns]),
         tuple(anchor(at) for at in range(len(rows))),
     )
     text = "Every test of the study, one row each. The words and symbols are explained in the "
@@ -54,8 +52,17 @@ def section(material: Material) -> Section | None:
     )
 
 
-def _reduction_of_logarithms(rows: Sequence[Row]) -> str:
-    return "; of tests of logarithms, that of the geometric mean" if any(map(uses_logarithms, rows)) else ""
+def _note(rows: Sequence[Row], titles: Sequence[str]) -> str:
+    """What n and the columns that the table has are of."""
+    sentences = [_meaning_of_n(list(dict.fromkeys(row["test"] for row in rows)))]
+    if "Mean difference" in titles:
+        sentences.append("Mean difference: first minus second condition.")
+    if "Reduction" in titles:
+        of_logarithms = (
+            "; of tests of logarithms, that of the geometric mean" if any(map(uses_logarithms, rows)) else ""
+        )
+        sentences.append(f"Reduction: relative to the first, for measures whose zero means none{of_logarithms}.")
+    return " ".join(sentences)
 
 
 def _meaning_of_n(tests: Sequence[str]) -> str:
@@ -68,9 +75,15 @@ def _meaning_of_n(tests: Sequence[str]) -> str:
 
 
 def _methods(rows: Sequence[Row]) -> str:
-    """Each test with the methods that computed it, and how families of p values were adjusted."""
+    """Each test with the methods that computed it, and how families of p values were adjusted.
+
+    A row that is undefined was not computed by its method, which is named only where no other row of the test is.
+    """
     methods_of: dict[str, list[str]] = {}
+    computed = {test_label(row) for row in rows if row["status"] == "ok"}
     for row in rows:
+        if row["status"] != "ok" and test_label(row) in computed:
+            continue
         methods_of.setdefault(test_label(row), []).append(row["method"])
     texts = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in methods_of.items()]
     return f"{'; '.join(texts)}. {capitalized(families(rows))}."

@@ -237,7 +237,11 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     )
     methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
     note = f"Methods: {methods}. {capitalized(families(rows))}."
-    caption = f"Tests of the {title} scales. Use the adjusted p: with many tests, some are significant by chance."
+    caption = f"Tests of the {title} scales."
+    if any(row["p_adjusted"] is not None for row in rows):
+        caption += " Use the adjusted p: with many tests, some are significant by chance."
+    elif len(rows) > 1:
+        caption += " With many tests, some are significant by chance; these p values are not adjusted for it."
     return Table(
         f"table-{safe_name(questionnaire)}-tests",
         caption,

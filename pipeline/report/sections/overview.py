@@ -293,7 +293,10 @@ def _ratings(material: Material) -> list[Text]:
     for (questionnaire, _), rows in families.items():
         label = measure_label(f"{questionnaire}/x").partition(":")[0]
         below = [row for row in rows if row["p"] is not None and row["p"] < alpha]
-        text = f"{len(below)} of {counted(len(rows), 'scale')} differ at the {100 * alpha:g} % level before adjustment"
+        differ = "differs" if len(rows) == 1 else "differ"
+        text = (
+            f"{len(below)} of {counted(len(rows), 'scale')} {differ} at the {100 * alpha:g} % level before adjustment"
+        )
         if any(row["p_adjusted"] is not None for row in rows):
             adjusted_below = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
             method = adjustment_label(rows[0]["adjust"])

@@ -102,9 +102,10 @@ def test_participants_give_number_sex_and_age(folder: Folder, steadyhand: Steady
     root = folder(SETTINGS + "participants: participants.csv\n", **{"measures.csv": GOOD, "participants.csv": people})
     assert steadyhand("compare", root).code == 0
     assert steadyhand.results()["study"]["participants"] == {
-        "n": 4,
-        "sex": {"female": 3, "male": 1},
-        "age": {"mean": 31.0, "min": 20.0, "max": 40.0},
+        "n": 3,
+        "listed": 4,
+        "sex": {"female": 2, "male": 1},
+        "age": {"mean": 28.0, "min": 20.0, "max": 34.0},
     }
     absent = [e for e in steadyhand.results()["exclusions"] if e["what"] == "no data"]
     assert [(e["participant"], e["condition"]) for e in absent] == [("P4", "a"), ("P4", "b")]

@@ -1,0 +1,103 @@
+"""Sentences that must be true of whatever they speak of: of one and of many, of what was computed and what was not."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipeline.words.names import was
+from pipeline.words.phrases import all_of
+from tests.pipeline.helpers import Steadyhand
+
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
+Page = Callable[[str, str, str], str]
+
+
+@pytest.fixture
+def page(tmp_path: Path, steadyhand: Steadyhand) -> Page:
+    """The text of the report of a study with one table: its settings, the table's kind, and the table."""
+
+    def of(settings: str, kind: str, table: str) -> str:
+        study = tmp_path / "study"
+        study.mkdir()
+        (study / "study.yaml").write_text(f"{kind}: table.csv\n{settings}", encoding="utf-8")
+        (study / "table.csv").write_text(table, encoding="utf-8")
+        ran = steadyhand("report", study, "--format", "html,json")
+        assert ran.code == 0, ran.err
+        text = re.sub(r"<[^>]+>", " ", (steadyhand.out / "report.html").read_text(encoding="utf-8"))
+        return re.sub(r"\s+([.,:;])", r"\1", re.sub(r"\s+", " ", html.unescape(text)))
+
+    return of
+
+
+def rated(scales: list[str], people: int = 6) -> str:
+    """Ratings of a questionnaire named `joy`."""
+    rows = [
+        f"P{at},{condition},joy,{scale},{1 + (at * (3 if condition == 'a' else 5) + len(scale)) % 7}"
+        for at in range(people)
+        for condition in "ab"
+        for scale in scales
+    ]
+    return "\n".join(["participant,condition,questionnaire,scale,rating", *rows, ""])
+
+
+def measured(values: dict[str, list[tuple[float, float]]]) -> str:
+    """Measures of two conditions a and b; of each measure the participants' pairs."""
+    rows = [
+        f"P{at},{condition},{name},{value}"
+        for name, pairs in values.items()
+        for at, pair in enumerate(pairs)
+        for condition, value in zip("ab", pair, strict=True)
+    ]
+    return "\n".join(["participant,condition,measure,value", *rows, ""])
+
+
+def test_an_adjusted_p_is_recommended_only_where_there_is_one(page: Page) -> None:
+    settings = "conditions: [a, b]\ncomparisons: [{measure: joy/*, test: wilcoxon}]\n"
+    text = page(settings, "questionnaires", rated(["x", "xy"]))
+    assert "Use the adjusted p" not in text
+    assert "some are significant by chance; these p values are not adjusted for it" in text
+
+
+def test_one_scale_differs_and_one_comparison_is_no_all(page: Page) -> None:
+    text = page("conditions: [a, b]\ncomparisons: [{measure: joy/x, test: t_paired}]\n", "questionnaires", rated(["x"]))
+    assert "of 1 scale differs at" in text
+    assert "The 1 comparison of the study." in text
+    assert "All 1" not in text
+    assert all_of(3, "comparison") == "All 3 comparisons"
+
+
+def test_a_pattern_is_named_by_its_measures_in_the_methods(page: Page) -> None:
+    pairs = [(1.0, 2.0), (2.5, 2.0), (1.0, 3.0), (4.0, 4.5), (2.0, 4.0)]
+    text = page(
+        "conditions: [a, b]\ncomparisons: [{measure: '*', test: t_paired}]\n",
+        "measures",
+        measured({"time_s": pairs, "bias_mm": [(-a, -b) for a, b in pairs]}),
+    )
+    assert "*: paired" not in text
+    assert "Bias and Time: paired t tests" in text
+    assert "Bias was" in text
+    assert "Bias were" not in text
+
+
+def test_a_method_that_computed_nothing_is_not_among_the_methods(page: Page) -> None:
+    """The measure that never varies has no test; the other is exact."""
+    values = {"same": [(1.0, 1.0)] * 4, "t": [(1.0, 2.0), (2.0, 3.0), (3.0, 5.0), (4.0, 3.0)]}
+    text = page("conditions: [a, b]\ncomparisons: [{measure: '*', test: friedman}]\n", "measures", measured(values))
+    assert "exact: the sign test" in text
+    assert "chi-squared approximation" not in text
+
+
+def test_one_participant_was_there(page: Page) -> None:
+    text = page("conditions: [a, b]\n", "measures", measured({"t": [(1.0, 2.0)]}))
+    assert "There was 1 participant and" in text
+
+
+@pytest.mark.parametrize(("label", "verb"), [("Bias", "was"), ("Errors", "were"), ("Loss", "was"), ("Time", "was")])
+def test_the_verb_fits_the_measure(label: str, verb: str) -> None:
+    assert was(label) == verb
