@@ -18,6 +18,7 @@ from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.practice import learning_rows
 from pipeline.analysis.preregistration.hypotheses import Done
 from pipeline.analysis.preregistration.plan_and_done import plan_and_done
+from pipeline.analysis.scores import refuse_undefined
 from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
@@ -49,6 +50,7 @@ def run(work: Work) -> Outcome:
         "intervals_within": tables.frame("intervals_within", intervals_within(study, measures, observations)),
         "differences": tables.frame("differences", differences(study, measures)),
     }
+    refuse_undefined(study, list(measures["measure"].unique()), tables.read("exclusions", measured))
     people = people_of(study, work.folder)
     rows, left_out = compared(study, measures, observations, people)
     frames["comparisons"] = tables.frame("comparisons", rows)

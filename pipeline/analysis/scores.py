@@ -12,18 +12,22 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from pipeline.analysis.answer_ranges import remedy, shifted_range
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.questionnaire_scores import MISSING, OUT_OF_RANGE, Fault, cronbach_alpha, participant_scores
+from pipeline.study.comparison import matching_measures
 from pipeline.study.scoring_rules import RULES, ScoringRule
 from pipeline.study.scoring_settings import OWN_RULES
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
-from pipeline.words.numbers import number
 from pipeline.words.phrases import listing
 
 _CELL = ["participant", "condition", "session"]
 _WEIGHT = "weight"
 _SHOWN = 6
+_REASONS_MAX = 3
+UNDEFINED = "score undefined"
+"""What the table `exclusions` calls a score that could not be made."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,7 @@ class Instrument:
     limits: tuple[float, float]
     items: Mapping[str, str]
     weights: Mapping[str, str]
+    range_is_stated: bool
 
     @property
     def scores(self) -> list[str]:
@@ -82,7 +87,7 @@ def _instrument(study: Study, questionnaire: str, given: Sequence[str]) -> Instr
             f"study.yaml: scoring.{questionnaire}: rule {rule.name} needs {len(rule.items)} items, and the data lack"
             f" {named}; they have {listing(list(given)[:_SHOWN])}{' …' if len(given) > _SHOWN else ''}"
         )
-    return Instrument(questionnaire, rule, limits, items, weights)
+    return Instrument(questionnaire, rule, limits, items, weights, entry is not None and entry.range is not None)
 
 
 def _is_weight(scale: str) -> bool:
@@ -113,6 +118,11 @@ def score_values(scored_by: Sequence[Instrument], values: pd.DataFrame, exclusio
         names = {f"{prefix}{given}": (item, False) for given, item in instrument.items.items()}
         names |= {f"{prefix}{given}": (item, True) for given, item in instrument.weights.items()}
         answers = values[values["measure"].isin(list(names))]
+        moved = _moved(instrument, answers)
+        if moved is not None:
+            reason = remedy(instrument.questionnaire, instrument.rule, instrument.limits, moved)
+            exclusions += [{"measure": name, "what": UNDEFINED, "reason": reason} for name in instrument.scores]
+            continue
         for cell, cell_answers in answers.groupby([*_CELL, "period"], dropna=False, sort=True):
             participant, condition, session, period = cell
             ratings: dict[str, float | None] = {}
@@ -133,6 +143,28 @@ def score_values(scored_by: Sequence[Instrument], values: pd.DataFrame, exclusio
     return scores.astype({"value": "float64", "factors": "object", "period": "Int64"})
 
 
+def _moved(instrument: Instrument, answers: pd.DataFrame) -> tuple[float, float] | None:
+    """The range on which an instrument's answers seem to run instead of that of its rule; None where one was stated."""
+    if instrument.range_is_stated:
+        return None
+    items = [f"{instrument.questionnaire}/{given}" for given in instrument.items]
+    return shifted_range(answers[answers["measure"].isin(items)], instrument.limits)
+
+
+def refuse_undefined(study: Study, known: Sequence[str], exclusions: pd.DataFrame) -> None:
+    """PipelineError where an entry of `comparisons` asks for scores of which not one is defined, saying why.
+
+    `known` are the measures that there are, `exclusions` the table of what is missing.
+    """
+    undefined = exclusions[exclusions["what"] == UNDEFINED]
+    for wanted in (pattern for entry in study.comparisons for pattern in entry.measures):
+        asked = matching_measures(wanted, undefined["measure"].unique())
+        if asked and not matching_measures(wanted, known):
+            reasons = list(undefined.loc[undefined["measure"].isin(asked), "reason"].unique())
+            why = "; ".join(reasons[:_REASONS_MAX]) + ("; …" if len(reasons) > _REASONS_MAX else "")
+            raise PipelineError(f'study.yaml: comparisons: nobody has a score of "{wanted}": {why}')
+
+
 def _or_none(session: object) -> object:
     return None if pd.isna(session) else session  # type: ignore[call-overload]
 
@@ -142,13 +174,14 @@ def _undefined(who: Row, instrument: Instrument, faults: Sequence[Fault]) -> Ite
     for score in dict.fromkeys(name for fault in faults for name in fault.scores):
         reasons = [_reason(fault, instrument) for fault in faults if score in fault.scores]
         reason = "; ".join(dict.fromkeys(reasons))
-        yield {**who, "measure": f"{instrument.questionnaire}/{score}", "what": "score undefined", "reason": reason}
+        yield {**who, "measure": f"{instrument.questionnaire}/{score}", "what": UNDEFINED, "reason": reason}
 
 
 def _reason(fault: Fault, instrument: Instrument) -> str:
     if fault.what == OUT_OF_RANGE and fault.value is not None:
         low, high = instrument.limits
-        return f"{fault.item} is {number(fault.value)}, outside {low:g} to {high:g}; state the range under scoring"
+        remedy_of_range = "" if instrument.range_is_stated else "; state the range under scoring"
+        return f"{fault.item} is {fault.value:g}, outside {low:g} to {high:g}{remedy_of_range}"
     if fault.what == MISSING:
         return f"{fault.item} is missing"
     return f"{fault.item} {fault.what}".strip()
@@ -160,6 +193,8 @@ def reliability(scored_by: Sequence[Instrument], values: pd.DataFrame) -> Iterat
         prefix = f"{instrument.questionnaire}/"
         given = {f"{prefix}{scale}": item for scale, item in instrument.items.items()}
         answers = values[values["measure"].isin(list(given))]
+        if _moved(instrument, answers) is not None:
+            continue
         wide = answers.pivot_table(
             index=["participant", "condition"], columns="measure", values="value", aggfunc="mean"
         )

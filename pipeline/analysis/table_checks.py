@@ -12,13 +12,14 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from pipeline.analysis.answer_ranges import remedy, shifted_range
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
 from pipeline.study.scoring_rules import RULES
 from pipeline.study.scoring_settings import ScoringEntry
 from pipeline.tables.table import Row
-from pipeline.words.phrases import listing
+from pipeline.words.phrases import counted, listing
 
 UNIT, MISSING_CODE, SCALE, TARGETS, ORDER = (
     "unit of time",
@@ -53,11 +54,14 @@ def check_rows(
     `selections` have the targets and selections of trials.csv; None where there is none. `scoring` is study.yaml's.
     """
     findings: list[Finding] = []
+    moved = dict(moved_ranges(values, scoring))
+    findings += moved.values()
     for (name, source), rows in values[np.isfinite(values["value"])].groupby(["measure", "source"], sort=False):
         value = rows["value"].to_numpy(np.float64)
         findings += unit_of_time(str(name), str(source), value)
         findings += missing_code(str(name), str(source), value, rows["participant"])
-        findings += rated_range(str(name), str(source), value, scoring)
+        if str(name).partition("/")[0] not in moved:
+            findings += rated_range(str(name), str(source), value, scoring)
     if selections is not None:
         findings += targets(selections)
     return rows_of(findings)
@@ -120,6 +124,25 @@ def _stands_out(value: FloatArray, code: float) -> bool:
     return bool(rest.max() * _FAR < code and rest.min() >= 0)
 
 
+def moved_ranges(values: pd.DataFrame, scoring: Mapping[str, ScoringEntry]) -> Iterator[tuple[str, Finding]]:
+    """Questionnaires whose answers seem to run on another range than their rule takes: one finding for all items."""
+    for questionnaire, rows in values.groupby(values["measure"].str.partition("/")[0], sort=False):
+        entry = scoring.get(str(questionnaire))
+        rule = RULES.get(entry.rule if entry is not None else str(questionnaire))
+        if rule is None or rule.limits is None or (entry is not None and entry.range is not None):
+            continue
+        scales = rows["measure"].str.partition("/")[2]
+        answers = rows[[rule.item(scale) is not None and not _weighs(scale) for scale in scales]]
+        moved = shifted_range(answers, rule.limits)
+        if moved is not None:
+            sources = listing(list(dict.fromkeys(answers["source"].astype(str))))
+            message = f'"{questionnaire}" in {sources}: {remedy(str(questionnaire), rule, rule.limits, moved)}'
+            low, high = answers["value"].min(), answers["value"].max()
+            expected = f"{rule.limits[0]:g} to {rule.limits[1]:g}"
+            check = of(SCALE, str(questionnaire))
+            yield str(questionnaire), Finding(check, "amber", f"{low:g} to {high:g}", expected, message)
+
+
 def rated_range(name: str, source: str, value: FloatArray, scoring: Mapping[str, ScoringEntry]) -> Iterator[Finding]:
     """Answers and scores that their instrument cannot have, whether or not a score is made of them."""
     limits = rated_limits(name, value, scoring)
@@ -129,9 +152,10 @@ def rated_range(name: str, source: str, value: FloatArray, scoring: Mapping[str,
     outside = (value < low) | (value > high)
     message = ""
     if outside.any():
+        are = "is" if outside.sum() == 1 else "are"
         message = (
-            f'{int(outside.sum())} ratings of "{name}" in {source} are outside {low:g} to {high:g}, such as '
-            f"{value[outside][0]:g}: correct them, or leave the cell empty; if the sheet runs otherwise, "
+            f'{counted(int(outside.sum()), "rating")} of "{name}" in {source} {are} outside {low:g} to {high:g}, such'
+            f" as {value[outside][0]:g}: correct them, or leave the cell empty; if the sheet runs otherwise, "
             "state its range under scoring: in study.yaml"
         )
     status: Status = "amber" if outside.any() else "green"

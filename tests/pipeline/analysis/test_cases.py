@@ -218,9 +218,43 @@ def test_an_answer_out_of_range_or_missing_is_named_and_leaves_out_that_score(
     assert found["comparisons"][0]["n"] == 2
     reasons = {row["participant"]: row["reason"] for row in found["exclusions"] if row["what"] == "score undefined"}
     assert reasons == {
-        "P1": "q3 is 7.00, outside 1 to 5; state the range under scoring",
+        "P1": "q3 is 7, outside 1 to 5; state the range under scoring",
         "P2": "q7 is missing",
     }
+
+
+IPQ = ["g1", *(f"{of}{i}" for of, n in (("sp", 5), ("inv", 4), ("real", 4)) for i in range(1, n + 1))]
+
+
+def test_answers_that_run_on_another_range_are_one_hint_and_no_score(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """The IPQ's rule takes 0 to 6. Of answers from 1 to 7 those from 1 to 6 would give scores too, each off by one."""
+    rows = [f"P{p},{c},ipq,{s},{1 + (p + at) % 7}" for p in range(8) for c in "AB" for at, s in enumerate(IPQ)]
+    ask = "comparisons: [{measure: ipq/*, test: t_paired}]\n"
+    ran = steadyhand("compare", questionnaire(tmp_path / "a", ask, rows))
+    assert ran.code == 2
+    key = "state scoring: {ipq: {rule: ipq, range: [1, 7]}}"
+    assert 'nobody has a score of "ipq/*": answers seem to run from 1 to 7, and rule ipq takes 0 to 6' in ran.err
+    assert key in ran.err
+    assert steadyhand("compare", questionnaire(tmp_path / "b", "", rows)).code == 0
+    found = steadyhand.results()
+    ranges = [row for row in found["checks"] if row["check"].startswith("range of the scale")]
+    assert [(row["check"], row["found"], row["expected"]) for row in ranges] == [
+        ("range of the scale: ipq", "1 to 7", "0 to 6")
+    ]
+    assert key in ranges[0]["message"]
+    assert {row["measure"] for row in found["descriptives"]} == set()
+    mended = f"scoring: {{ipq: {{rule: ipq, range: [1, 7]}}}}\n{ask}"
+    assert steadyhand("compare", questionnaire(tmp_path / "c", mended, rows)).code == 0
+    scores = {row["measure"]: row["n"] for row in steadyhand.results()["descriptives"]}
+    assert scores["ipq/general_presence"] == 8
+
+
+def test_answers_coded_around_zero_name_the_range_to_state(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    rows = [f"P{p},{c},ueq_s,q{i},{(p + 2 * i) % 7 - 3}" for p in range(8) for c in "AB" for i in range(1, 9)]
+    ask = "comparisons: [{measure: ueq_s/*, test: t_paired}]\n"
+    ran = steadyhand("compare", questionnaire(tmp_path / "a", ask, rows))
+    assert ran.code == 2
+    assert "state scoring: {ueq_s: {rule: ueq_s, range: [-3, 3]}}" in ran.err
 
 
 def test_an_instrument_without_a_rule_has_no_total(tmp_path: Path, steadyhand: Steadyhand) -> None:
