@@ -18,7 +18,7 @@ from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.practice import learning_rows
 from pipeline.analysis.preregistration.hypotheses import Done
 from pipeline.analysis.preregistration.plan_and_done import plan_and_done
-from pipeline.analysis.scores import refuse_undefined
+from pipeline.analysis.scores import UNDEFINED, refuse_undefined
 from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
@@ -87,7 +87,7 @@ def run(work: Work) -> Outcome:
         repeats = study_tables.read_repeats(work.folder / study.repeats, study.conditions)
         rows = list(reductions(study.simulation, study.conditions, repeats))
         frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
-    facts = _participant_facts(work, measures)
+    facts = _participant_facts(work, measures, tables.read("exclusions", measured))
     frames["preregistration"] = tables.frame("preregistration", _beside_plan(work, frames))
     for name, table in frames.items():
         tables.write(name, table, work.out)
@@ -147,15 +147,17 @@ def _without_accuracy(work: Work, quality: pd.DataFrame, accuracy: pd.DataFrame)
     return rows
 
 
-def _participant_facts(work: Work, measures: pd.DataFrame) -> Row:
+def _participant_facts(work: Work, measures: pd.DataFrame, exclusions: pd.DataFrame) -> Row:
     """The number of participants with a value or a session that counts, and the facts of participants.csv about them.
 
-    Who is listed there and has neither was not analysed.
+    Who is listed there and has neither was not analysed, nor who has nothing but scores that are undefined.
     """
     counting = (session for session in work.sessions if not work.study.exclusion_of(session))
     people = set(measures["participant"]) | {str(session.participant) for session in counting}
     if work.study.participants is None:
-        return {"n": len(people)}
+        unscored = exclusions.loc[exclusions["what"] == UNDEFINED, "participant"].dropna()
+        everybody = people | set(unscored)
+        return {"n": len(people)} if everybody == people else {"n": len(people), "listed": len(everybody)}
     return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants), people)
 
 

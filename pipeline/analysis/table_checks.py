@@ -21,10 +21,11 @@ from pipeline.study.scoring_settings import ScoringEntry
 from pipeline.tables.table import Row
 from pipeline.words.phrases import counted, listing
 
-UNIT, MISSING_CODE, SCALE, TARGETS, ORDER = (
+UNIT, MISSING_CODE, SCALE, ITEMS, TARGETS, ORDER = (
     "unit of time",
     "code for missing",
     "range of the scale",
+    "items of the questionnaire",
     "unit of the targets",
     "order of the conditions",
 )
@@ -43,6 +44,7 @@ _FARTHEST_MM = 20_000.0
 _FAR_FROM_TARGET_MM, _UNDONE = 50.0, 0.2  # the middle distance, and how much of it a mistake leaves once undone
 _SAME_NS = 60e9  # logs of one minute were not recorded one after the other
 _NAMED_MAX = 3
+_ITEMS_MIN = 2
 
 
 def check_rows(
@@ -56,6 +58,7 @@ def check_rows(
     findings: list[Finding] = []
     moved = dict(moved_ranges(values, scoring))
     findings += moved.values()
+    findings += missing_items(values, scoring)
     for (name, source), rows in values[np.isfinite(values["value"])].groupby(["measure", "source"], sort=False):
         value = rows["value"].to_numpy(np.float64)
         findings += unit_of_time(str(name), str(source), value)
@@ -141,6 +144,28 @@ def moved_ranges(values: pd.DataFrame, scoring: Mapping[str, ScoringEntry]) -> I
             expected = f"{rule.limits[0]:g} to {rule.limits[1]:g}"
             check = of(SCALE, str(questionnaire))
             yield str(questionnaire), Finding(check, "amber", f"{low:g} to {high:g}", expected, message)
+
+
+def missing_items(values: pd.DataFrame, scoring: Mapping[str, ScoringEntry]) -> Iterator[Finding]:
+    """Known instruments of which the data have some items and not all: without a word they would not be scored."""
+    for questionnaire, rows in values.groupby(values["measure"].str.partition("/")[0], sort=False):
+        name = str(questionnaire)
+        rule = RULES.get(name)
+        if name in scoring or rule is None or rule.limits is None:
+            continue
+        scales = rows["measure"].str.partition("/")[2].unique()
+        there = {item for scale in scales if (item := rule.item(scale)) is not None}
+        missing = [item for item in rule.items if item not in there]
+        if len(there) < _ITEMS_MIN or not missing:
+            continue
+        named = listing(missing) if len(missing) <= _NAMED_MAX else f"{', '.join(missing[:_NAMED_MAX])}, …"
+        (low, high), sources = rule.limits, listing(list(rows["source"].astype(str).unique()))
+        message = (
+            f'"{name}" in {sources} has {len(there)} of {len(rule.items)} items'
+            f" ({named} missing), so no score is made of them and nothing is turned; give all items, or state a rule of"
+            f" your own: scoring: {{{name}: {{rule: mean, range: [{low:g}, {high:g}], reversed: [the items to turn]}}}}"
+        )
+        yield Finding(of(ITEMS, name), "amber", f"{len(there)} items", f"{len(rule.items)} items", message)
 
 
 def rated_range(name: str, source: str, value: FloatArray, scoring: Mapping[str, ScoringEntry]) -> Iterator[Finding]:

@@ -163,14 +163,18 @@ def measure(name: str) -> Measure:
 
 
 def _rating(name: str, questionnaire: str, scale: str) -> Measure:
-    """The record of a questionnaire's scale. Ratings count as interval: equal steps, but no zero that means none."""
+    """The record of a questionnaire's scale. Ratings count as interval: equal steps, but no zero that means none.
+
+    Of a single item nothing is known to be better: half of those of the SUS, for one, are worded negatively.
+    """
     known = QUESTIONNAIRES.get(questionnaire, Questionnaire(questionnaire, _spaced(questionnaire)))
     order = known.scales.index(scale) if scale in known.scales else len(known.scales)
+    is_item = scale not in (*known.scales, *known.score_labels, _TOTAL)
     return Measure(
         name,
         f"{known.label}: {known.score_labels.get(scale, _spaced(scale).lower())}",
         scale="interval",
-        better=known.better,
+        better="unknown" if is_item else known.better,
         section="ratings",
         source="questionnaires",
         cite=known.cite,

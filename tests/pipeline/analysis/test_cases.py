@@ -249,6 +249,25 @@ def test_answers_that_run_on_another_range_are_one_hint_and_no_score(tmp_path: P
     assert scores["ipq/general_presence"] == 8
 
 
+def test_who_has_no_score_at_all_is_no_participant_that_vanishes(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    rows = [f"P{p},{c},sus,q{i},{3 + (p + i) % 2}" for p in range(8) for c in "AB" for i in range(1, 11)]
+    rows = [re.sub(r"^(P1,.,sus,q2),.*", r"\1,9", row) for row in rows]
+    assert steadyhand("compare", questionnaire(tmp_path / "a", "", rows)).code == 0
+    assert steadyhand.results()["study"]["participants"] == {"n": 7, "listed": 8}
+
+
+def test_half_of_an_instrument_is_not_scored_and_said(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """Five items of the SUS have no score; the even ones are worded negatively, so that higher is not better."""
+    rows = [f"P{p},{c},sus,q{i},{1 + (p + i + (c == 'B')) % 5}" for p in range(8) for c in "AB" for i in range(1, 6)]
+    study = questionnaire(tmp_path / "a", "comparisons: [{measure: sus/*, test: t_paired}]\n", rows)
+    ran = steadyhand("compare", study)
+    assert ran.code == 0
+    (row,) = (row for row in steadyhand.results()["checks"] if row["check"].startswith("items of the questionnaire"))
+    assert "has 5 of 10 items (q6, q7, q8, … missing), so no score is made of them" in row["message"]
+    assert "(better)" not in ran.out
+    assert "(worse)" not in ran.out
+
+
 def test_answers_coded_around_zero_name_the_range_to_state(tmp_path: Path, steadyhand: Steadyhand) -> None:
     rows = [f"P{p},{c},ueq_s,q{i},{(p + 2 * i) % 7 - 3}" for p in range(8) for c in "AB" for i in range(1, 9)]
     ask = "comparisons: [{measure: ueq_s/*, test: t_paired}]\n"
