@@ -127,34 +127,43 @@ def _stands_out(value: FloatArray, code: float) -> bool:
     return bool(rest.max() * _FAR < code and rest.min() >= 0)
 
 
+def _by_questionnaire(values: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """The rows of each questionnaire: of what stands before the slash in a measure's name."""
+    of_each = pd.Series([str(name).partition("/")[0] for name in values["measure"]], values.index, dtype="object")
+    for questionnaire, rows in values.groupby(of_each, sort=False):
+        yield str(questionnaire), rows
+
+
+def _scale(name: str) -> str:
+    return name.partition("/")[2]
+
+
 def moved_ranges(values: pd.DataFrame, scoring: Mapping[str, ScoringEntry]) -> Iterator[tuple[str, Finding]]:
     """Questionnaires whose answers seem to run on another range than their rule takes: one finding for all items."""
-    for questionnaire, rows in values.groupby(values["measure"].str.partition("/")[0], sort=False):
-        entry = scoring.get(str(questionnaire))
-        rule = RULES.get(entry.rule if entry is not None else str(questionnaire))
+    for questionnaire, rows in _by_questionnaire(values):
+        entry = scoring.get(questionnaire)
+        rule = RULES.get(entry.rule if entry is not None else questionnaire)
         if rule is None or rule.limits is None or (entry is not None and entry.range is not None):
             continue
-        scales = rows["measure"].str.partition("/")[2]
+        scales = [_scale(name) for name in rows["measure"]]
         answers = rows[[rule.item(scale) is not None and not _weighs(scale) for scale in scales]]
         moved = shifted_range(answers, rule.limits)
         if moved is not None:
             sources = listing(list(dict.fromkeys(answers["source"].astype(str))))
-            message = f'"{questionnaire}" in {sources}: {remedy(str(questionnaire), rule, rule.limits, moved)}'
+            message = f'"{questionnaire}" in {sources}: {remedy(questionnaire, rule, rule.limits, moved)}'
             low, high = answers["value"].min(), answers["value"].max()
             expected = f"{rule.limits[0]:g} to {rule.limits[1]:g}"
-            check = of(SCALE, str(questionnaire))
-            yield str(questionnaire), Finding(check, "amber", f"{low:g} to {high:g}", expected, message)
+            check = of(SCALE, questionnaire)
+            yield questionnaire, Finding(check, "amber", f"{low:g} to {high:g}", expected, message)
 
 
 def missing_items(values: pd.DataFrame, scoring: Mapping[str, ScoringEntry]) -> Iterator[Finding]:
     """Known instruments of which the data have some items and not all: without a word they would not be scored."""
-    for questionnaire, rows in values.groupby(values["measure"].str.partition("/")[0], sort=False):
-        name = str(questionnaire)
+    for name, rows in _by_questionnaire(values):
         rule = RULES.get(name)
         if name in scoring or rule is None or rule.limits is None:
             continue
-        scales = rows["measure"].str.partition("/")[2].unique()
-        there = {item for scale in scales if (item := rule.item(scale)) is not None}
+        there = {item for measured in rows["measure"].unique() if (item := rule.item(_scale(measured))) is not None}
         missing = [item for item in rule.items if item not in there]
         if len(there) < _ITEMS_MIN or not missing:
             continue

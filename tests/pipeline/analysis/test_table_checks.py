@@ -192,3 +192,7 @@ def test_milliseconds_in_a_table_are_said_on_the_console_and_the_first_page(
     assert page.index("divide them by 1000") < page.index('id="design"')
     (check,) = (row for row in steadyhand.results()["checks"] if row["status"] != "green")
     assert (check["session"], check["status"]) == (None, "amber")
+
+
+def test_no_values_are_no_fault() -> None:
+    assert check_rows(typed("time_s")[:0], None) == []
