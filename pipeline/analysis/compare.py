@@ -14,6 +14,7 @@ from pipeline.analysis.comparisons import People, all_requests, compared, people
 from pipeline.analysis.descriptives import descriptives, differences, intervals_within
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.fitts_law import fitts_law
+from pipeline.analysis.group_descriptives import by_group
 from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.practice import learning_rows
 from pipeline.analysis.preregistration.hypotheses import Done
@@ -58,6 +59,7 @@ def run(work: Work) -> Outcome:
     frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
     requests = [request for entry in all_requests(study, measures, observations, people) for request in entry]
+    frames["descriptives_by_group"] = tables.frame("descriptives_by_group", by_group(requests))
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
     frames["design_check"] = tables.frame("design_check", design_rows)
     movements = tables.read("movements", measured)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import pandas as pd
@@ -21,14 +21,22 @@ from pipeline.tables.table import Row
 def descriptives(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> list[Row]:
     """n, mean, SD, median and the interval of the mean, one row per measure and condition."""
     rows: list[Row] = []
-    for name, wide, method in _by_measure(study, measures, observations):
-        everything = _all_of(wide)
-        within_unit = not measure(name).unit and bool(((everything >= 0) & (everything <= 1)).all())
+    for name in sorted(set(measures["measure"]), key=measure_order):
+        wide = tables.participant_means(measures, name, study.conditions)
+        described_as = described_values(name, wide, observations)
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
             if len(values):
-                rows.append({"measure": name, "condition": condition, **described(values, method, within_unit)})
+                rows.append({"measure": name, "condition": condition, **described_as(values)})
     return rows + _root_rows(rows)
+
+
+def described_values(name: str, wide: pd.DataFrame, observations: pd.DataFrame) -> Callable[[FloatArray], Row]:
+    """What describes some of a measure's values; `wide`, all participants' means by condition, tells their kind."""
+    everything = _all_of(wide)
+    method = _interval_method(name, wide, observations)
+    within_unit = not measure(name).unit and bool(((everything >= 0) & (everything <= 1)).all())
+    return lambda values: described(values, method, within_unit)
 
 
 def intervals_within(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> list[Row]:
@@ -71,8 +79,12 @@ def _by_measure(
     """Each measure with the participants' means by condition, and the method of the intervals of its means."""
     for name in sorted(set(measures["measure"]), key=measure_order):
         wide = tables.participant_means(measures, name, study.conditions)
-        shares = are_answers(observations[observations["measure"] == name])
-        yield name, wide, interval_method(_all_of(wide), shares, measure(name).unit != "")
+        yield name, wide, _interval_method(name, wide, observations)
+
+
+def _interval_method(name: str, wide: pd.DataFrame, observations: pd.DataFrame) -> str:
+    shares = are_answers(observations[observations["measure"] == name])
+    return interval_method(_all_of(wide), shares, measure(name).unit != "")
 
 
 def _all_of(wide: pd.DataFrame) -> FloatArray:

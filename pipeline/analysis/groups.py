@@ -70,7 +70,7 @@ def by_group(request: Request) -> GroupCases:
         exclusions = list(cases.left_out)
     known = {person: float(value) for person, value in means.items() if person in members}
     exclusions += _without_group(request, factor, [str(person) for person in means.index if person not in members])
-    names = _names(request, factor, members, known)
+    names = group_names(request, factor, members, known)
     groups = [np.array([value for person, value in known.items() if members[person] == name]) for name in names]
     return GroupCases(factor, names, groups, exclusions)
 
@@ -88,7 +88,7 @@ def mixed(request: Request) -> MixedCases:
     cases = complete_cases.by_factors_of(request)
     kept = [person in members for person in cases.participants]
     people = [person for person in cases.participants if person in members]
-    names = _names(request, factor, members, people)
+    names = group_names(request, factor, members, people)
     codes = np.array([names.index(members[person]) for person in people], dtype=np.int64)
     missing = [person for person in cases.participants if person not in members]
     exclusions = [*cases.left_out, *_without_group(request, factor, missing)]
@@ -156,7 +156,7 @@ def _refuse_look_alikes(factor: str, members: Mapping[str, str]) -> None:
             )
 
 
-def _names(request: Request, factor: str, members: Mapping[str, str], people: Iterable[str]) -> list[str]:
+def group_names(request: Request, factor: str, members: Mapping[str, str], people: Iterable[str]) -> list[str]:
     """The groups that have somebody, in the study's order or by the alphabet."""
     occupied = {members[person] for person in people}
     return [

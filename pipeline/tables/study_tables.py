@@ -304,6 +304,28 @@ STUDY_TABLES = (
     FITTS,
     FITTS_POINTS,
     Table(
+        "descriptives_by_group",
+        "One row per measure that is tested between groups of participants, group and condition.",
+        (
+            MEASURE,
+            text("factor", "what tells the groups apart: a column of participants.csv or of the measures"),
+            text("group", "its level"),
+            CONDITION,
+            count("group_n", "participants of the group with a value in some condition"),
+            count("n", "those with a value in this condition"),
+            number("mean", "their mean, in the measure's unit"),
+            number("sd", "standard deviation between them, in the measure's unit"),
+            number("median", "median, in the measure's unit"),
+            CI_LOW._replace(about="lower end of the mean's 95 % interval"),
+            CI_HIGH._replace(about="upper end of the mean's 95 % interval"),
+            text("interval", "how it was computed, as in `descriptives`"),
+        ),
+        stages=("compare",),
+        key=("measure", "factor", "group", "condition"),
+        in_results=True,
+        as_csv=True,
+    ),
+    Table(
         "measures",
         "One row per participant, condition and measure, and level of further factors.",
         (

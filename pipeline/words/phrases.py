@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 
@@ -24,6 +24,15 @@ def all_of(count: int, noun: str) -> str:
 def there_were(facts: Mapping[str, Any], who: str = "") -> str:
     """`There was 1 participant`, `There were 12 participants`; `who` tells of them."""
     return f"There {'was' if facts['n'] == 1 else 'were'} {participants_counted(facts, who)}"
+
+
+def group_sizes(rows: Iterable[Mapping[str, Any]]) -> str:
+    """`group: 4 novice and 3 expert`, from rows of `descriptives_by_group`; the largest of each group's measures."""
+    sizes: dict[str, dict[str, int]] = {}
+    for row in rows:
+        of_factor = sizes.setdefault(row["factor"], {})
+        of_factor[row["group"]] = max(of_factor.get(row["group"], 0), row["group_n"])
+    return "; ".join(f"{factor}: {listing([f'{n} {name}' for name, n in of.items()])}" for factor, of in sizes.items())
 
 
 def capitalized(sentence: str) -> str:

@@ -17,7 +17,7 @@ from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
 from pipeline.words.numbers import number
-from pipeline.words.phrases import counted, listing, there_were
+from pipeline.words.phrases import counted, group_sizes, listing, there_were
 
 _ORIGINS = {
     "simulated": "The data were simulated by a model, not measured with people.",
@@ -71,6 +71,8 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     groups = [factor for factor in study.factors if factor != "condition"]
     if groups and designs - {"within"}:
         yield f"Participants were compared between the levels of {listing(groups)}."
+        if results["descriptives_by_group"]:
+            yield f"Participants of each {group_sizes(results['descriptives_by_group'])}."
 
 
 def _sex_and_age(facts: Mapping[str, Any]) -> str:

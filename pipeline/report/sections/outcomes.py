@@ -32,7 +32,7 @@ from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import statistic
 from pipeline.words.names import measure_label, short_label
 from pipeline.words.numbers import NO_VALUE, interval, number, p_value
-from pipeline.words.phrases import capitalized, counted, listing
+from pipeline.words.phrases import capitalized, counted, group_sizes, listing
 from pipeline.words.sentences import brief_sentence, with_article
 
 _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
@@ -48,7 +48,7 @@ def selection(material: Material) -> Section | None:
         "How far from the target people selected. MSE is a participant's mean squared distance over trials; RMSE is the"
         " square root of the mean of the participants' MSEs, in the unit of the display."
     )
-    blocks: list[Block] = [Paragraph((text,)), *_task(material), _descriptives(material, "table-selection", names)]
+    blocks: list[Block] = [Paragraph((text,)), *_task(material), *_descriptives(material, "table-selection", names)]
     blocks += _figure_and_tests(material, drawn)
     blocks += _selections(material)
     if material.rows("shown_at_selection"):
@@ -65,7 +65,7 @@ def time(material: Material) -> Section | None:
         "Completion time runs from the start of a session to its last selection; time per trial from the appearance of "
         "a target to its selection."
     )
-    blocks: list[Block] = [Paragraph((text,)), _descriptives(material, "table-time", names)]
+    blocks: list[Block] = [Paragraph((text,)), *_descriptives(material, "table-time", names)]
     for name in names:
         blocks += _figure_and_tests(material, name)
     return Section("time", "Time", tuple(blocks))
@@ -88,7 +88,7 @@ def others(material: Material) -> Section | None:
     names = _measures_in(material, "others")
     if not names:
         return None
-    blocks: list[Block] = [_descriptives(material, "table-others", names)]
+    blocks: list[Block] = [*_descriptives(material, "table-others", names)]
     for name in names:
         blocks += _figure_and_tests(material, name)
     return Section("others", "Further measures", tuple(blocks))
@@ -101,23 +101,34 @@ def _measures_in(material: Material, section_name: SectionName) -> list[str]:
     return [*built_in, *(name for name in names if name not in built_in)]
 
 
-def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Table:
-    titles = ("Measure", "Condition", "n", "Mean", "SD", "Median", "95 % interval of the mean")
+_DESCRIBED = ("n", "Mean", "SD", "Median", "95 % interval of the mean")
+
+
+def _descriptives(material: Material, table_id: str, names: Sequence[str]) -> Iterator[Block]:
+    """The table of means by condition, and that by group where groups of participants are compared."""
     rows = [row for name in names for row in material.rows("descriptives") if row["measure"] == name]
+    cells = tuple((measure_label(row["measure"]), row["condition"], *_described(row)) for row in rows)
+    caption = "Means over participants; each participant has one value in each condition that they met."
+    yield Table(table_id, caption, columns(("Measure", "Condition", *_DESCRIBED), 2), cells, interval_note(rows))
+    yield from _by_group(material, table_id, names)
+
+
+def _by_group(material: Material, table_id: str, names: Sequence[str]) -> Iterator[Block]:
+    rows = [row for name in names for row in material.rows("descriptives_by_group") if row["measure"] == name]
+    if not rows:
+        return
     cells = tuple(
-        (
-            measure_label(row["measure"]),
-            row["condition"],
-            f"{row['n']}",
-            number(row["mean"]),
-            number(row["sd"]),
-            number(row["median"]),
-            interval(row["ci_low"], row["ci_high"]),
-        )
+        (measure_label(row["measure"]), f"{row['factor']}: {row['group']}", row["condition"], *_described(row))
         for row in rows
     )
-    caption = "Means over participants; each participant has one value in each condition that they met."
-    return Table(table_id, caption, columns(titles, 2), cells, interval_note(rows))
+    caption = f"Means by group and condition. {capitalized(group_sizes(rows))}."
+    titles = ("Measure", "Group", "Condition", *_DESCRIBED)
+    yield Table(f"{table_id}-groups", caption, columns(titles, 3), cells, interval_note(rows))
+
+
+def _described(row: Row) -> tuple[str, ...]:
+    bounds = interval(row["ci_low"], row["ci_high"])
+    return f"{row['n']}", number(row["mean"]), number(row["sd"]), number(row["median"]), bounds
 
 
 def interval_note(rows: Sequence[Row]) -> str:
@@ -192,6 +203,7 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
     title = measure_label(f"{questionnaire}/x").partition(":")[0]
     wide = {name: material.participant_means(name) for name in scales}
     blocks: list[Block] = [_ratings_table(material, questionnaire, title, names)]
+    blocks += _by_group(material, f"table-{safe_name(questionnaire)}", names)
     tested = [row for name in names for row in material.comparisons_of(name)]
     if tested:
         blocks.append(_tests_table(questionnaire, title, tested))

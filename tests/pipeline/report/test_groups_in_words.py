@@ -81,6 +81,16 @@ def test_a_difference_that_depends_on_the_group_is_a_caution(steadyhand: Steadyh
     page = read(steadyhand, study(tmp_path / "s", values, entry, "factors: {group: between}\n", people=people))
     assert "The difference depends: in Time (s) it is not the same at each level of group" in page
     assert "Participants were compared between the levels of group." in page
+    assert "Participants of each group: 5 new and 5 old." in page
+    assert "Means by group and condition. Group: 5 new and 5 old." in page
+    means = {(row["group"], row["condition"]): row for row in steadyhand.results()["descriptives_by_group"]}
+    assert {key: round(row["mean"], 2) for key, row in means.items()} == {
+        ("new", "A"): 20.5,
+        ("new", "B"): 15.6,
+        ("old", "A"): 14.36,
+        ("old", "B"): 14.4,
+    }
+    assert {(row["n"], row["group_n"], row["interval"]) for row in means.values()} == {(5, 5, "t")}
     assert "follow-up, paired t test, t(4)" in page
     assert "follow-up, Welch's t test, t(" in page
 
@@ -116,7 +126,14 @@ def test_a_mixed_anova_of_two_conditions_answers_by_their_difference(
 
 @pytest.mark.parametrize(
     ("label", "verb"),
-    [("Time", "was"), ("Errors", "were"), ("Corrections per trial", "were"), ("Success", "was"), ("Axis", "was")],
+    [
+        ("Time", "was"),
+        ("Errors", "were"),
+        ("Corrections per trial", "were"),
+        ("Success", "was"),
+        ("Axis", "was"),
+        ("Bias", "was"),
+    ],
 )
 def test_the_verb_fits_the_measure(label: str, verb: str) -> None:
     assert was(label) == verb

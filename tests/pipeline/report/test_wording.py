@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.words.names import was
 from pipeline.words.phrases import all_of
 from tests.pipeline.helpers import Steadyhand
 
@@ -96,8 +95,3 @@ def test_a_method_that_computed_nothing_is_not_among_the_methods(page: Page) -> 
 def test_one_participant_was_there(page: Page) -> None:
     text = page("conditions: [a, b]\n", "measures", measured({"t": [(1.0, 2.0)]}))
     assert "There was 1 participant and" in text
-
-
-@pytest.mark.parametrize(("label", "verb"), [("Bias", "was"), ("Errors", "were"), ("Loss", "was"), ("Time", "was")])
-def test_the_verb_fits_the_measure(label: str, verb: str) -> None:
-    assert was(label) == verb

@@ -71,6 +71,7 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
         "learning",
         "fitts",
         "fitts_points",
+        "descriptives_by_group",
     )
     assert in_results_of("replay") == ["accuracy", "replay_means", "replay_exclusions"]
     assert written_by("replay") == ["accuracy", "replay_trials", "replay_means", "replay_exclusions"]
