@@ -12,7 +12,7 @@ import pandas as pd
 from pipeline.analysis import model_rows, orders
 from pipeline.analysis.complete_cases import Request, rows_and_factors
 from pipeline.analysis.factors import Factors, missing_cells
-from pipeline.analysis.groups import one_condition_each
+from pipeline.analysis.groups import CONDITION, between_factor, group_of_each, one_condition_each
 from pipeline.analysis.kinds_of_values import skewed, yes_or_no
 from pipeline.errors import PipelineError
 from pipeline.statistics import OK
@@ -63,6 +63,7 @@ def findings(
         rows += [row for request in one_per_measure for row in _order_effects(request)]
     rows += [
         *_complete_people(study, one_per_measure),
+        *_shared_names(requests),
         *_trials(trials, one_per_measure),
         *yes_or_no(requests),
         *skewed(requests),
@@ -88,6 +89,26 @@ def _between(study: Study, requests: Sequence[Request]) -> Iterator[Row]:
         )
     row = {"what": "participants of each condition, who met one each", "found": sizes, "expected": "the same in each"}
     yield {**row, "remark": remark}
+
+
+def _shared_names(requests: Sequence[Request]) -> Iterator[Row]:
+    """Groups that are named like conditions: a pair `A − B at A` can then be read in two ways."""
+    factors: dict[str, set[str]] = {}
+    for request in requests:
+        if TESTS[request.entry.test].design in ("between", "mixed") and between_factor(request) not in factors:
+            factor = between_factor(request)
+            rows, _ = rows_and_factors(request, request.measures)
+            factors[factor] = set(group_of_each(request, factor, rows).values())
+    for factor, levels in factors.items():
+        shared = [condition for condition in requests[0].study.conditions if condition in levels]
+        if shared and factor != CONDITION:
+            name = "names" if len(shared) == 1 else "name"
+            remark = (
+                f"{listing(shared)} {name} a condition and a group, so that pairs at a level can be read in two ways;"
+                f" give the levels of {factor} names of their own"
+            )
+            row = {"what": "names of the groups", "found": listing(shared), "expected": "other names than conditions"}
+            yield {**row, "remark": remark}
 
 
 def _complete_orders(conditions: Sequence[str], run: pd.DataFrame) -> dict[str, Order]:

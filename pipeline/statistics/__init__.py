@@ -23,7 +23,8 @@ ONE_IN_GROUP = "undefined: a group has only one participant"
 EQUAL_IN_GROUP = "undefined: all values of one group are equal, so its mean has no standard error"
 EQUAL_IN_GROUPS = "undefined: no value varies within its group, so there is no error to test against"
 NOT_BINARY = "undefined: there are values other than 0 and 1"
-NOT_COUNTS = "undefined: there are values that are no counts, or an exposure that is not above 0"
+NOT_COUNTS = "undefined: there are values that are no counts, which are whole numbers from 0 on"
+NOT_EXPOSED = "undefined: there is an exposure that is not above 0, so there is no rate; correct it, or leave it empty"
 ONE_LEVEL = "undefined: a condition has no value"
 SEPARATED = (
     "undefined: in one condition all answers are the same, or no event was counted, so its odds or rate has no log"
@@ -55,6 +56,7 @@ STATUSES = (
     EQUAL_IN_GROUPS,
     NOT_BINARY,
     NOT_COUNTS,
+    NOT_EXPOSED,
     ONE_LEVEL,
     SEPARATED,
     ONE_ITEM,

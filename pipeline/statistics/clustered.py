@@ -23,6 +23,7 @@ from pipeline.statistics import (
     NOT_BINARY,
     NOT_CONVERGED,
     NOT_COUNTS,
+    NOT_EXPOSED,
     ONE_LEVEL,
     SEPARATED,
     TOO_FEW_VALUES,
@@ -81,8 +82,8 @@ def _undefined(trials: Trials, k: int, people: int, family: Family) -> str | Non
     seen = np.bincount(trials.conditions, minlength=k)
     if k < 2 or not seen.all():
         return ONE_LEVEL
-    if not _fits(trials, family):
-        return NOT_BINARY if family == "logit" else NOT_COUNTS
+    if status := _unfit(trials, family):
+        return status
     means = np.bincount(trials.conditions, trials.outcome, k) / seen
     at_end = (means == 0) | ((means == 1) & (family == "logit"))
     if at_end.any():
@@ -90,12 +91,13 @@ def _undefined(trials: Trials, k: int, people: int, family: Family) -> str | Non
     return TOO_FEW_VALUES if people <= k else None
 
 
-def _fits(trials: Trials, family: Family) -> bool:
-    """Whether the outcomes fit the family: 0 or 1, or counts with exposures above 0."""
+def _unfit(trials: Trials, family: Family) -> str | None:
+    """Why the outcomes do not fit the family, 0 or 1 or counts with exposures above 0; None where they do."""
     if family == "logit":
-        return bool(np.isin(trials.outcome, (0.0, 1.0)).all())
-    exposed = trials.exposure is None or (trials.exposure > 0).all()
-    return bool(exposed and ((trials.outcome >= 0) & (trials.outcome % 1 == 0)).all())
+        return None if np.isin(trials.outcome, (0.0, 1.0)).all() else NOT_BINARY
+    if not ((trials.outcome >= 0) & (trials.outcome % 1 == 0)).all():
+        return NOT_COUNTS
+    return None if trials.exposure is None or (trials.exposure > 0).all() else NOT_EXPOSED
 
 
 def _estimated(trials: Trials, clusters: IntArray, k: int, family: Family) -> Estimated | str:

@@ -8,6 +8,8 @@ from pipeline.words.comparison import Row
 from pipeline.words.names import unit_of
 from pipeline.words.numbers import number, percent
 
+_PERCENTAGE_MAX = 10.0  # 1000 %
+
 
 def change_phrase(row: Row) -> str:
     """`reduced by 38.3 %`, or where a percentage is not meaningful `higher by 0.42`."""
@@ -44,8 +46,11 @@ def meaningful_reduction(row: Row) -> float | None:
     """The reduction relative to the first mean, or None where a percentage is not meaningful.
 
     It is on a ratio scale only, whose zero means "none" (Stevens 1946), and counts are one. Shares of answers are left
-    out: a percentage of percentages is easily misread.
+    out: a percentage of percentages is easily misread. So is a mean of more than eleven times the first: that much is
+    said by a first mean near zero, which is hardly known.
     """
+    if row["reduction"] is not None and abs(row["reduction"]) > _PERCENTAGE_MAX:
+        return None
     values = TESTS[row["test"]].values
     is_ratio_scale = measure(row["measure"]).scale == "ratio" or values == "counts"
     return row["reduction"] if is_ratio_scale and values != "answers" else None

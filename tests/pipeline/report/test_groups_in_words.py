@@ -124,6 +124,19 @@ def test_a_mixed_anova_of_two_conditions_answers_by_their_difference(
         assert f"Completion time was {-amount:.2f} s lower (better) with B than with A (p" in page
 
 
+def test_groups_that_are_named_like_conditions_are_a_remark(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    times: dict[str, list[float]] = {
+        "A": [20.0, 21, 19, 22, 14, 15, 13.5, 14.2],
+        "B": [15.0, 16.5, 14.2, 16, 14, 15, 13, 15],
+    }
+    people = "participant,group\n" + "".join(f"P{at:02},{'A' if at <= 4 else 'old'}\n" for at in range(1, 9))
+    entry = ["measure: time_s, test: mixed_anova"]
+    values: Values = {"time_s": times}
+    folder = study(tmp_path / "s", values, entry, "factors: {group: between}\n", people=people)
+    page = read(steadyhand, folder)
+    assert "A names a condition and a group, so that pairs at a level can be read in two ways" in page
+
+
 @pytest.mark.parametrize(
     ("label", "verb"),
     [

@@ -95,3 +95,23 @@ def test_a_method_that_computed_nothing_is_not_among_the_methods(page: Page) -> 
 def test_one_participant_was_there(page: Page) -> None:
     text = page("conditions: [a, b]\n", "measures", measured({"t": [(1.0, 2.0)]}))
     assert "There was 1 participant and" in text
+
+
+def test_a_percentage_of_a_mean_near_zero_is_not_said(page: Page) -> None:
+    pairs = [(0.0001, 12.0), (0.0002, 12.1), (0.0003, 11.9), (0.0001, 12.3), (0.0004, 12.2)]
+    settings = "conditions: [a, b]\ncomparisons: [{measure: error_mm, test: t_paired}]\n"
+    text = page(settings, "measures", measured({"error_mm": pairs}))
+    assert "Error was 12.10 mm higher with b than with a" in text
+    assert " % higher" not in text
+
+
+@pytest.mark.parametrize(
+    ("exposure", "count", "why"), [(0, 2, "an exposure that is not above 0"), (30, 1.5, "no counts")]
+)
+def test_what_a_rate_cannot_be_of_is_told_apart(page: Page, exposure: float, count: float, why: str) -> None:
+    errors = [(1.0, 3.0), (2.0, 2.0), (4.0, 1.0), (3.0, 5.0), (count, 1.0)]
+    seconds = [(30.0, 30.0)] * 4 + [(float(exposure), 30.0)]
+    settings = "conditions: [a, b]\ncomparisons: [{measure: errors, test: gee_poisson, exposure: secs}]\n"
+    text = page(settings, "measures", measured({"errors": errors, "secs": seconds}))
+    assert why in text
+    assert ("no counts" in text) != ("an exposure that is not above 0" in text)

@@ -165,7 +165,7 @@ DIFFER = [[[0, 1], [1, 1]], [[0, 0], [1, 0]], [[1, 0], [0, 1]], [[0, 0], [1, 1]]
         ([[[0], [1]], [[0], [1]], [[0], [0]]], "logit", "undefined: in one condition all answers are the same"),
         ([[[0], [0]], [[0], [0]], [[0], [0]]], "logit", "undefined: no value varies"),
         ([[[0, 2], [1]]] * 3, "logit", "undefined: there are values other than 0 and 1"),
-        ([[[0, 1.5], [1]]] * 3, "poisson", "undefined: there are values that are no counts"),
+        ([[[0, 1.5], [1]]] * 3, "poisson", "undefined: there are values that are no counts, which"),
         ([[[0], [3]], [[0], [1]], [[0], [2]]], "poisson", "undefined: in one condition all answers are the same"),
         ([[[0, 1], []]] * 3, "logit", "undefined: a condition has no value"),
         ([[[0, 1, 1], [0, 0, 1]]] * 4, "logit", "undefined: all differences are equal"),
