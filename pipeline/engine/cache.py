@@ -42,7 +42,7 @@ digest. `damage` and `verify` read everything, which also finds bad sectors of a
 power cut. A damaged entry is treated as missing: it is computed again, and the user is told.
 
 What must stay true. (1) A key covers everything that may change the entry. Otherwise stale results are taken for
-current ones, and the cache cannot notice it. (2) A function that fills a folder writes there only. (3) Files below an
+current ones, and the cache cannot notice it. For files that change while they are read, see input_files. (2) A function that fills a folder writes there only. (3) Files below an
 entry are never written to. (4) `new` is on the same file system as the entries.
 
 What may change. Anything about `new`, the lock and `inputs`. A change to what entry.json holds needs another LAYOUT,

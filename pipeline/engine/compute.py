@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from pipeline.engine.cache import Cache, Entry, digest_of
+from pipeline.engine.input_files import CHANGED, InputChangedError, InputFiles
 from pipeline.engine.processes import Processes
 from pipeline.engine.stage import Outcome, Stage, Work
 from pipeline.errors import RUN_AGAIN, PipelineError, SessionError
@@ -39,23 +40,24 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
     """Run a stage's function and keep its result in the cache.
 
     A session that cannot be used is an outcome, not an error, so the other sessions go on. So is an internal error in
-    one session; such an outcome is kept under a key of its own, so that the next run tries again. Raises PipelineError
-    where the cache cannot be written.
+    one session, and a log that changed while it was read; such an outcome is kept under a key of its own, so that the
+    next run tries again. Raises PipelineError where the cache cannot be written, and InputChangedError where a stage of
+    the whole study read a file that changed.
     """
-    cache = Cache(cache_root)
+    cache, files = Cache(cache_root), InputFiles(stage, work)
     try:
         with cache.new(stage.name) as out:
-            try:
-                outcome = _run(stage, replace(work, out=out))
-            except SessionError as error:
-                outcome = Outcome(set_aside=str(error))
-            except PipelineError:
-                raise
-            except Exception as error:
-                if stage.scope != "session" or _cannot_write(error):
-                    raise
-                return keep_unusable(cache, stage, key, _internal_error(stage, error))
-            return cache.keep(stage.name, key, out, asdict(outcome))
+            outcome, error = _outcome(stage, replace(work, out=out))
+            changed = files.changed()  # before the error, which half a file may have caused
+            if changed is not None and stage.scope == "session":
+                return keep_unusable(cache, stage, key, CHANGED)
+            if changed is not None:
+                raise InputChangedError(f"{changed}: {CHANGED}")
+            if error is None:
+                return cache.keep(stage.name, key, out, asdict(outcome))
+            if isinstance(error, PipelineError) or stage.scope != "session" or _cannot_write(error):
+                raise error
+            return keep_unusable(cache, stage, key, _internal_error(stage, error))
     except OSError as error:
         if not _cannot_write(error):
             raise
@@ -65,10 +67,15 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
         ) from None
 
 
-def _run(stage: Stage, work: Work) -> Outcome:
+def _outcome(stage: Stage, work: Work) -> tuple[Outcome, Exception | None]:
+    """What the stage's function reports, or the error that it raised."""
     module, name = stage.function.split(":")
-    outcome: Outcome = getattr(import_module(module), name)(work)
-    return outcome
+    try:
+        return getattr(import_module(module), name)(work), None
+    except SessionError as error:
+        return Outcome(set_aside=str(error)), None
+    except Exception as error:  # noqa: BLE001 - raised by the caller
+        return Outcome(), error
 
 
 def _internal_error(stage: Stage, error: Exception) -> str:

@@ -12,8 +12,9 @@ from pathlib import Path
 from pipeline.engine.cache import digest_of, file_digest
 
 _SETTLED_NS = 2_000_000_000  # coarser than any file system's clock: a later change shows in the times
-_Stamp = list[int]
-_Known = dict[str, tuple[_Stamp, str]]
+Stamp = list[int]
+"""Size, time of modification and of the last change (ns), and inode of a file."""
+_Known = dict[str, tuple[Stamp, str]]
 
 
 def file_digests(
@@ -34,17 +35,18 @@ def file_digests(
     now: _Known = {}
     digests = {}
     for name, path in files.items():
-        stamp = _stamp(path)
+        current = stamp(path)
         known = before.get(name)
-        digests[name] = known[1] if known is not None and known[0] == stamp else read_digest(path)
-        if max(stamp[1:3]) < now_ns() - _SETTLED_NS:
-            now[name] = (stamp, digests[name])
+        digests[name] = known[1] if known is not None and known[0] == current else read_digest(path)
+        if max(current[1:3]) < now_ns() - _SETTLED_NS:
+            now[name] = (current, digests[name])
     if now != before:
         _write(now, kept)
     return digests
 
 
-def _stamp(path: Path) -> _Stamp:
+def stamp(path: Path) -> Stamp:
+    """What the file system says of a file; it changes with every change of the file."""
     state = path.stat()
     return [state.st_size, state.st_mtime_ns, state.st_ctime_ns, state.st_ino]
 
@@ -55,7 +57,7 @@ def _read(kept: Path) -> _Known:
         content = json.loads(kept.read_text(encoding="utf-8"))
         if digest_of(content["files"]) != content["sha256"]:
             return {}
-        return {name: (list(stamp), str(digest)) for name, (stamp, digest) in content["files"].items()}
+        return {name: (list(known), str(digest)) for name, (known, digest) in content["files"].items()}
     except (OSError, ValueError, KeyError, TypeError):
         return {}
 

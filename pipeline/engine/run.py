@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.engine.cache import Cache, Entry
+from pipeline.engine.cache import Cache, Entry, file_digest
 from pipeline.engine.entries import entries_of, entry_of_study
+from pipeline.engine.input_files import CHANGED, InputChangedError
 from pipeline.engine.keys import declared_by, work_and_key
 from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
@@ -22,9 +24,20 @@ from pipeline.study.settings import Study
 def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
     """Run the stages over a study; what the cache holds is not computed again.
 
-    Raises PipelineError for a study that cannot be read, or one without tables and without a usable session.
+    Where a table or study.yaml changes while it is read, everything that depends on it is done once more; so is a log
+    by itself. Raises PipelineError for a study that cannot be read, one without tables and without a usable session,
+    and one whose tables or study.yaml change again.
     """
     began = time.monotonic()
+    try:
+        result = _run_stages(folder, stages, resources)
+    except InputChangedError:
+        result = _run_stages(folder, stages, resources)
+    result.seconds = time.monotonic() - began
+    return result
+
+
+def _run_stages(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
     result, sessions = open_study(folder, resources.cache)
     for stage in stages:
         try:
@@ -35,15 +48,31 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources
             else:
                 work, key = work_and_key(declared_by(stage, result.study), result, sessions)
                 result.entries[stage.name] = {"": entry_of_study(stage, result, work, key, resources)}
+        except InputChangedError:
+            raise
         except PipelineError as error:
             raise PipelineError(_with_context(folder, result, str(error))) from None
     result.sessions = sessions
-    result.seconds = time.monotonic() - began
     return result
 
 
 def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], resources: Resources) -> dict[str, Entry]:
-    """The stage's entry for each session, computed where the cache has none."""
+    """The stage's entry for each session, computed where the cache has none; of a log that changed, once more."""
+    entries = _entries_of_sessions(stage, result, sessions, resources)
+    changed = [session for session in sessions if entries[session.id].outcome["set_aside"] == CHANGED]
+    if changed:
+        computed = result.computed[stage.name]
+        for session in changed:
+            with suppress(OSError):  # one that has gone meanwhile is set aside as one that changed
+                result.inputs[session.path.relative_to(result.folder).as_posix()] = file_digest(session.path)
+        entries |= _entries_of_sessions(stage, result, changed, resources)
+        result.computed[stage.name] += computed
+    return entries
+
+
+def _entries_of_sessions(
+    stage: Stage, result: Result, sessions: Sequence[Session], resources: Resources
+) -> dict[str, Entry]:
     declared = declared_by(stage, result.study)
     pieces = (work_and_key(declared, result, [session]) for session in sessions)
     entries = entries_of(stage, result, pieces, resources)

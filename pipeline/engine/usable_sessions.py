@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.engine.cache import Cache, Entry
-from pipeline.engine.input_digests import file_digests
+from pipeline.engine.cache import Cache, Entry, file_digest
+from pipeline.engine.input_digests import file_digests, stamp
+from pipeline.engine.input_files import CHANGED, InputChangedError
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Outcome
 from pipeline.errors import PipelineError
-from pipeline.study.folder import TABLE_FIELDS, files_by_fixed_name, find_sessions, load_study
+from pipeline.study.folder import SETTINGS_FILE, TABLE_FIELDS, files_by_fixed_name, find_sessions, load_study
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
@@ -19,18 +20,25 @@ from pipeline.study.settings import Study
 def open_study(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
     """A study before its first stage, and its sessions with participant and condition as their file names say.
 
-    Raises PipelineError where the study cannot be read.
+    Raises PipelineError where the study cannot be read, InputChangedError where study.yaml changes meanwhile.
     """
+    settings_file = folder / SETTINGS_FILE
+    before = (stamp(settings_file), file_digest(settings_file)) if settings_file.is_file() else None
     study = load_study(folder)
     listed = find_sessions(folder, study)
     result = Result(folder.resolve(), study, set_aside=listed.set_aside, unused=listed.unused)
     result.inputs = _input_digests(result.folder, study, listed.sessions, cache)
+    if (
+        stamp(settings_file),
+        result.inputs[SETTINGS_FILE],
+    ) != before:  # then these settings and the digest may be of different contents
+        raise InputChangedError(f"{settings_file}: {CHANGED}")
     return result, listed.sessions
 
 
 def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache: Cache) -> dict[str, str]:
     """SHA-256 of every file of the study that is read, by its path in the study."""
-    paths = [root / "study.yaml", *(session.path for session in sessions)]
+    paths = [root / SETTINGS_FILE, *(session.path for session in sessions)]
     for field_name in TABLE_FIELDS:
         name = getattr(study, field_name)
         if name is not None:
