@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class PipelineError(Exception):
@@ -18,6 +19,17 @@ class SessionError(PipelineError):
 
 class WorkerLostError(Exception):
     """The process that computed something died of it, or was killed; its text says by what."""
+
+
+class DamagedTableError(PipelineError):
+    """A table that was kept is not what was written: a disk or a copy of the cache is at fault."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)  # the one argument, so that the error can be handed from process to process
+        self.path = path
+
+    def __str__(self) -> str:
+        return f"{self.path}: is damaged; run `steadyhand cache verify`, which removes it, and the command again"
 
 
 RUN_AGAIN = "Finished work is cached: run the command again to continue"

@@ -35,15 +35,21 @@ removes its own folder, since the contents are the same. The lock only keeps one
 another has just replaced it. Readers take no lock.
 
 What `get` trusts. Reading every table to compare digests would take longer than many runs. So `keep` sets the time of
-each file to an even second in the past (`_seal`), and `get` considers a file unchanged as long as it has that time and
-its size. Whatever writes to the file sets another time, even within one tick of the coarsest clock. A file with another
-time (after a copy of the cache, say) is read and compared. entry.json is always read, and checked against its own
-digest. `damage` and `verify` read everything, which also finds bad sectors of a disk and writes that were lost in a
-power cut. A damaged entry is treated as missing: it is computed again, and the user is told.
+each file to an even second in the past (`_seal`), and `get` considers a table unchanged as long as it has that time and
+its size. Whatever writes to the file sets another time, even within one tick of the coarsest clock. A table with
+another time (after a copy of the cache, say) is read and compared. So is every other file, such as results.json, and
+entry.json is checked against its own digest. `damage` and `verify` read everything.
+
+Decay. Bad sectors of a disk, and writes that were lost in a power cut, change a file and not its time. Tables have
+checksums of their own (pipeline.tables.table), which are compared whenever a table is read. Where a stage finds one
+wrong, `distrust` sets another time and the run begins again: `get` then reads the whole entry.
+
+A damaged entry is treated as missing: it is computed again, and the user is told.
 
 What must stay true. (1) A key covers everything that may change the entry. Otherwise stale results are taken for
-current ones, and the cache cannot notice it. For files that change while they are read, see input_files. (2) A function that fills a folder writes there only. (3) Files below an
-entry are never written to. (4) `new` is on the same file system as the entries.
+current ones, and the cache cannot notice it. For files that change while they are read, see input_files. (2) A function
+that fills a folder writes there only. (3) Files below an entry are never written to. (4) `new` is on the same file
+system as the entries.
 
 What may change. Anything about `new`, the lock and `inputs`. A change to what entry.json holds needs another LAYOUT,
 which is in every key: entries of the former layout are then never looked for, and `verify` removes them. Where Outcome
@@ -68,6 +74,7 @@ from typing import Any
 LAYOUT = 2
 """The version of what entry.json holds; it is part of every key."""
 _MANIFEST = "entry.json"
+_TABLE = ".parquet"
 _NEW = "new"
 _KEY_LENGTH = 64
 _CLOCK_S = 2  # the coarsest clock of a file system
@@ -111,7 +118,7 @@ class Cache:
     def get(self, stage: str, key: str) -> Entry | None:
         """The entry; None where there is none, or where a file of it is missing or has changed.
 
-        A file that still has the time and size it was kept with is not read.
+        A table that still has the time and size it was kept with is not read.
         """
         folder = self._folder(stage, key)
         try:
@@ -206,6 +213,13 @@ class _DamagedError(Exception):
     """Raised with the reason why a folder is not a whole entry."""
 
 
+def distrust(folder: Path) -> None:
+    """Have `get` read all of an entry the next time it is asked for it, since one of its tables cannot be right."""
+    for path in folder.rglob(f"*{_TABLE}"):
+        with suppress(OSError):
+            os.utime(path)
+
+
 def last_used_s(folder: Path) -> float:
     """When an entry was last used, in seconds since 1970; for a remnant, when it was last changed."""
     manifest = folder / _MANIFEST
@@ -226,7 +240,7 @@ def damage_in(folder: Path) -> str | None:
 def _read(folder: Path, read_digest: Callable[[Path], str], trust_times: bool) -> Entry:
     """The entry in a folder; raises _DamagedError where a file is not what was written.
 
-    With `trust_times`, a file that still has the time it was sealed with counts as unchanged and is not read.
+    With `trust_times`, a table that still has the time it was sealed with counts as unchanged and is not read.
     """
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
@@ -238,7 +252,7 @@ def _read(folder: Path, read_digest: Callable[[Path], str], trust_times: bool) -
         for name, written in files.items():
             path = folder / name
             now = path.stat()
-            untouched = trust_times and now.st_mtime_ns == manifest["sealed_ns"]
+            untouched = trust_times and name.endswith(_TABLE) and now.st_mtime_ns == manifest["sealed_ns"]
             if now.st_size != written["size"] or not (untouched or read_digest(path) == written["sha256"]):
                 raise _DamagedError(f"{name} has changed since it was written")
     except FileNotFoundError as error:

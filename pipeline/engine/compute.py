@@ -9,11 +9,11 @@ from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
 
-from pipeline.engine.cache import Cache, Entry, digest_of
+from pipeline.engine.cache import Cache, Entry, digest_of, distrust
 from pipeline.engine.input_files import CHANGED, InputChangedError, InputFiles
 from pipeline.engine.processes import Processes
 from pipeline.engine.stage import Outcome, Stage, Work
-from pipeline.errors import RUN_AGAIN, PipelineError, SessionError
+from pipeline.errors import RUN_AGAIN, DamagedTableError, PipelineError, SessionError
 
 Piece = tuple[Work, str]
 """A piece of work, and the key of its result."""
@@ -41,8 +41,8 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
 
     A session that cannot be used is an outcome, not an error, so the other sessions go on. So is an internal error in
     one session, and a log that changed while it was read; such an outcome is kept under a key of its own, so that the
-    next run tries again. Raises PipelineError where the cache cannot be written, and InputChangedError where a stage of
-    the whole study read a file that changed.
+    next run tries again. Raises PipelineError where the cache cannot be written, InputChangedError where a stage of the
+    whole study read a file that changed, and DamagedTableError where an entry that it read is damaged.
     """
     cache, files = Cache(cache_root), InputFiles(stage, work)
     try:
@@ -53,6 +53,8 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
                 return keep_unusable(cache, stage, key, CHANGED)
             if changed is not None:
                 raise InputChangedError(f"{changed}: {CHANGED}")
+            if isinstance(error, DamagedTableError):
+                distrust(error.path.parent)
             if error is None:
                 return cache.keep(stage.name, key, out, asdict(outcome))
             if isinstance(error, PipelineError) or stage.scope != "session" or _cannot_write(error):

@@ -19,7 +19,7 @@ from pipeline.engine.processes import InThisProcess, Processes, call_in_own_proc
 from pipeline.engine.resources import Resources
 from pipeline.engine.result import Damaged, Result
 from pipeline.engine.stage import Stage, Work
-from pipeline.errors import RUN_AGAIN, PipelineError, WorkerLostError
+from pipeline.errors import RUN_AGAIN, DamagedTableError, PipelineError, WorkerLostError
 
 _AHEAD = 256  # groups handed to the executor ahead of time: more than a cluster has processes, so that none waits
 _LARGEST_GROUP = 8  # pieces of one session computed together, so that its recording is loaded once
@@ -42,7 +42,7 @@ def entries_of(stage: Stage, result: Result, pieces: Iterable[Piece], resources:
             missing[key] = work, key
         else:
             entries[key] = entry
-    result.computed[stage.name] = len(missing)
+    result.computed[stage.name] = result.computed.get(stage.name, 0) + len(missing)
     if missing:
         resources.cache.root.mkdir(parents=True, exist_ok=True)  # a worker on another machine checks that it exists
         resources.progress.begin(stage.label or stage.name, len(missing), stage.unit)
@@ -56,7 +56,7 @@ def entries_of(stage: Stage, result: Result, pieces: Iterable[Piece], resources:
 def entry_of_study(stage: Stage, result: Result, work: Work, key: str, resources: Resources) -> Entry:
     """The entry of a stage of scope "study", computed where the cache has none."""
     entry = _look_up(stage, key, "", result, resources.cache)
-    result.computed[stage.name] = int(entry is None)
+    result.computed[stage.name] = result.computed.get(stage.name, 0) + int(entry is None)
     if entry is None:
         resources.progress.begin(stage.label or stage.name, 1)
         entry = _compute_study(stage, work, key, resources)
@@ -114,9 +114,11 @@ def _computed(stage: Stage, missing: Sequence[Piece], resources: Resources) -> I
 
     A piece whose process died is tried once more after the others, by itself: another piece of its group may have
     killed the process, or the machine may have been short of memory at that moment. If the process dies again, the
-    session is set aside, and tried again in the next run.
+    session is set aside, and tried again in the next run. DamagedTableError is raised after all else is computed:
+    one more attempt then finds all damaged entries.
     """
     lost: list[Piece] = []
+    damaged: DamagedTableError | None = None
     waiting: dict[Future[list[Entry]], list[Piece]] = {}
     try:
         for done in _as_completed(stage, _groups(missing, resources.fewest_groups), resources, waiting):
@@ -125,11 +127,15 @@ def _computed(stage: Stage, missing: Sequence[Piece], resources: Resources) -> I
                     yield key, _require_visible(entry)
             except WorkerLostError:
                 lost += waiting[done]
+            except DamagedTableError as error:
+                damaged = error
     finally:
         for future in waiting:
             future.cancel()
     for work, key in lost:
         yield key, _require_visible(_retry(stage, work, key, resources))
+    if damaged is not None:
+        raise damaged
 
 
 def _retry(stage: Stage, work: Work, key: str, resources: Resources) -> Entry:

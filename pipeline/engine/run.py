@@ -13,10 +13,10 @@ from pipeline.engine.entries import entries_of, entry_of_study
 from pipeline.engine.input_files import CHANGED, InputChangedError
 from pipeline.engine.keys import declared_by, work_and_key
 from pipeline.engine.resources import Resources
-from pipeline.engine.result import Result
+from pipeline.engine.result import Damaged, Result
 from pipeline.engine.stage import Stage
 from pipeline.engine.usable_sessions import open_study, require_data, usable_after
-from pipeline.errors import PipelineError
+from pipeline.errors import DamagedTableError, PipelineError
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
@@ -24,21 +24,36 @@ from pipeline.study.settings import Study
 def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
     """Run the stages over a study; what the cache holds is not computed again.
 
-    Where a table or study.yaml changes while it is read, everything that depends on it is done once more; so is a log
-    by itself. Raises PipelineError for a study that cannot be read, one without tables and without a usable session,
-    and one whose tables or study.yaml change again.
+    Where a table or study.yaml changes while it is read, the run begins once more. It does so too where a stage finds
+    an entry damaged, since that must be computed first. What was finished is in the cache. Raises PipelineError for a
+    study that cannot be read, one without tables and without a usable session, and one whose files change again.
     """
     began = time.monotonic()
-    try:
-        result = _run_stages(folder, stages, resources)
-    except InputChangedError:
-        result = _run_stages(folder, stages, resources)
-    result.seconds = time.monotonic() - began
-    return result
+    computed: dict[str, int] = {}
+    damaged: list[Damaged] = []
+    times_changed = times_damaged = 0
+    while True:
+        try:
+            result = _run_stages(folder, stages, resources, computed, damaged)
+        except InputChangedError:
+            times_changed += 1
+            if times_changed > 1:
+                raise
+        except DamagedTableError:
+            times_damaged += 1
+            if times_damaged > len(stages):  # each stage may find damage in those before it
+                raise
+        else:
+            result.seconds = time.monotonic() - began
+            return result
 
 
-def _run_stages(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
+def _run_stages(
+    folder: Path, stages: Sequence[Stage], resources: Resources, computed: dict[str, int], damaged: list[Damaged]
+) -> Result:
+    """Add to what earlier attempts have `computed` and found `damaged`."""
     result, sessions = open_study(folder, resources.cache)
+    result.computed, result.damaged = computed, damaged
     for stage in stages:
         try:
             if stage.scope == "session":
@@ -48,7 +63,7 @@ def _run_stages(folder: Path, stages: Sequence[Stage], resources: Resources) -> 
             else:
                 work, key = work_and_key(declared_by(stage, result.study), result, sessions)
                 result.entries[stage.name] = {"": entry_of_study(stage, result, work, key, resources)}
-        except InputChangedError:
+        except (InputChangedError, DamagedTableError):
             raise
         except PipelineError as error:
             raise PipelineError(_with_context(folder, result, str(error))) from None
@@ -61,12 +76,10 @@ def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], res
     entries = _entries_of_sessions(stage, result, sessions, resources)
     changed = [session for session in sessions if entries[session.id].outcome["set_aside"] == CHANGED]
     if changed:
-        computed = result.computed[stage.name]
         for session in changed:
             with suppress(OSError):  # one that has gone meanwhile is set aside as one that changed
                 result.inputs[session.path.relative_to(result.folder).as_posix()] = file_digest(session.path)
         entries |= _entries_of_sessions(stage, result, changed, resources)
-        result.computed[stage.name] += computed
     return entries
 
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from pipeline.errors import DamagedTableError
 from pipeline.tables.catalogue import TABLES
 from pipeline.tables.columns import COUNT, FLOAT, TEXT
 
@@ -127,6 +128,7 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
             use_dictionary=False if small else plain,
             column_encoding=None if small else encodings,
             store_schema=False,
+            write_page_checksum=True,
         )
 
 
@@ -147,17 +149,34 @@ def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
 
 
 def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
-    """As `read`, but an Arrow table."""
+    """As `read`, but an Arrow table. Both raise DamagedTableError for a file that is not what was written."""
     merged, parts = [], []
     for folder in [folders] if isinstance(folders, Path) else folders:
-        path = folder / f"{name}.parquet"
         with suppress(FileNotFoundError):
-            content = pa.BufferReader(path.read_bytes())  # opening it as a file takes longer than reading a small table
-            parts.append(pq.ParquetFile(content).read(use_threads=False))
+            parts.append(_read_file(name, folder / f"{name}.parquet"))
         if len(parts) == _PARTS:
             merged.append(pa.concat_tables(parts).combine_chunks())
             parts = []
     return pa.concat_tables([*merged, *parts]) if merged or parts else TABLES[name].schema.empty_table()
+
+
+def _read_file(name: str, path: Path) -> pa.Table:
+    """Raises DamagedTableError where a checksum, the columns or the number of rows differ from what was written.
+
+    The pages have checksums. What stands beside them in the file has none, but where a bit of it changes, the file
+    cannot be read, or the columns are others, or the two numbers of rows in it differ.
+    """
+    try:
+        content = pa.BufferReader(path.read_bytes())  # opening it as a file takes longer than reading a small table
+        file = pq.ParquetFile(content, page_checksum_verification=True)
+        table = file.read(use_threads=False)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, pa.ArrowException):
+        raise DamagedTableError(path) from None
+    if table.schema != TABLES[name].schema or len(table) != file.metadata.num_rows:
+        raise DamagedTableError(path)
+    return table
 
 
 Columns = Mapping[str, np.ndarray[Any, Any]]

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 from pipeline.__main__ import main
@@ -228,6 +229,48 @@ def test_a_damaged_entry_is_computed_again_and_said(study: Path, undisturbed: by
         assert "Computed: fuse 1 (" in ran.out
         assert (filled.out / "results.json").read_bytes() == undisturbed
     assert "damaged" not in filled("compare", study).err
+
+
+def _decay(path: Path) -> None:
+    """Flip a bit of what the file holds, as a disk does: the file's time stays."""
+    sealed, content = path.stat(), bytearray(path.read_bytes())
+    place = len(content) // 3
+    if path.suffix == ".parquet":
+        column = pq.ParquetFile(path).metadata.row_group(0).column(0)
+        place = column.data_page_offset + column.total_compressed_size - 1
+    content[place] ^= 4
+    path.write_bytes(content)
+    os.utime(path, ns=(sealed.st_atime_ns, sealed.st_mtime_ns))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_decay_that_no_time_tells_of_is_computed_again_when_it_is_read(
+    study: Path, undisturbed: bytes, filled: Steadyhand, tmp_path: Path, jobs: int
+) -> None:
+    root = shutil.copytree(study, tmp_path / "study")
+    for path in filled.cache.glob("ingest/*/*/positions.parquet"):
+        _decay(path)
+    _decay(next(filled.cache.glob("assess/*/*/trials.parquet")))
+    shutil.rmtree(filled.cache / "fuse")  # so that both sessions are read again
+    shutil.rmtree(filled.cache / "measure")
+    ran = filled("compare", root, "--jobs", str(jobs))
+    assert ran.code == 0
+    for session in SESSIONS:
+        said = f'"ingest" of session {session} was damaged (positions.parquet has changed since it was written)'
+        assert ran.err.count(said) == 1
+    assert (
+        ran.err.count("was damaged (trials.parquet has changed since it was written) and has been computed again") == 1
+    )
+    assert "Computed: ingest 2, fuse 4, " in ran.out
+    assert (filled.out / "results.json").read_bytes() == undisturbed
+    assert "Nothing had changed" in filled("compare", root).out
+
+
+def test_decay_of_what_is_copied_to_the_user_is_seen(study: Path, undisturbed: bytes, filled: Steadyhand) -> None:
+    _decay(next(filled.cache.glob("compare/*/*/results.json")))
+    ran = filled("compare", study)
+    assert "was damaged (results.json has changed since it was written) and has been computed again" in ran.err
+    assert (filled.out / "results.json").read_bytes() == undisturbed
 
 
 @pytest.fixture
