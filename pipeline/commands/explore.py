@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -61,9 +60,13 @@ def explore(folder: Path, options: Options, out: Path | None, jobs: int | None, 
     except KeyboardInterrupt:
         raise _StoppedError("interrupted; nothing was written") from None
     explored = _explored(folder.resolve().name, setting, grid, rows)
-    _write(explored, grid, target)
+    _write(explored, grid, target, ("explore", explored.name, *_given(options)))
     _say(explored)
     console.say(f"Report: {console.short_path(target / _PAGE)}  {console.short_path(target / _PRINT)}")
+
+
+def _given(options: Options) -> list[str]:
+    return [f"--{name}={value}" for name, value in asdict(options).items() if value is not None]
 
 
 class _StoppedError(PipelineError):
@@ -143,7 +146,7 @@ def _explored(name: str, setting: Setting, grid: Grid, rows: list[dict[str, Any]
     return Explored(name, setting.study, result_tables, pays, own, grid.participants, grid.repeats)
 
 
-def _write(explored: Explored, grid: Grid, target: Path) -> None:
+def _write(explored: Explored, grid: Grid, target: Path, command: Sequence[str]) -> None:
     """The pages, results.json and the tables, each whole or not at all."""
     from pipeline.commands.publish import copy, publish_exploration
     from pipeline.report.document import html, pdf
@@ -166,7 +169,7 @@ def _write(explored: Explored, grid: Grid, target: Path) -> None:
         pdf.render(pages, pictures, folder / _PRINT)
         for path in sorted(folder.iterdir()):
             copy(path, target / path.name)
-    publish_exploration(explored.study, target, sys.argv)
+    publish_exploration(explored.study, target, command)
 
 
 def _say(explored: Explored) -> None:

@@ -92,9 +92,13 @@ def publish_exploration(study: Study, folder: Path, command: Sequence[str]) -> N
 
 
 def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
-    """What ran: the command, versions, and each stage's digest, which covers its code and the versions of libraries."""
+    """What ran: the command, versions, and each stage's digest, which covers its code and the versions of libraries.
+
+    `command` says what of it has a say in the results, studies by name. Folders, and how many processes computed, would
+    tell of a person's machine and make the same report another file elsewhere.
+    """
     return {
-        "command": [Path(command[0]).name, *command[1:]],
+        "command": ["steadyhand", *command],
         "python": platform.python_version(),
         "versions": versions(["steadyhand", *LIBRARIES, *OF_STATISTICS]),
         "code_sha256": {stage.name: code_digest(stage.module) for stage in stages},

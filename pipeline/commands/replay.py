@@ -87,7 +87,9 @@ def replay(
 
     code = for_each_study(studies, INGEST, jobs, cache, then, bring=bring, executor_name=executor)
     if gathered.results:
-        _write(gathered, folder)
+        further = () if estimators is None else ("--estimators", estimators.name)
+        changed = [word for change in changes for word in ("--set", change)]
+        _write(gathered, folder, ("replay", *(result.name for result in gathered.results), *changed, *further))
     sys.exit(code)
 
 
@@ -182,7 +184,7 @@ def _settings(variant: Variant) -> Row:
     return {"estimator": variant.estimator, "variant": variant.label, "settings": settings}
 
 
-def _write(gathered: _Gathered, folder: Path) -> None:
+def _write(gathered: _Gathered, folder: Path, command: Sequence[str]) -> None:
     """Write replay.html, replay.pdf, results.json and the tables as Parquet, and print the ranking."""
     accuracy, trials = pd.concat(gathered.accuracy), pd.concat(gathered.trials)
     frames = {
@@ -198,7 +200,7 @@ def _write(gathered: _Gathered, folder: Path) -> None:
         _fill(gathered.studies, frames, Path(drawn), Path(filled))
         for name in files:
             copy(Path(filled) / name, folder / name)
-    publish_provenance(gathered.results, folder, sys.argv)
+    publish_provenance(gathered.results, folder, command)
     _say(list(tables.records("replay_means", frames["replay_means"])), reference_phrase(accuracy["reference"]))
     for caution in in_doubt(gathered.studies):
         console.say(caution)

@@ -32,7 +32,7 @@ def report(
     for name in wanted:
         if name not in FORMATS:
             raise PipelineError(f'--format: there is no "{name}"{did_you_mean(name, FORMATS)}')
-    _run(studies, COMPARE if wanted == ["json"] else STAGES, out, jobs, cache, executor, wanted)
+    _run(studies, COMPARE if wanted == ["json"] else STAGES, out, jobs, cache, executor, wanted, formats)
 
 
 def compare(studies: Sequence[Path], out: Path | None, jobs: int | None, cache: Path | None, executor: str) -> None:
@@ -48,6 +48,7 @@ def _run(
     cache: Path | None,
     executor: str,
     formats: Sequence[str] = (),
+    formats_given: str | None = None,
 ) -> None:
     folders = dict(zip(studies, _out_folders(studies, out), strict=True))
     for folder in folders.values():
@@ -56,11 +57,12 @@ def _run(
     def write(study: Path, result: Result) -> int:
         _show(result)
         if formats:
-            publish(result, folders[study], sys.argv, formats)
+            given = () if formats_given is None else ("--format", formats_given)
+            publish(result, folders[study], ("report", result.name, *given), formats)
             pages = (console.short_path(folders[study] / FORMATS[name][0]) for name in formats[:2])
             console.say(f"Report: {'  '.join(pages)}")
         else:
-            publish_results(result, folders[study], sys.argv)
+            publish_results(result, folders[study], ("compare", result.name))
             console.say(f"Results: {console.short_path(folders[study] / 'results.json')}")
         console.say(computed_message(result))
         return result.exit_code

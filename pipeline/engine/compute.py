@@ -59,7 +59,10 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
                 return cache.keep(stage.name, key, out, asdict(outcome))
             if isinstance(error, PipelineError) or stage.scope != "session" or _cannot_write(error):
                 raise error
-            return keep_unusable(cache, stage, key, _internal_error(stage, error))
+            reason = _internal_error(stage, error)
+            for folder in (work.folder, cache_root):  # the reason is part of the results, which name no folder
+                reason = reason.replace(f"{folder}/", "")
+            return keep_unusable(cache, stage, key, reason)
     except OSError as error:
         if not _cannot_write(error):
             raise

@@ -132,7 +132,7 @@ def test_the_report_ranks_and_says_everything(study: Path, steadyhand: Steadyhan
         {"estimator": "fusion", "variant": "fusion[window=3]", "settings": {"type": "window_gp", "window": 3}},
     ]
     made = json.loads((steadyhand.out / "provenance.json").read_text())
-    assert made["command"][:2] == ["steadyhand", "replay"]
+    assert made["command"] == ["steadyhand", "replay", "study", "--set", "fusion.window=3"]
     assert "data/P1_a.mcap" in made["studies"]["study"]["inputs_sha256"]
     means = found["replay_means"]
     assert [row["rank"] for row in means] == [1, 2, 3]
