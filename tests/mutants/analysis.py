@@ -75,7 +75,9 @@ MUTANTS = (
         _CASES,
     ),
     Mutant(
-        'if re.fullmatch(pattern, name) and not name.endswith("/total")', "if re.fullmatch(pattern, name)", _MEASURE
+        'expression.fullmatch(name) and not (is_pattern and name.endswith("/total"))',
+        "expression.fullmatch(name)",
+        _MEASURE,
     ),
     Mutant('"reduction": 1 - second / first if', '"reduction": second / first - 1 if', _COMPARED),
     Mutant('{"mean_difference": first - second,', '{"mean_difference": second - first,', _COMPARED),
