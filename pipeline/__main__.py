@@ -40,6 +40,24 @@ ExecutorName = Annotated[
 ]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"steadyhand {version('steadyhand')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _of_all_commands(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    pass
+
+
 @app.command()
 def report(
     studies: Studies,
@@ -305,8 +323,10 @@ def main() -> None:
             warn(f"steadyhand: interrupted. {RUN_AGAIN}")
         raise
     except OSError as error:
+        from pipeline.commands.places import remedy
+
         where = error.filename or "a file"
-        warn(f"steadyhand: {where}: {error.strerror or error}; check --out, --junit and --cache")
+        warn(f"steadyhand: {where}: {error.strerror or error}{remedy(error, sys.argv)}")
         sys.exit(2)
     except Exception as error:
         if os.environ.get("STEADYHAND_TRACEBACK"):

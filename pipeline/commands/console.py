@@ -8,10 +8,15 @@ import unicodedata
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+_NO_LETTERS = ("Cc", "Cs", "Zl", "Zp")  # control characters, halves of characters, further line breaks
+_DIRECTIONS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+
 
 def printable(text: str) -> str:
-    """Text with control characters replaced: a name from a log must not steer the terminal."""
-    return "".join("□" if unicodedata.category(c) == "Cc" and c != "\n" else c for c in text)
+    """Text with control characters replaced: a name from a log must not steer the terminal, nor show text reversed."""
+    return "".join(
+        "□" if (c in _DIRECTIONS or unicodedata.category(c) in _NO_LETTERS) and c != "\n" else c for c in text
+    )
 
 
 def say(text: str, strong: bool = False) -> None:
@@ -36,7 +41,7 @@ def table(
     """
     from rich.cells import cell_len
 
-    lines = [[cell.replace("\n", " ") for cell in line] for line in (header, *rows)]
+    lines = [[printable(cell.replace("\n", " ")) for cell in line] for line in (header, *rows)]
     widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
     for at, line in enumerate(lines, start=-1):
         padded = []

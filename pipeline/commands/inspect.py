@@ -16,7 +16,7 @@ from pipeline.sessions.logs import read_log
 from pipeline.sessions.stream_quality import quality_row
 from pipeline.tables import table as tables
 from pipeline.words.numbers import number
-from pipeline.words.phrases import counted, listing
+from pipeline.words.phrases import counted, listing, one_line
 
 _GUESSED = "gravity_mm_s2 is a guess: the log has no orientation; give gravity as it points in the tracker's frame"
 
@@ -34,13 +34,13 @@ def inspect(files: Sequence[Path], as_json: bool) -> None:
         try:
             log = read_log(path, [])
         except SessionError as error:
-            console.warn(f"steadyhand: {path}: {error}")
+            console.warn(one_line(f"steadyhand: {path}: {error}"))
             code = 2
             continue
         of_log = [quality_row(path.stem, topic, readings, []) for topic, readings in sorted(log.topics.items())]
         rows += tables.records("quality", tables.frame("quality", of_log))
         for fault in log.faults:
-            console.warn(f"steadyhand: {path}: {fault}")
+            console.warn(one_line(f"steadyhand: {path}: {fault}"))
         if log.faults or any(row["messages_lost"] for row in of_log):
             code = max(code, 1)
         if as_json:
@@ -48,7 +48,7 @@ def inspect(files: Sequence[Path], as_json: bool) -> None:
         inspection = inspected(path, log)
         _print(path, of_log, log.facts, {topic.name: topic for topic in inspection.topics})
         for line in (*_block(inspection), *_checks(inspection)):
-            console.say(line)
+            console.say(one_line(line))
         if not inspection.usable:
             console.warn(f"steadyhand: {path}: no topic is usable as position, acceleration or events")
             code = max(code, 1)
@@ -62,14 +62,15 @@ def _print(path: Path, rows: Sequence[dict[str, object]], facts: object, topics:
     for row in rows:
         lost, topic = row.get("messages_lost"), topics.get(row["stream"])
         rate = row.get("rate_hz") if topic is None or topic.rate_hz is None else topic.rate_hz
-        console.say(
+        line = (
             f"  {row['stream']}: {row['messages_read']} messages, "
             f"{'an unknown number' if lost is None else lost} lost"
             + (f", {number(rate, 1)} Hz" if isinstance(rate, float) else "")
             + (f"; {row['note']}" if row.get("note") else "")
         )
+        console.say(one_line(line))
         if topic is not None:
-            console.say(f"    {_described(topic)}")
+            console.say(one_line(f"    {_described(topic)}"))
 
 
 def _described(topic: Topic) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,6 +25,7 @@ from pipeline.study.settings import Study
 
 _RESULTS = "results.json"
 _ARCHIVE = "report.zip"
+_NOT_PORTABLE = re.compile(r'[\\/:*?"<>|\x00-\x1f]')
 FORMATS: Mapping[str, tuple[str, ...]] = {
     "html": ("report.html", "traces.html", "participants/"),
     "pdf": ("report.pdf",),
@@ -61,10 +63,15 @@ def _is_of(name: str, wanted: Iterable[str]) -> bool:
 
 
 def _write_archive(files: Mapping[str, Path], study: str, path: Path) -> None:
-    """Everything in one file to send, in a folder of the study's name; the same files give the same bytes."""
+    """Everything in one file to send, in a folder of the study's name; the same files give the same bytes.
+
+    A folder's name may hold what separates folders elsewhere, such as `..\\`; whoever unpacks the ZIP there is not to
+    find the files in another place.
+    """
+    root = _NOT_PORTABLE.sub("_", study).strip(". ") or "study"
     with _replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, source in sorted(files.items()):
-            archive.writestr(zipfile.ZipInfo(f"{study}/{name}"), source.read_bytes(), zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(f"{root}/{name}"), source.read_bytes(), zipfile.ZIP_DEFLATED)
 
 
 def _publish_provenance(result: Result, folder: Path, command: Sequence[str], files: Iterable[str]) -> bool:
@@ -158,7 +165,7 @@ def _published(folder: Path) -> list[str]:
         return []
     root = folder.resolve()
     known = [file for files in FORMATS.values() for file in files]
-    ours = [name for name in listed if isinstance(name, str) and _is_of(name, known)]
+    ours = [name for name in listed if isinstance(name, str) and _is_of(name, known) and ".." not in Path(name).parts]
     return [name for name in ours if (root / name).resolve().is_relative_to(root)]
 
 

@@ -11,7 +11,7 @@ from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_ref
 from pipeline.report.prose.answer import HEADER, answer, notes, rows_beside_the_answer
 from pipeline.words.names import measure_label
 from pipeline.words.numbers import number
-from pipeline.words.phrases import counted
+from pipeline.words.phrases import counted, one_line
 from pipeline.words.sentences import brief_sentence
 
 _CHECKS_MAX = 5  # printed; the report has them all
@@ -20,14 +20,14 @@ _CHECKS_MAX = 5  # printed; the report has them all
 def say_results(results: Mapping[str, Any]) -> None:
     """Print title and origin, the table of pairs as on the report's first page, and the lines of `summary`."""
     study = results["study"]
-    console.say(f"{study['title']} (data: {study['data_origin']})")
+    console.say(one_line(f"{study['title']} (data: {study['data_origin']})"))
     lines = answer(results)
     if lines:
         significant = {at for at, line in enumerate(lines) if line.significant}
         console.table(HEADER, [line.cells for line in lines], left=4, strong=significant)
         console.say(f"  {notes(results)}")
     for line in summary(results):
-        console.say(line)
+        console.say(one_line(line))
 
 
 def summary(results: Mapping[str, Any]) -> Iterator[str]:

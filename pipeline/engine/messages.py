@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.engine.result import Result
+from pipeline.words.phrases import one_line
 
 
 def session_messages(result: Result) -> Iterator[str]:
     """A line for each session that is set aside or read in part, and for each file that is not used."""
     for session, reason in result.set_aside:
-        yield f"{result.name}: session {session.id} set aside: {reason}"
+        yield one_line(f"{result.name}: session {session.id} set aside: {reason}")
     for session, reason in result.in_part:
-        yield f"{result.name}: session {session.id} read in part: {reason}"
+        yield one_line(f"{result.name}: session {session.id} read in part: {reason}")
     for name, reason in result.unused:
-        yield f"{result.name}: {name} not used: {reason}"
+        yield one_line(f"{result.name}: {name} not used: {reason}")
 
 
 def damage_messages(result: Result) -> Iterator[str]:
     """A line for each entry of the cache that was damaged."""
     for stage, session, damage in result.damaged:
         which = f'"{stage}" of session {session}' if session else f'"{stage}"'
-        yield f"{result.name}: the cached result of stage {which} was damaged ({damage}) and has been computed again"
+        said = f"{result.name}: the cached result of stage {which} was damaged ({damage}) and has been computed again"
+        yield one_line(said)
 
 
 def computed_message(result: Result) -> str:

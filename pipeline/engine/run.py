@@ -19,6 +19,7 @@ from pipeline.engine.usable_sessions import open_study, require_data, usable_aft
 from pipeline.errors import DamagedTableError, PipelineError
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
+from pipeline.words.phrases import one_line
 
 
 def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
@@ -140,5 +141,8 @@ def _with_context(folder: Path, result: Result, message: str) -> str:
     if str(folder) not in lines[0] and str(result.folder) not in lines[0]:
         lines[0] = f"{folder}: {lines[0]}"
     if result.set_aside and "no session can be used" not in message:
-        lines += ["sessions set aside before:", *(f"  {session.id}: {why}" for session, why in result.set_aside)]
+        lines += [
+            "sessions set aside before:",
+            *(one_line(f"  {session.id}: {why}") for session, why in result.set_aside),
+        ]
     return "\n".join(lines)

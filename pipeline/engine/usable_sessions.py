@@ -15,6 +15,7 @@ from pipeline.errors import PipelineError
 from pipeline.study.folder import SETTINGS_FILE, TABLE_FIELDS, files_by_fixed_name, find_sessions, load_study
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
+from pipeline.words.phrases import one_line
 
 
 def open_study(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
@@ -76,9 +77,9 @@ def require_data(folder: Path, result: Result, sessions: Sequence[Session]) -> N
     if sessions or study.trials or study.questionnaires or study.measures:
         return
     if result.set_aside:
-        reasons = "\n".join(f"  {session.id}: {reason}" for session, reason in result.set_aside)
+        reasons = "\n".join(one_line(f"  {session.id}: {reason}") for session, reason in result.set_aside)
         raise PipelineError(f"{folder}: no session can be used:\n{reasons}")
-    hint = "".join(f"\n  {name}: {reason}" for name, reason in result.unused)
+    hint = "".join(f"\n  {one_line(name)}: {reason}" for name, reason in result.unused)
     if study.simulation is not None:
         hint = f"; write its simulated logs with: steadyhand simulate {folder}"
     raise PipelineError(f'{folder}: no file matches sessions: "{study.sessions}"{hint}')

@@ -95,15 +95,20 @@ def _number(text: str) -> float:
     return value
 
 
-def _numbers(path: Path, table: pd.DataFrame, column: str, codes: Codes = ()) -> pd.Series:
-    """A column as numbers, NaN for a missing cell or code. Raises PipelineError, naming the rows, for other text."""
+def _numbers(path: Path, table: pd.DataFrame, column: str, codes: Codes = (), *, finite: bool = False) -> pd.Series:
+    """A column as numbers, NaN for a missing cell or code. Raises PipelineError, naming the rows, for other text.
+
+    With `finite`, for infinity too: a measure may be infinite and is listed then, a place or a time cannot be.
+    """
     values, faults = [], []
     for line, text in table[column].items():
         try:
             value = np.nan if text in MISSING or text in codes else _number(text)
+            if finite and np.isinf(value):
+                raise ValueError(" that is finite")
             values.append(np.nan if value in codes else value)
         except ValueError as error:
-            span = str(error) if str(error).startswith(" between") else ""
+            span = str(error) if str(error).startswith((" between", " that is")) else ""
             faults.append(f'row {line}: "{column}" should be a number{span}, found "{text}"')
     if faults:
         more = f"; and {len(faults) - _SHOWN_FAULTS} more" if len(faults) > _SHOWN_FAULTS else ""
@@ -173,7 +178,7 @@ def read_trials(path: Path, conditions: Sequence[str], codes: Codes = ()) -> pd.
     table["trial"] = _whole_numbers(path, table, "trial")
     _check_unique(path, table, ["participant", "condition", "session", "trial"])
     for column in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]):
-        table[column] = _numbers(path, table, column, codes)
+        table[column] = _numbers(path, table, column, codes, finite=True)
     for line, width in table["target_width_mm"].items():
         if width <= 0:
             raise PipelineError(f'{path}, row {line}: "target_width_mm" should be above 0, found {width:g}')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -130,7 +131,7 @@ def _cannot_be_a_log(path: Path, relative: str, matches: bool, suffix: str) -> s
     if not matches:
         near = Path(relative).suffix.casefold() == suffix.casefold()
         return "its name does not fit the pattern of study.yaml" if near else None
-    if not path.is_file():
+    if not (path.is_file() and os.access(path, os.R_OK)):
         return "it is not a file that can be read"
     try:
         relative.encode("utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from types import UnionType
@@ -17,7 +18,11 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """A loader for which a key that is given twice in one mapping is an error; PyYAML silently takes the last."""
+    """A loader for which a key that is given twice in one mapping is an error; PyYAML silently takes the last.
+
+    010, 1_000, 0x10, 1:30 and 2024-01-31 are text, as they are to YAML 1.2 or to whoever wrote them as a name; to YAML
+    1.1, which PyYAML reads, they are 8, 1000, 16, 90 and a date.
+    """
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """Refuse aliases: a few lines of them can expand to gigabytes."""
@@ -38,6 +43,22 @@ def _mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[object, o
 
 
 _UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+
+
+_NUMBERS = {
+    "tag:yaml.org,2002:int": r"[-+]?(?:0|[1-9][0-9]*)",
+    "tag:yaml.org,2002:float": (
+        r"[-+]?[0-9]+\.[0-9]*(?:[eE][-+][0-9]+)?|\.[0-9]+(?:[eE][-+][0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
+    ),
+}
+_AS_TEXT = {*_NUMBERS, "tag:yaml.org,2002:timestamp"}
+_UniqueKeyLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _AS_TEXT]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _tag, _pattern in _NUMBERS.items():
+    _UniqueKeyLoader.add_implicit_resolver(_tag, re.compile(rf"^(?:{_pattern})$"), list("-+.0123456789"))
 
 
 class _TextLoader(_UniqueKeyLoader):
@@ -65,14 +86,22 @@ def read_yaml(path: Path, as_text: bool = False) -> dict[str, Any]:
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise PipelineError(f"{path}: not valid YAML: {error}") from None
     try:
-        json.dumps(content, ensure_ascii=False, default=str).encode("utf-8")
+        require_whole_characters(path, json.dumps(content, ensure_ascii=False, default=str))
+    except TypeError as error:  # a tag such as !!timestamp makes a key of another kind
+        raise PipelineError(f"{path}: a key that is no text: {error}") from None
+    if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
+        raise PipelineError(f"{path}: holds no settings; it needs lines like `title: My study`")
+    return content
+
+
+def require_whole_characters(path: Path, text: str) -> None:
+    """Raise PipelineError where a text from a user's file cannot be written as UTF-8."""
+    try:
+        text.encode("utf-8")
     except UnicodeEncodeError:
         raise PipelineError(
             f"{path}: holds half of a surrogate pair (\\ud800 and the like); write the character"
         ) from None
-    if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
-        raise PipelineError(f"{path}: holds no settings; it needs lines like `title: My study`")
-    return content
 
 
 def read_values(text: str) -> list[Any]:

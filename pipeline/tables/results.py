@@ -12,6 +12,7 @@ import pandas as pd
 
 from pipeline.errors import PipelineError
 from pipeline.study.settings import Study
+from pipeline.study.yaml_text import require_whole_characters
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import IN_STUDY_RESULTS
 from pipeline.tables.differences import OF_A_REPLAY, OF_A_STUDY
@@ -92,6 +93,8 @@ def read_object(path: Path) -> dict[str, Any]:
         raise PipelineError(f"{path}: not valid JSON: {error}") from None
     if not isinstance(content, dict):
         raise PipelineError(f"{path}: should hold one JSON object")
+    if "\\u" in text:  # only an escape can be half a character: the file itself is UTF-8
+        require_whole_characters(path, json.dumps(content, ensure_ascii=False))
     return content
 
 

@@ -46,3 +46,8 @@ def participants_counted(facts: Mapping[str, Any], who: str = "") -> str:
     if facts["n"] == listed:
         return people
     return f"{people} analysed of {listed} listed" if facts["n"] < listed else f"{people} analysed, {listed} listed"
+
+
+def one_line(text: str) -> str:
+    """Text of a log or a table, in which a line break must not begin what looks like a line of Steadyhand's own."""
+    return text.replace("\n", "□")
