@@ -20,6 +20,7 @@ from pipeline.report.document.typography import Run, Style, typeset, typeset_hea
 _DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))
 _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS) if chr(code) not in "\n\t"}
 _UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may break there
+_TAGS: dict[Style, str] = {"italic": "var", "subscript": "sub"}
 _HERE = Path(__file__).parent
 
 
@@ -58,9 +59,6 @@ def _quoted(text: str) -> str:
 def _hashed(text: str) -> str:
     """The entry of a policy that allows exactly this text."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
-_TAGS: dict[Style, str] = {"italic": "var", "subscript": "sub"}
 
 
 def _marked(runs: Iterable[Run]) -> Markup:

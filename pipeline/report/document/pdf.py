@@ -27,7 +27,8 @@ from pipeline.report.document.model import (
     repeats,
 )
 from pipeline.report.document.typography import Run, typeset, typeset_heading
-from pipeline.report.glyphs import font_folder, showable
+from pipeline.report.document.typst_compiler import compiler_of
+from pipeline.report.glyphs import showable
 
 _HERE = Path(__file__).parent
 _UNBROKEN = 24  # characters: a longer word in a table may break after punctuation
@@ -42,18 +43,12 @@ _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
 def render(document: Document, figures: Path, path: Path) -> None:
     """Write the PDF; `figures` is the folder of the SVG files it shows, and typst can read nothing else."""
-    import typst
-
     # A line may break at a thin space, which within a number it must not.
     content = _map_texts(_content(document), lambda text: text.replace("\u2009", "\u202f"))
     printed = _map_texts(content, showable)
     printed |= {"lacking": printed != content, "unbroken": _UNBROKEN}
-    compiler = typst.Compiler(
-        (_HERE / "report.typ").read_bytes(),
-        root=figures.resolve(),
-        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
-        ignore_system_fonts=True,
-        sys_inputs={"document": json.dumps(printed, ensure_ascii=False)},
+    compiler = compiler_of(
+        (_HERE / "report.typ").read_bytes(), figures, document=json.dumps(printed, ensure_ascii=False)
     )
     pdf = compiler.compile(format="pdf", pdf_standards=[*_STANDARDS], timestamp=0)
     assert isinstance(pdf, bytes)  # noqa: S101 - one document gives one PDF
@@ -89,7 +84,7 @@ def _section(section: Section, names: dict[str, str]) -> dict[str, Any]:
 def _text(text: Text) -> list[dict[str, Any]]:
     return [
         {
-            "text": _runs(typeset(part if isinstance(part, str) else part.text)),
+            "text": _typeset(part if isinstance(part, str) else part.text),
             "strong": isinstance(part, Strong),
             "anchor": part.anchor if isinstance(part, CrossReference) else "",
         }
@@ -107,7 +102,7 @@ def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
             texts = [_text(text) for text in block.texts]
             data = {"kind": "notice", "title": block.title, "care": block.kind == "care", "texts": texts}
         case KeyFigures():
-            keys = [{key: _runs(typeset(text)) for key, text in vars(figure).items()} for figure in block.figures]
+            keys = [{key: _typeset(text) for key, text in vars(figure).items()} for figure in block.figures]
             data = {"kind": "key-figures", "figures": keys}
         case ToPaste():
             data = {"kind": "to-paste", "texts": [_text(text) for text in block.texts]}
@@ -115,7 +110,7 @@ def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
             data = {"kind": "table", "name": names[block.id], **_table(block)}
         case Figure():
             picture = {"name": names[block.id], "file": block.file, "alt": block.alt}
-            data = {"kind": "figure", "caption": _runs(typeset(block.caption)), **picture}
+            data = {"kind": "figure", "caption": _typeset(block.caption), **picture}
         case Folded() | Pages():
             raise TypeError("is not printed: see for_print")
     return data
@@ -123,19 +118,23 @@ def _block(block: Block, names: dict[str, str]) -> dict[str, Any]:
 
 def _table(table: Table) -> dict[str, Any]:
     return {
-        "caption": _runs(typeset(table.caption)),
+        "caption": _typeset(table.caption),
         "columns": [
-            {"title": _runs(typeset_heading(column.title)), "numeric": column.numeric} for column in table.columns
+            {"title": _as_data(typeset_heading(column.title)), "numeric": column.numeric} for column in table.columns
         ],
-        "rows": [[_runs(typeset(cell)) for cell in row] for row in table.rows],
+        "rows": [[_typeset(cell) for cell in row] for row in table.rows],
         "again": list(repeats(table)),
-        "note": _runs(typeset(table.note)) if table.note else [],
+        "note": _typeset(table.note),
         "anchors": list(table.anchors),
         "shares": _shares(table),
     }
 
 
-def _runs(runs: Iterable[Run]) -> list[list[str]]:
+def _typeset(text: str) -> list[list[str]]:
+    return _as_data(typeset(text))
+
+
+def _as_data(runs: Iterable[Run]) -> list[list[str]]:
     """Words and how they are set, as plain data."""
     return [[run.text, run.style] for run in runs]
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from pipeline.report.glyphs import font_folder
+from pipeline.report.document.typst_compiler import compiler_of
 
 BUDGET_BYTES = 3_500_000
 """Of all figures of a page; its text and tables come to less than a megabyte."""
@@ -52,15 +52,10 @@ def _vector_url(svg: str) -> str:
 
 def _pixel_url(figures: Path, name: str) -> str:
     """A PNG, made by the program that sets the PDF, with the same fonts."""
-    import typst
     from PIL import Image
 
-    compiler = typst.Compiler(
-        f'#set page(width: auto, height: auto, margin: 0pt, fill: white)\n#image("/{name}")'.encode(),
-        root=figures.resolve(),
-        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
-        ignore_system_fonts=True,
-    )
+    source = f'#set page(width: auto, height: auto, margin: 0pt, fill: white)\n#image("/{name}")'
+    compiler = compiler_of(source.encode(), figures)
     drawn = compiler.compile(format="png", ppi=_PIXELS_PER_INCH)
     assert isinstance(drawn, bytes)  # noqa: S101 - one figure gives one page
     few_colours = Image.open(io.BytesIO(drawn)).convert("RGB").quantize(_COLOURS)

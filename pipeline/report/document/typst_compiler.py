@@ -1,0 +1,24 @@
+"""The typst compiler as reports use it: it reads one folder of figures, and the fonts that come with the program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.report.glyphs import font_folder
+
+if TYPE_CHECKING:
+    import typst
+
+
+def compiler_of(source: bytes, figures: Path, **inputs: str) -> typst.Compiler:
+    """A compiler of `source`, whose `sys.inputs` are these; `figures` is the only folder that it can read."""
+    import typst
+
+    return typst.Compiler(
+        source,
+        root=figures.resolve(),
+        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
+        ignore_system_fonts=True,
+        sys_inputs=inputs,
+    )
