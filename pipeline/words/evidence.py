@@ -19,11 +19,16 @@ def evidence(row: Row, digits: int = 4, before_interval: str = " ") -> str:
     if greenhouse_geisser(row):
         parts.append(greenhouse_geisser(row, digits) or "")
     if row["p_adjusted"] is not None:
-        parts.append(p_phrase(row["p_adjusted"], f"{adjustment_label(row['adjust'])}-adjusted p", digits))
+        parts.append(adjusted_p(row, digits))
     if row["effect_size"] is not None or row["ci_low"] is not None:
         parts.append(effect_size(row, before_interval))
     parts += [text for text in (permutation(row, digits), bootstrap(row), one_sided(row)) if text]
     return ", ".join(parts)
+
+
+def adjusted_p(row: Row, digits: int = 4) -> str:
+    """`Holm-adjusted p = .0346`, of a row whose p is adjusted."""
+    return p_phrase(row["p_adjusted"], f"{adjustment_label(row['adjust'])}-adjusted p", digits)
 
 
 def statistic(row: Row) -> str:

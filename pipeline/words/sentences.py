@@ -25,8 +25,8 @@ from pipeline.words.comparison import (
 )
 from pipeline.words.condition_means import StudyFacts, means_of_conditions
 from pipeline.words.effect_sizes import effect_size, ratio_to_first
-from pipeline.words.evidence import evidence, statistic, statistic_value
-from pipeline.words.names import adjustment_label, measure_as_subject, unit_of, was
+from pipeline.words.evidence import adjusted_p, evidence, statistic, statistic_value
+from pipeline.words.names import measure_as_subject, unit_of, was
 from pipeline.words.numbers import interval, number, p_phrase, percent
 from pipeline.words.phrases import listing
 
@@ -113,9 +113,9 @@ def no_difference_sentence(rows: Sequence[Row], facts: StudyFacts) -> list[str]:
     for place, row in enumerate(rows):
         pair = _pair(row, facts.conditions)
         assert pair is not None  # noqa: S101 - see above
-        p = row["p"] if row["p_adjusted"] is None else row["p_adjusted"]
-        name = "p" if row["p_adjusted"] is None else f"{adjustment_label(row['adjust'])}-adjusted p"
-        figures = f"{statistic(row)}, {p_phrase(p, name, _p_digits(row, facts.alpha))}, n = {row['n']}"
+        digits = _p_digits(row, facts.alpha)
+        p = p_phrase(row["p"], digits=digits) if row["p_adjusted"] is None else adjusted_p(row, digits)
+        figures = f"{statistic(row)}, {p}, n = {row['n']}"
         head = f"{measure_as_subject(row['measure'])} did not differ significantly" if place == 0 else ", nor"
         parts.append(f"{head} between {pair.first} and {pair.second}{pair.where} ({figures})")
     return parts

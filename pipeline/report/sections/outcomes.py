@@ -188,9 +188,11 @@ def _statements(rows: Sequence[Row]) -> Iterator[Text]:
     whole = {
         (row["test"], row["effect"]) for row in rows if row["contrast"] is None and row["statistic_name"] in ("F", "Q")
     }
-    follow_ups = [row for row in rows if row["contrast"] is not None and (row["test"], row["effect"]) in whole]
+    follow_ups = []
     for row in rows:
-        if row not in follow_ups:
+        if row["contrast"] is not None and (row["test"], row["effect"]) in whole:
+            follow_ups.append(row)
+        else:
             yield (f"{brief_sentence(row)}.",)
     if follow_ups:
         tests = listing(list(dict.fromkeys(with_article(TESTS[row["test"]].label) for row in follow_ups)))

@@ -164,10 +164,9 @@ def _figure(material: Material) -> list[Figure]:
 
 def drawn_measure(material: Material) -> str | None:
     """The measure whose figure stands on the first page; it is not repeated further on."""
-    for row in _headline_rows(material):
-        if row["status"] == "ok" and material.participant_means(row["measure"]).notna().any().any():
-            return str(row["measure"])
-    return None
+    described = {row["measure"] for row in material.rows("descriptives") if row["n"]}
+    headlines_tested = (row["measure"] for row in _headline_rows(material) if row["status"] == "ok")
+    return next((str(name) for name in headlines_tested if name in described), None)
 
 
 def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:

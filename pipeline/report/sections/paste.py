@@ -84,12 +84,13 @@ def _results(material: Material) -> Iterator[Text]:
         without_means.discard(measure)
         words: list[str | Strong | CrossReference] = [f"{means} "] if means else []
         of_test = list(group)
-        together = [item for item in of_test if finds_nothing_of_a_pair(item[1], facts)]
-        together = together if len(together) > 1 else []
+        together = {at: row for at, row in of_test if finds_nothing_of_a_pair(row, facts)}
+        if len(together) == 1:
+            together = {}
         for at, row in of_test:
-            if (at, row) not in together:
+            if at not in together:
                 words += [f"{full_sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "]
-        for (at, _), part in zip(together, no_difference_sentence([row for _, row in together], facts), strict=True):
+        for at, part in zip(together, no_difference_sentence(list(together.values()), facts), strict=True):
             words += [part, " ", CrossReference("[row]", anchor(at))]
         yield (*words, ".") if together else tuple(words)
 
