@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import json
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -51,11 +51,6 @@ class Factors:
     crossed: Mapping[str, tuple[str, ...]]
     between: tuple[str, ...]
     rare: tuple[RareLevel, ...]
-
-    def rare_of(self, names: Iterable[str]) -> list[RareLevel]:
-        """The rare levels of some factors."""
-        wanted = set(names)
-        return [level for level in self.rare if level.factor in wanted]
 
 
 def parsed(factors: pd.Series) -> list[dict[str, str]]:

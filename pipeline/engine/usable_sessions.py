@@ -29,10 +29,8 @@ def open_study(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
     listed = find_sessions(folder, study)
     result = Result(folder.resolve(), study, set_aside=listed.set_aside, unused=listed.unused)
     result.inputs = _input_digests(result.folder, study, listed.sessions, cache)
-    if (
-        stamp(settings_file),
-        result.inputs[SETTINGS_FILE],
-    ) != before:  # then these settings and the digest may be of different contents
+    # Else these settings and the digest may be of different contents.
+    if (stamp(settings_file), result.inputs[SETTINGS_FILE]) != before:
         raise InputChangedError(f"{settings_file}: {CHANGED}")
     return result, listed.sessions
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from fusion_core import Raw, Samples
+from fusion_core import FusionAdaptive, Raw, Samples
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.sessions.estimators import fusing, sensors
 from pipeline.sessions.recording import Recording, Shown, where_judged
@@ -19,7 +19,6 @@ from pipeline.words.accuracy_reference import SMOOTHED
 
 USED, WORSE = "accelerations used", "fusion against tracker"
 _ADAPTIVE = "fusion_adaptive"
-_ITS_SENSORS = ["acceleration", "position"]
 _LEFT_OUT = 0.01  # of the accelerations
 _PLAIN, _RED = 1.15, 1.5  # times the tracker's own error; between 1 and the first, an interval decides
 _BLOCK_S = 2.0  # errors of instants further apart than a reach have little to do with each other
@@ -99,15 +98,21 @@ def _cause(study: Study, name: str, helping: Sequence[str]) -> str:
             f" readings; change the settings of {name}, or show people {helping[0]}"
         )
     finds_out = ""
-    if (
-        study.estimators[name].type != _ADAPTIVE
-        and sorted(one.kind for one in study.sensor_streams.values()) == _ITS_SENSORS
-    ):
+    if study.estimators[name].type != _ADAPTIVE and _takes_the_sensors(study):
         finds_out = f", or an estimator of type {_ADAPTIVE}, which finds these out from the readings"
     return (
         f"noise, latency, gravity or orientation are not as stated, or the settings of {name} do not suit the movement;"
         f" put the other checks right, then try steadyhand fit{finds_out}"
     )
+
+
+def _takes_the_sensors(study: Study) -> bool:
+    """Can the adaptive filter be built for the study's sensors? It knows itself which it takes."""
+    try:
+        FusionAdaptive(sensors(study))
+    except ValueError:
+        return False
+    return True
 
 
 def _beside_tracker(

@@ -33,7 +33,7 @@ def bootstrap(first: FloatArray, second: FloatArray, seed: int, level: float = 0
     reason = TOO_FEW_TO_RESAMPLE if len(values) < _FROM else ALL_EQUAL if np.ptp(values) == 0 else None
     if reason is not None:
         return {"bootstrap_ci_difference": None, "bootstrap_ci_dz": None, **details, "no_bootstrap": reason}
-    mean, dz = _bca(values, _mean, seed, level), _bca(values, _dz, seed, level)
+    mean, dz = bca((values,), _mean, seed, level), bca((values,), _dz, seed, level)
     if mean is None or dz is None:
         details["no_bootstrap"] = UNBOUNDED
     return {
@@ -56,12 +56,17 @@ def _dz(values: FloatArray, axis: int = -1) -> FloatArray:
     return np.where(flat & (mean != 0), np.copysign(np.inf, mean), ratio)
 
 
-def _bca(values: FloatArray, statistic: Any, seed: int, level: float) -> list[float] | None:
-    random = np.random.default_rng(seed)
+def bca(samples: tuple[FloatArray, ...], statistic: Any, seed: int, level: float) -> list[float] | None:
+    """The BCa interval of a statistic of one or more samples, each resampled by itself; None where it is unbounded."""
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
         resampled = stats.bootstrap(
-            (values,), statistic, n_resamples=RESAMPLES, confidence_level=level, method="BCa", rng=random
+            samples,
+            statistic,
+            n_resamples=RESAMPLES,
+            confidence_level=level,
+            method="BCa",
+            rng=np.random.default_rng(seed),
         )
     bounds = [float(resampled.confidence_interval.low), float(resampled.confidence_interval.high)]
     return bounds if np.isfinite(bounds).all() else None
@@ -93,9 +98,14 @@ def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, A
         "permutation_p": p,
         "permutation_exact": False,
         "permutation_count": PERMUTATIONS,
-        "permutation_p_error": float(np.sqrt(p * (1 - p) / PERMUTATIONS)),
+        "permutation_p_error": error_of_drawn(p),
         "permutation_seed": seed,
     }
+
+
+def error_of_drawn(p: float) -> float:
+    """The standard error of a p from permutations that were drawn."""
+    return float(np.sqrt(p * (1 - p) / PERMUTATIONS))
 
 
 def _exact_p(values: FloatArray) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from math import comb
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
-from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES, UNBOUNDED
+from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES, UNBOUNDED, bca, error_of_drawn
 
 _FROM = 5  # participants in each group, as for pairs
 _AT_ONCE = 2**12
@@ -31,21 +30,11 @@ def bootstrap(first: FloatArray, second: FloatArray, seed: int, level: float = 0
         return {"bootstrap_ci_difference": None, **details, "no_bootstrap": TOO_FEW_IN_A_GROUP}
     if np.ptp(one) == 0 and np.ptp(other) == 0:
         return {"bootstrap_ci_difference": None, **details, "no_bootstrap": ALL_ALIKE}
-    with np.errstate(invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        interval = stats.bootstrap(
-            (one, other),
-            _difference,
-            n_resamples=RESAMPLES,
-            confidence_level=level,
-            method="BCa",
-            rng=np.random.default_rng(seed),
-        ).confidence_interval
-    # The differences of the centred values are those of the values: their common mean is taken off both.
-    bounds = [float(np.ldexp(bound, exponent)) for bound in (interval.low, interval.high)]
-    if not np.isfinite(bounds).all():
+    bounds = bca((one, other), _difference, seed, level)
+    if bounds is None:
         return {"bootstrap_ci_difference": None, **details, "no_bootstrap": UNBOUNDED}
-    return {"bootstrap_ci_difference": bounds, **details}
+    # The differences of the centred values are those of the values: their common mean is taken off both.
+    return {"bootstrap_ci_difference": [float(np.ldexp(bound, exponent)) for bound in bounds], **details}
 
 
 def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, Any]:
@@ -76,8 +65,7 @@ def permutation(first: FloatArray, second: FloatArray, seed: int) -> dict[str, A
     p = float(found.pvalue)
     if exact:
         return {"permutation_p": p, **details, "permutation_p_error": None}
-    error = float(np.sqrt(p * (1 - p) / PERMUTATIONS))
-    return {"permutation_p": p, **details, "permutation_p_error": error, "permutation_seed": seed}
+    return {"permutation_p": p, **details, "permutation_p_error": error_of_drawn(p), "permutation_seed": seed}
 
 
 def _centred(first: FloatArray, second: FloatArray) -> tuple[list[FloatArray], int]:

@@ -55,12 +55,6 @@ def times(other: str) -> Way:
     return product
 
 
-def without_sign(problem: Problem, _theirs: Figures, quantity: str) -> float | None:
-    """The size of our figure."""
-    value = ours(problem.row, quantity)
-    return None if value is None else abs(value)
-
-
 def of_other_sign(problem: Problem, _theirs: Figures, quantity: str) -> float | None:
     """Second minus first."""
     value = ours(problem.row, quantity)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.sessions.checks.causes import G_M_S2
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.motion import Compared, Interval
 from pipeline.sessions.checks.recorded import Imu, Positions, Recorded
@@ -21,7 +22,7 @@ _SIZE_AMBER, _SIZE_RED = 2.0, 5.0  # recordings without a fault: 0.65 to 1.03
 _TURN_AMBER_DEG, _TURN_RED_DEG = 20.0, 40.0  # 0.4 to 9
 _TURN_CERTAIN_DEG = 15.0
 _SURE = 0.99
-_SPEED_MM_S = 8_000.0  # a thrown ball is faster; a hand that points is not, over 0.2 s and in one reading of ten
+SPEED_MM_S = 8_000.0  # a thrown ball is faster; a hand that points is not, over 0.2 s and in one reading of ten
 _OVER_S = 0.2
 _DRIFTS_S = 0.1  # from one half of the session to the other
 _UNITS = (
@@ -32,7 +33,7 @@ _UNITS = (
     (3.281, "feet"),
     (0.001, "kilometres"),
 )
-_FORCES = ((1e3, "mm/s²"), (1e2, "cm/s² or thousandths of g"), (3.281, "feet/s²"), (1 / 9.80665, "g"))
+_FORCES = ((1e3, "mm/s²"), (1e2, "cm/s² or thousandths of g"), (3.281, "feet/s²"), (1 / G_M_S2, "g"))
 _UNIT_NEAR = 1.4  # the figure of the size is bent by up to a third, and units are further apart
 
 
@@ -206,8 +207,8 @@ def speed(recorded: Recorded) -> Iterator[Finding]:
         fastest = _fastest_tenth(positions)
         if not np.isfinite(fastest):
             continue
-        found, expected = f"{fastest / 1e3:.2g} m/s", f"below {_SPEED_MM_S / 1e3:g} m/s"
-        if fastest <= _SPEED_MM_S:
+        found, expected = f"{fastest / 1e3:.2g} m/s", f"below {SPEED_MM_S / 1e3:g} m/s"
+        if fastest <= SPEED_MM_S:
             yield Finding(of(SPEED, positions.name), "green", found, expected)
             continue
         yield Finding(

@@ -15,7 +15,7 @@ from pipeline.statistics.arrays import FloatArray
 _EXPLAINS_M_S2 = 0.7  # of the mean that is left once the mistake is undone
 _TURNED_DEG = 15.0
 _AT_MOST = 2000  # readings looked at: a mean needs no more
-_G_M_S2 = 9.80665
+G_M_S2 = 9.80665
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def causes(imu: Imu, motion: Compared | None) -> list[Cause]:
     for text, tried_force, tried_turn, tried_gravity in _tried(force, quaternion, gravity):
         upright = turned(tried_turn, tried_force)
         if tried_gravity is None:
-            left = abs(float(np.linalg.norm(upright.mean(axis=0))) - _G_M_S2)
+            left = abs(float(np.linalg.norm(upright.mean(axis=0))) - G_M_S2)
         else:
             left = float(np.linalg.norm(upright.mean(axis=0) + tried_gravity))
         if left < _EXPLAINS_M_S2:
@@ -60,7 +60,7 @@ def _tried(
     """Each mistake undone: words, force, orientation and gravity."""
     if gravity is not None:
         mean = turned(quaternion, force).mean(axis=0)
-        if abs(np.linalg.norm(mean) - _G_M_S2) < _EXPLAINS_M_S2:
+        if abs(np.linalg.norm(mean) - G_M_S2) < _EXPLAINS_M_S2:
             shown = ", ".join(f"{value:.0f}" for value in np.where(abs(mean) < 1.0, 0.0, -1e3 * mean))
             yield (
                 f"gravity_mm_s2 has another axis, sign or unit than the orientation; by this log it is [{shown}]",
@@ -117,10 +117,10 @@ def _tried(
                 gravity,
             )
     size = float(np.linalg.norm(turned(quaternion, force).mean(axis=0)))
-    if gravity is not None and size > 0 and abs(size / _G_M_S2 - 1) > 0.2:
+    if gravity is not None and size > 0 and abs(size / G_M_S2 - 1) > 0.2:
         yield (
-            f"its values are {size / _G_M_S2:.2g} times too large: another unit (3.3 times is feet/s²); log m/s²",
-            force * _G_M_S2 / size,
+            f"its values are {size / G_M_S2:.2g} times too large: another unit (3.3 times is feet/s²); log m/s²",
+            force * G_M_S2 / size,
             quaternion,
             gravity,
         )

@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.causes import Cause, causes
+from pipeline.sessions.checks.causes import G_M_S2, Cause, causes
 from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Imu, Recorded
 from pipeline.statistics.arrays import FloatArray
 
 FORCE, GRAVITY, REST = "specific force", "length of gravity", "mean acceleration"
 
-_G_M_S2 = 9.80665
 _SMALL_M_S2 = 3.0  # the median of |f|: in g about 1, without gravity 0.4 to 2; a brisk hand's is above 9.7
 LARGE_M_S2 = 60.0
 _UNITS = ((981.0, "cm/s² or thousandths of g"), (9807.0, "mm/s²"))
@@ -119,7 +118,7 @@ def _without_gravity(imu: Imu) -> Iterator[Finding]:
     mean = imu.upright_m_s2.mean(axis=0)
     size = float(np.linalg.norm(mean))
     found, expected = f"the upright force is {size:.3g} m/s² long on average", "9.3 to 10.3 m/s²"
-    good = abs(size - _G_M_S2) < _MEAN_AMBER_M_S2 / 2
+    good = abs(size - G_M_S2) < _MEAN_AMBER_M_S2 / 2
     message = f'by its orientation "{imu.name}" does not stay upright: {_likely(imu, None)}'
     yield Finding(of(REST, imu.name), "green" if good else "amber", found, expected, "" if good else message)
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.sessions.checks.agreement import SPEED_MM_S
 from pipeline.sessions.checks.finding import Finding, of
 from pipeline.sessions.checks.recorded import Recorded
 from pipeline.sessions.checks.repeats import jumps_to_zero
@@ -14,7 +15,6 @@ from pipeline.statistics.arrays import FloatArray
 
 JUMPS = "jumps"
 
-_SPEED_MM_S = 8_000.0
 _FAR_MM, _FAR_SDS = 200.0, 8.0
 _AROUND = 5
 _MANY = 0.01
@@ -60,7 +60,7 @@ def _sudden(time: FloatArray, value: FloatArray, length: FloatArray, noise_sd_mm
     """Which steps (n - 1,) are too far and too fast, and begin at once: a brisk reach gathers speed over several."""
     lasted = np.maximum(np.diff(time), float(np.median(np.diff(time))))
     noise_mm = max(noise_sd_mm, float(np.median(length)))
-    far = length > np.maximum(np.maximum(_SPEED_MM_S * lasted, _FAR_MM), _FAR_SDS * noise_mm)
+    far = length > np.maximum(np.maximum(SPEED_MM_S * lasted, _FAR_MM), _FAR_SDS * noise_mm)
     speed = length / lasted
     after_rest = np.concatenate([[False], speed[1:] > _SUDDEN * speed[:-1]])
     before_rest = np.concatenate([speed[:-1] > _SUDDEN * speed[1:], [False]])
