@@ -39,7 +39,7 @@ MUTANTS = (
     Mutant("sign * ranks - larger - equal / 2", "sign * ranks - larger - equal", _RANKS),
     Mutant("(max(low, 1 / total), high) if r > 0", "(low, high) if r > 0", _RANKS),
     # Bootstrap, permutation, intervals within participants.
-    Mutant('method="BCa", rng=random', 'method="percentile", rng=random', _ESTIMATION),
+    Mutant('method="BCa"', 'method="percentile"', _ESTIMATION),
     Mutant("_ROUND_OFF * float(np.abs(values).sum())", "0.0", _ESTIMATION),
     Mutant("2 * reaching / (float(len(first_half))", "reaching / (float(len(first_half))", _ESTIMATION),
     Mutant("np.sqrt(k / (k - 1) / n)", "np.sqrt(1 / n)", _ESTIMATION),
