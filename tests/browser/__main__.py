@@ -37,7 +37,11 @@ def check(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
 
 def _at_width(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
     opened.evaluate(f"{_CHECKS};0")
-    yield from opened.evaluate("tracesFaults()" if page.name == "traces.html" else "sortingFaults()")
+    if page.name == "traces.html":
+        yield from opened.evaluate("playerFaults()")
+        yield from opened.evaluate("tracesFaults()")
+    else:
+        yield from opened.evaluate("sortingFaults()")
     yield from opened.evaluate("overflowFaults()")
     if checker is not None:
         opened.evaluate(f"{checker};0")

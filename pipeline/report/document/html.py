@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,16 +30,19 @@ def render(document: Document, figures: Path, path: Path) -> None:
     blocks = (block for section in document.sections for block in unfolded(section.blocks))
     shown = pictures(figures, [block.file for block in blocks if isinstance(block, Figure)])
     values = {"document": document, "names": numbered(document), "pictures": shown}
-    write_page("report.html.jinja", "report.js", path, document.origin, **values)
+    write_page("report.html.jinja", ("report.js",), path, document.origin, **values)
 
 
-def write_page(template: str, script: str, path: Path, origin: str, **values: Any) -> None:
-    """Write a page from a template, with style and script inside; control characters in its text are shown as □.
+def write_page(template: str, scripts: Sequence[str], path: Path, origin: str, **values: Any) -> None:
+    """Write a page from a template, with style and scripts inside; control characters in its text are shown as □.
+
+    The scripts' files follow one another in a single element.
 
     The page's content security policy forbids any other script or style and every request, whatever text it holds.
     `origin` stands at the foot of each page that a browser prints.
     """
-    style, code = ((_HERE / name).read_text(encoding="utf-8") for name in ("style.css", script))
+    style, *parts = ((_HERE / name).read_text(encoding="utf-8") for name in ("style.css", *scripts))
+    code = "".join(parts)
     style += f"@page {{ @bottom-left {{ content: {_quoted(origin)}; }} }}\n"
     policy = (
         f"default-src 'none'; img-src data:; style-src {_hashed(style)}; script-src {_hashed(code)};"

@@ -1,4 +1,3 @@
-"use strict";
 // Draws the sessions that are packed in #data. Every name is set as text.
 
 const sessions = JSON.parse(document.getElementById("data").textContent);
@@ -220,6 +219,7 @@ async function open(index) {
   at("said").textContent = said(session);
   listLines();
   draw();
+  openPlayer(session, state.lines, state.whole);
 }
 
 function liveliest(axes) {
@@ -284,6 +284,7 @@ function begin() {
   for (const [id, key] of Object.entries(BUTTONS)) at(id).addEventListener("click", KEYS[key]);
   picture.addEventListener("keydown", (event) => { const act = KEYS[event.key]; if (act) { event.preventDefault(); act(); } });
   followPointers();
+  startPlayer();
   window.addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { listLines(); draw(); });
   const wanted = Number(location.hash.slice(1)) - 1;

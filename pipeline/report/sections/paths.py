@@ -30,7 +30,7 @@ def section(material: Material) -> Section | None:
 def _first_session(material: Material, used: list[int], plane: Plane) -> list[Block]:
     """The first session: the reference, what was displayed, and what the best fusion makes of it."""
     tracks, positions, events = (material.table_of(name, used[:1]) for name in _READ)
-    lines = [material.study.stream_of_kind("reference"), _displayed(material, used[0]), _fused(material)]
+    lines = [material.study.stream_of_kind("reference"), displayed(material, used[0]), best_estimator(material)]
     recorded = {*positions["stream"], *tracks["estimator"]}
     shown = [line for line in dict.fromkeys(lines) if line in recorded]
     if not shown:
@@ -43,7 +43,7 @@ def _every_participant(material: Material, used: list[int], plane: Plane) -> lis
     line_of, more = {}, first_of(_SESSIONS_MAX, len(used), "sessions")
     used = used[:_SESSIONS_MAX]
     for place in used:
-        line, condition = _displayed(material, place), material.sessions[place].condition
+        line, condition = displayed(material, place), material.sessions[place].condition
         if line is not None and condition is not None:
             line_of[condition] = line
     ordered = {condition: line_of[condition] for condition in material.study.conditions if condition in line_of}
@@ -60,14 +60,14 @@ def _every_participant(material: Material, used: list[int], plane: Plane) -> lis
     return [material.drawn("paths", figures.paths, *joined, sessions, ordered, plane, more=more)]
 
 
-def _displayed(material: Material, place: int) -> str | None:
+def displayed(material: Material, place: int) -> str | None:
     """What a session showed: its display's stream, else the estimator it names, else the tracker."""
     study = material.study
     condition = material.sessions[place].condition or ""
     return study.stream_of_kind("display") or study.shown.get(condition) or study.tracker
 
 
-def _fused(material: Material) -> str | None:
+def best_estimator(material: Material) -> str | None:
     """The estimator with the least error; the last one where errors are not known."""
     rows = [row for row in material.rows("accuracy_means") if row["rmse_mm"] is not None]
     if rows and not without_reference(material.results):

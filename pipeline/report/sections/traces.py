@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.report.document import traces
-from pipeline.report.document.traces import Kind, Series, Traces
+from pipeline.report.document.traces import Event, Kind, Scene, Series, Traces
+from pipeline.report.figures.plane import XY, Plane
+from pipeline.report.sections import paths
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.sessions import recording
-from pipeline.study.session import Session
+from pipeline.statistics.arrays import FloatArray
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
 
@@ -30,12 +33,12 @@ def write(material: Material, path: Path) -> None:
 def _all(material: Material) -> Iterator[Traces]:
     """Session by session, for there may be thousands."""
     ingested_of, fused_of = (material.entries[stage] for stage in ("ingest", "fuse"))
-    for session, ingested, fused in zip(material.sessions, ingested_of, fused_of, strict=True):
-        yield _of_session(material, session, ingested, fused)
+    for place, (ingested, fused) in enumerate(zip(ingested_of, fused_of, strict=True)):
+        yield _of_session(material, place, ingested, fused)
 
 
-def _of_session(material: Material, session: Session, ingested: Path, fused: Path) -> Traces:
-    study = material.study
+def _of_session(material: Material, place: int, ingested: Path, fused: Path) -> Traces:
+    study, session = material.study, material.sessions[place]
     origin_ns, streams = recording.positions(study, ingested)
     series: list[Series] = []
     for name, samples in streams.items():
@@ -48,4 +51,52 @@ def _of_session(material: Material, session: Session, ingested: Path, fused: Pat
     for estimator, rows in tables.read("tracks", fused).groupby("estimator", sort=False):
         time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
         series.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
-    return Traces(session.id, session.participant, session.condition, tuple(series))
+    scene = _scene(material, place, ingested, origin_ns)
+    return Traces(session.id, session.participant, session.condition, tuple(series), scene)
+
+
+def _scene(material: Material, place: int, ingested: Path, origin_ns: int) -> Scene | None:
+    """What a session is played on; None where nothing moves in a plane."""
+    axes, task = material.study.axes, material.study.task
+    if len(axes) < 2:
+        return None
+    plane = (axes[0], axes[1])
+    displayed_by = material.study.shown.get(material.sessions[place].condition or "")
+    compared = _compared(material, displayed_by)
+    events = _events(ingested, origin_ns, plane)
+    scene = Scene(plane, paths.displayed(material, place), displayed_by, compared, events)
+    if task is None or plane != XY:  # the task is stated in x and y
+        return scene
+    return replace(
+        scene,
+        path_mm=task.path_mm,
+        targets_mm=task.targets_mm,
+        target_diameter_mm=task.target_diameter_mm,
+        window_mm=task.window_mm,
+    )
+
+
+def _compared(material: Material, displayed_by: str | None) -> str | None:
+    """The best estimator, or where the session showed just that, the first other one."""
+    best = paths.best_estimator(material) if material.study.estimators else None
+    if best != displayed_by:
+        return best
+    return next((name for name in material.study.estimators if name not in (displayed_by, "raw")), None)
+
+
+def _events(ingested: Path, origin_ns: int, plane: Plane) -> tuple[Event, ...]:
+    """The trials' starts and the selections, in the order of time."""
+    rows = tables.read("events", ingested).sort_values("time_ns", kind="stable")
+    rows = rows[rows["type"].isin(["trial_start", "selection"])]
+    time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
+    targets, selected = (
+        rows[[f"{prefix}{axis}_mm" for axis in plane]].to_numpy(np.float64) for prefix in ("target_", "")
+    )
+    return tuple(
+        Event(kind, float(time), _place(target), _place(at))
+        for kind, time, target, at in zip(rows["type"], time_s, targets, selected, strict=True)
+    )
+
+
+def _place(point_mm: FloatArray) -> tuple[float, float] | None:
+    return (float(point_mm[0]), float(point_mm[1])) if np.isfinite(point_mm).all() else None

@@ -18,7 +18,7 @@ from hypothesis.extra.numpy import arrays
 
 from pipeline.engine.stage import Work
 from pipeline.report.document import traces
-from pipeline.report.document.traces import Series, Traces
+from pipeline.report.document.traces import Event, Scene, Series, Traces
 from pipeline.sessions import ingest, recording
 from pipeline.study.folder import load_study
 from pipeline.study.session import Session
@@ -88,6 +88,87 @@ def test_many_long_sessions_are_thinned_out_to_fit_and_say_so(tmp_path: Path, mo
     times = unpacked(packed[0])[0] / 1e3
     assert 100 < len(times) < 20_000
     assert np.all(np.diff(np.floor((times + 1e-6) / packed[0]["step_s"])) > 0)
+
+
+def a_line(n: int = 50) -> tuple[Series, ...]:
+    return (Series("a", "estimator", ("x", "y"), np.arange(n) / 90, np.zeros((n, 2))),)
+
+
+def test_the_page_holds_what_a_session_is_played_on(tmp_path: Path) -> None:
+    events = (
+        Event("trial_start", 1.0, (50.0, -20.0), None),
+        Event("selection", 2.34567, (50.0, -20.0), (53.14, -21.0)),
+        Event("selection", 3.0, None, None),
+    )
+    scene = Scene(
+        ("x", "z"), "display", "a", "b", events, ((0.0, 0.0), (90.0, 0.0)), ((50.0, -20.0),), 20.0, (85.4, 48.0)
+    )
+    (packed,) = page_of([Traces("s", None, None, a_line(), scene)], tmp_path)
+    assert packed["scene"] == {
+        "plane": ["x", "z"],
+        "displayed": "display",
+        "displayed_by": "a",
+        "compared": "b",
+        "path": [[0, 0], [90, 0]],
+        "targets": [[50, -20]],
+        "diameter": 20,
+        "window": [85.4, 48],
+        "events": [
+            {"type": "trial_start", "time": 1, "target": [50, -20], "at": None},
+            {"type": "selection", "time": 2.3457, "target": [50, -20], "at": [53.1, -21]},
+            {"type": "selection", "time": 3, "target": None, "at": None},
+        ],
+        "events_left_out": 0,
+    }
+
+
+def test_events_without_number_do_not_fill_the_page_and_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(traces, "BUDGET_BYTES", 40_000)
+    events = tuple(Event("selection", 1000 + index / 7, (-1234.5, 5.1), (-1e4, 9.9)) for index in range(5000))
+    (packed,) = page_of([Traces("s", None, None, a_line(), Scene(("x", "y"), None, None, None, events))], tmp_path)
+    kept = packed["scene"]["events"]
+    assert 0 < len(kept) < 5000
+    assert len(kept) + packed["scene"]["events_left_out"] == 5000
+    assert len(json.dumps(kept)) < 40_000 / 4
+
+
+TASK = """
+conditions: [a, b]
+shown: {a: raw, b: fusion}
+sessions: '{participant}_{condition}.mcap'
+estimators: {raw: {type: raw}, kinect: {type: position_kalman}, fusion: {type: fusion_kalman}}
+task: {window_mm: [80, 50], targets_mm: [[10, 20]], path_mm: [[0, 0], [10, 20]], target_diameter_mm: 12}
+"""
+
+
+def played(folder: Folder, steadyhand: Steadyhand, settings: str) -> dict[str, dict[str, Any]]:
+    root = folder(settings + STREAMS)
+    for condition in "ab":
+        write_session(root / f"P_{condition}.mcap", session_messages(3.0))
+    assert steadyhand("report", root).code == 0
+    page = (steadyhand.out / "traces.html").read_text(encoding="utf-8")
+    (data,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page)
+    return {session["condition"]: session["scene"] for session in json.loads(data)}
+
+
+def test_a_session_is_played_on_its_task_beside_an_estimator_that_it_did_not_show(
+    folder: Folder, steadyhand: Steadyhand
+) -> None:
+    scenes = played(folder, steadyhand, TASK)
+    for scene in scenes.values():
+        assert scene["plane"] == ["x", "y"]
+        assert (scene["window"], scene["diameter"]) == ([80, 50], 12)
+        assert (scene["path"], scene["targets"]) == ([[0, 0], [10, 20]], [[10, 20]])
+        assert scene["compared"] not in (scene["displayed_by"], None)
+    assert [scenes[condition]["displayed_by"] for condition in "ab"] == ["raw", "fusion"]
+
+
+def test_a_session_of_one_axis_is_not_played(folder: Folder, steadyhand: Steadyhand) -> None:
+    one_axis = TASK.replace("conditions", "axes: [x]\nconditions", 1)
+    one_axis = "".join(line for line in one_axis.splitlines(keepends=True) if not line.startswith("task"))
+    assert played(folder, steadyhand, one_axis) == {"a": None, "b": None}
 
 
 def test_positions_are_those_of_the_whole_recording(folder: Folder, tmp_path: Path) -> None:
