@@ -14,6 +14,7 @@ from pipeline.report.figures.fitts_law import fitts
 from pipeline.report.figures.hand_paths import path, paths
 from pipeline.report.figures.layout import task_layout
 from pipeline.report.figures.lead_curves import lead
+from pipeline.report.figures.overlay import overlay
 from pipeline.report.figures.power import Labels, power
 from pipeline.report.figures.practice import practice
 from pipeline.report.figures.rainclouds import paired, scales
@@ -37,6 +38,7 @@ __all__ = [
     "lag_and_error",
     "lead",
     "noise",
+    "overlay",
     "paired",
     "path",
     "paths",

@@ -200,6 +200,20 @@ def _session_figures(material: Material) -> list[Block]:
         blocks.append(material.drawn("streams", figures.streams, excerpts))
     if (excerpts["kind"] == "estimate").any():
         blocks.append(material.drawn("estimates", figures.estimates, excerpts, contradicted(material)))
+        blocks += _overlaid(material, excerpts)
     if len(curves):
         blocks.append(material.drawn("lead", figures.lead, curves))
     return blocks
+
+
+def _overlaid(material: Material, excerpts: pd.DataFrame) -> list[Block]:
+    """Fusion on one axis with an estimator of positions alone, of the same type where the study has one."""
+    there = list(dict.fromkeys(excerpts.loc[excerpts["kind"] == "estimate", "name"]))
+    with_accelerations, estimators = fusing(material.study), material.study.estimators
+    fused = [name for name in there if name in with_accelerations]
+    positions_only = [name for name in there if name not in with_accelerations]
+    alike = [
+        (alone, both) for alone in positions_only for both in fused if estimators[alone].type == estimators[both].type
+    ]
+    pairs = alike or [(alone, both) for alone in positions_only[:1] for both in fused[-1:]]
+    return [material.drawn("overlay", figures.overlay, excerpts, *pairs[0])] if pairs else []

@@ -83,6 +83,23 @@ def test_a_band_that_is_still_wide_does_not_flatten_the_errors(excerpts: pd.Data
     assert figures.estimates(began).axes[1].get_ylim()[1] < 100
 
 
+def test_two_estimators_stand_on_one_axis_and_minus_the_reference_below(excerpts: pd.DataFrame, tmp_path: Path) -> None:
+    figure = figures.overlay(excerpts, "late", "good")
+    above, below = figure.axes
+    assert {"late", "good", "reference", "Minus reference"} <= set(texts(figure, tmp_path))
+    lines = [np.asarray(line.get_ydata(), dtype=np.float64) for line in below.lines]
+    np.testing.assert_allclose(lines[1], -10.0)
+    np.testing.assert_allclose(lines[2], 1.0)
+    assert len(above.collections) == 3  # the frames and two bands
+    assert "late 10.0 mm and good 1.0 mm" in figures.overlay.words(excerpts, "late", "good").caption
+
+
+def test_without_a_reference_nothing_stands_below(excerpts: pd.DataFrame) -> None:
+    alone = excerpts[excerpts["kind"] != "reference"]
+    assert len(figures.overlay(alone, "late", "good").axes) == 1
+    assert "reference" not in figures.overlay.words(alone, "late", "good").caption
+
+
 def curve(name: str, peak_s: float) -> pd.DataFrame:
     lead = np.arange(-45, 46) / 90
     rows = pd.DataFrame({"lead_s": lead, "correlation_mm2": 100 - (lead - peak_s) ** 2})
