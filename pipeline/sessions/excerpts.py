@@ -1,4 +1,4 @@
-"""Tables for figures of one session: the seconds with most movement, the estimators' lead, and what arrived when."""
+"""Tables for figures of one session: the seconds with the largest turn, the estimators' lead, and what arrived when."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
 
 EXCERPT_S = 4.0  # long enough for a reach, short enough to see single frames
+_TURN_SHARE = 0.25  # of the largest range that a turn needs to be one of the hand's
 _STRETCHES = 120  # of a session at the most
 _STRETCH_NS = 1_000_000_000  # at the least
 
 
 def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
-    """The table `excerpts`: the stretch and axis in which the tracker moves most. `raw`, the tracker, is left out."""
+    """The table `excerpts`: the stretch and axis in which the tracker turns most. `raw`, the tracker, is left out."""
     name = study.stream_of_kind("position")
     if name is None or len(loaded.samples[name]) == 0:
         return tables.frame("excerpts", [])
@@ -59,18 +60,33 @@ def _cut(
 
 
 def _liveliest(tracker: Samples) -> tuple[int, float]:
-    """The axis and the begin (s) of the stretch with the largest range of positions."""
-    best = (-1.0, 0, float(tracker.arrival[0]))
+    """The axis and the begin (s) of the stretch in which the tracker goes furthest there and back.
+
+    An estimator that lags is seen where the hand turns. Where even the largest turn is small beside the largest range,
+    nothing but noise turns, and the stretch with that range is taken.
+    """
+    most = {"turn": (-1.0, 0, float(tracker.arrival[0])), "range": (-1.0, 0, float(tracker.arrival[0]))}
     last = max(tracker.arrival[-1] - EXCERPT_S, tracker.arrival[0])
     for begin in np.arange(tracker.arrival[0], last + 1e-9, 0.5):
         inside = (tracker.arrival >= begin) & (tracker.arrival <= begin + EXCERPT_S)
         if inside.sum() < 2:
             continue
-        ranges = np.ptp(tracker.value[inside], axis=0)
-        axis = int(np.argmax(ranges))
-        if ranges[axis] > best[0]:
-            best = (float(ranges[axis]), axis, float(begin))
-    return best[1], best[2]
+        for axis, value in enumerate(tracker.value[inside].T):
+            for what, size in (("turn", _turn_mm(value)), ("range", float(np.ptp(value)))):
+                if size > most[what][0]:
+                    most[what] = (size, axis, float(begin))
+    _, axis, begin = most["turn" if most["turn"][0] > _TURN_SHARE * most["range"][0] else "range"]
+    return axis, begin
+
+
+def _turn_mm(value: FloatArray) -> float:
+    """How far values (n,) in mm go to some point and come back from it, whichever is less; either way round."""
+    turns = []
+    for signed in (value, -value):
+        there = signed - np.minimum.accumulate(signed)
+        back = signed - np.minimum.accumulate(signed[::-1])[::-1]
+        turns.append(float(np.minimum(there, back).max()))
+    return max(turns)
 
 
 def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:

@@ -109,10 +109,11 @@ SESSION_TABLES = (
     ),
     Table(
         "excerpts",
-        "One row per point of a line in the figures of the four seconds in which the tracker moves most.",
+        "One row per point of a line in the figures of the four seconds in which the tracker turns back furthest (moves"
+        " most, if it never does).",
         (
             SESSION,
-            text("axis", "the axis along which the tracker moves most"),
+            text("axis", "the axis along which it does"),
             text("kind", "tracker (as it arrived), reference, acceleration or estimate"),
             text("name", "the stream or estimator, as study.yaml names it"),
             number("time_s", "since the session's first message"),

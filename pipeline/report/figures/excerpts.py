@@ -131,7 +131,7 @@ def estimates(excerpts: pd.DataFrame, contradicted: str = "") -> Figure:
 def _span(excerpts: pd.DataFrame) -> str:
     time = finite(excerpts["time_s"])
     where = f"session {excerpts['session'].iloc[0]}, axis {excerpts['axis'].iloc[0]}"
-    return f"{where}, {number(time.min(), 1)} to {number(time.max(), 1)} s, where the tracker moves most"
+    return f"{where}, {number(time.min(), 1)} to {number(time.max(), 1)} s, chosen for its movement"
 
 
 def _errors_range(excerpts: pd.DataFrame, names: Sequence[str]) -> tuple[float, float]:

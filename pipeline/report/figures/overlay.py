@@ -27,7 +27,7 @@ def _overlay_words(excerpts: pd.DataFrame, positions_only: str, fused: str) -> W
     below = ", and below each minus the reference" if parts else ""
     return Words(
         f"{positions_only}, of positions alone, and {fused}, which fuses accelerations, on one axis ({where}){below};"
-        f" bands are two stated SDs. Look where the hand turns back: what lags overshoots the turn.{off}",
+        f" bands are two stated SDs. Where the hand sets off or turns, what lags is late.{off}",
         f"Two estimates over time with the tracker's frames{below}: {positions_only} and {fused}.{off}",
     )
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 import pipeline
+from fusion_core import Samples
 from pipeline.notebook import Tables
 from pipeline.sessions import excerpts
 from pipeline.sessions.logs.mcap import Message
@@ -39,6 +40,26 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tables]:
 
 def _silent(message: Message) -> bool:
     return message.topic == "/tracker/position" and 2.0 < (message.arrival_ns - EPOCH_NS) / 1e9 < 3.1
+
+
+def frames_of(x_mm: np.ndarray, time: np.ndarray) -> Samples:
+    value = np.column_stack([x_mm, np.zeros(len(time))]) + np.random.default_rng(0).normal(0, 8, (len(time), 2))
+    return Samples(time, time + 0.1, value)
+
+
+def test_an_excerpt_holds_a_turn_rather_than_a_longer_way() -> None:
+    time = np.arange(0, 30, 1 / 30)
+    there_and_back = 200 * np.clip(1 - np.abs(time - 22), 0, None)
+    axis, begin = excerpts._liveliest(frames_of(500 * np.clip(time - 5, 0, 1) + there_and_back, time))
+    assert axis == 0
+    assert begin < 22.1 < begin + excerpts.EXCERPT_S  # when the turn's frame arrives
+
+
+def test_where_nothing_but_noise_turns_the_longest_way_is_shown() -> None:
+    time = np.arange(0, 30, 1 / 30)
+    axis, begin = excerpts._liveliest(frames_of(500 * np.clip(time - 15, 0, 1), time))
+    assert axis == 0
+    assert begin < 15.1 and begin + excerpts.EXCERPT_S > 16.1
 
 
 def test_excerpts_hold_every_signal_of_the_axis_that_moves(loaded: Tables) -> None:
