@@ -117,12 +117,13 @@ function currentTarget(scene, instant) {
 }
 
 function selectionShapes(scene, instant, view, colours) {
+  const below = (scene.window ? scene.window[1] / 2 * view.scale : 8) + 20; // clear of the window around it
   return scene.events.filter((event) => event.type === "selection" && event.at && event.time <= instant).flatMap((event) => {
     const [x, y] = view.to(event.at), shapes = [];
     for (const slant of [-4, 4]) shapes.push({ type: "line", points: [[x - 4, y - slant], [x + 4, y + slant]], colour: colours.ink, stroke: 1.6 });
     if (event.target) shapes.push({ type: "line", points: [view.to(event.target), [x, y]], colour: colours.ink });
     if (event.target && instant - event.time < LABELLED_S) {
-      shapes.push({ type: "text", x: x + 9, y: y - 9, text: `missed its centre by ${millimetres(distance(event.at, event.target))}`, colour: colours.ink });
+      shapes.push({ type: "text", x: x - 4, y: y + below, text: `selected ${millimetres(distance(event.at, event.target))} off`, colour: colours.ink });
     }
     return shapes;
   });

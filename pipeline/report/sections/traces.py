@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -13,10 +14,10 @@ from pipeline.report.document.traces import Event, Kind, Scene, Series, Traces
 from pipeline.report.figures.plane import XY, Plane
 from pipeline.report.sections import paths
 from pipeline.report.sections.material import ORIGINS, Material
-from pipeline.sessions import recording
-from pipeline.statistics.arrays import FloatArray
+from pipeline.sessions import recording, trials
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
+from pipeline.tables.table import Row
 
 PAGE = "traces.html"
 _KINDS: dict[str, Kind] = {"position": "tracker", "display": "display", "reference": "reference"}
@@ -85,18 +86,21 @@ def _compared(material: Material, displayed_by: str | None) -> str | None:
 
 
 def _events(ingested: Path, origin_ns: int, plane: Plane) -> tuple[Event, ...]:
-    """The trials' starts and the selections, in the order of time."""
-    rows = tables.read("events", ingested).sort_values("time_ns", kind="stable")
-    rows = rows[rows["type"].isin(["trial_start", "selection"])]
-    time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
-    targets, selected = (
-        rows[[f"{prefix}{axis}_mm" for axis in plane]].to_numpy(np.float64) for prefix in ("target_", "")
-    )
-    return tuple(
-        Event(kind, float(time), _place(target), _place(at))
-        for kind, time, target, at in zip(rows["type"], time_s, targets, selected, strict=True)
-    )
+    """The trials' starts and the selections in the order of time; a selection without a target has its trial's."""
+    rows: list[Row] = tables.read_arrow("events", ingested).to_pylist()
+    starts, selections = trials.selections_by_trial(rows)
+    events = [_event("trial_start", start, start, origin_ns, plane) for start in starts]
+    for selection, place in selections:
+        aimed = selection if place < 0 or _place(selection, "target_", plane) else starts[place]
+        events.append(_event("selection", selection, aimed, origin_ns, plane))
+    return tuple(sorted(events, key=lambda event: event.time_s))  # stable: a start comes before its selection
 
 
-def _place(point_mm: FloatArray) -> tuple[float, float] | None:
-    return (float(point_mm[0]), float(point_mm[1])) if np.isfinite(point_mm).all() else None
+def _event(kind: Literal["trial_start", "selection"], row: Row, aimed: Row, origin_ns: int, plane: Plane) -> Event:
+    return Event(kind, (row["time_ns"] - origin_ns) * S_PER_NS, _place(aimed, "target_", plane), _place(row, "", plane))
+
+
+def _place(row: Row, prefix: str, plane: Plane) -> tuple[float, float] | None:
+    """Where something is in the plane, in mm; None if that is not known on both axes."""
+    x, y = (row[f"{prefix}{axis}_mm"] for axis in plane)
+    return None if x is None or y is None else (float(x), float(y))

@@ -19,9 +19,11 @@ from hypothesis.extra.numpy import arrays
 from pipeline.engine.stage import Work
 from pipeline.report.document import traces
 from pipeline.report.document.traces import Event, Scene, Series, Traces
+from pipeline.report.sections import traces as section
 from pipeline.sessions import ingest, recording
 from pipeline.study.folder import load_study
 from pipeline.study.session import Session
+from pipeline.tables import table as tables
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
@@ -163,6 +165,26 @@ def test_a_session_is_played_on_its_task_beside_an_estimator_that_it_did_not_sho
         assert (scene["path"], scene["targets"]) == ([[0, 0], [10, 20]], [[10, 20]])
         assert scene["compared"] not in (scene["displayed_by"], None)
     assert [scenes[condition]["displayed_by"] for condition in "ab"] == ["raw", "fusion"]
+
+
+def test_a_selection_that_names_no_target_has_that_of_its_trial(tmp_path: Path) -> None:
+    nowhere = dict.fromkeys([f"{prefix}{axis}_mm" for prefix in ("", "target_") for axis in "xyz"])
+    target = {"target_x_mm": 10.0, "target_y_mm": 20.0}
+    rows = [
+        {**nowhere, "session": "s", "time_ns": 10**9, "type": "selection", "trial": None, "x_mm": 1.0, "y_mm": 2.0},
+        {**nowhere, "session": "s", "time_ns": 2 * 10**9, "type": "trial_start", "trial": 1, **target},
+        {**nowhere, "session": "s", "time_ns": 3 * 10**9, "type": "selection", "trial": 1, "x_mm": 13.0, "y_mm": 24.0},
+        {**nowhere, "session": "s", "time_ns": 4 * 10**9, "type": "selection", "trial": 7, "x_mm": 13.0, "y_mm": 24.0},
+        {**nowhere, "session": "s", "time_ns": 5 * 10**9, "type": "selection", "trial": None, "x_mm": 9.0, "y_mm": 9.0},
+    ]
+    tables.write("events", tables.frame("events", rows), tmp_path)
+    assert section._events(tmp_path, 0, ("x", "y")) == (
+        Event("selection", 1.0, None, (1.0, 2.0)),
+        Event("trial_start", 2.0, (10.0, 20.0), None),
+        Event("selection", 3.0, (10.0, 20.0), (13.0, 24.0)),
+        Event("selection", 4.0, None, (13.0, 24.0)),  # of a trial that never started
+        Event("selection", 5.0, (10.0, 20.0), (9.0, 9.0)),
+    )
 
 
 def test_a_session_of_one_axis_is_not_played(folder: Folder, steadyhand: Steadyhand) -> None:
