@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.audit.beside_computed import compare_printed
-from pipeline.analysis.comparisons import People, all_requests, compared, people_of
+from pipeline.analysis.comparisons import all_requests, compared, people_of
+from pipeline.analysis.complete_cases import People, read_values
 from pipeline.analysis.descriptives import descriptives, differences, intervals_within
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.fitts_law import fitts_law
@@ -42,7 +43,8 @@ def run(work: Work) -> Outcome:
     for name in study.estimators:
         build_estimator(study, name)  # so that a misspelt estimator is an error even where there is no log to run it on
     measured = work.entry("measure")
-    measures, observations = (tables.read(name, measured) for name in ("measures", "observations"))
+    values = read_values(measured, people_of(study, work.folder))
+    measures, observations = values.measures, values.observations
     frames: dict[str, pd.DataFrame] = {
         "trials": tables.read("trials", measured),
         "measures": measures,
@@ -52,13 +54,12 @@ def run(work: Work) -> Outcome:
         "differences": tables.frame("differences", differences(study, measures)),
     }
     refuse_undefined(study, list(measures["measure"].unique()), tables.read("exclusions", measured))
-    people = people_of(study, work.folder)
-    rows, left_out = compared(study, measures, observations, people)
+    rows, left_out = compared(study, values)
     frames["comparisons"] = tables.frame("comparisons", rows)
-    rows, uncomparable = _comparisons_of_all_data(study, measured / ALL_DATA, people)
+    rows, uncomparable = _comparisons_of_all_data(study, measured / ALL_DATA, values.people)
     frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
-    requests = [request for entry in all_requests(study, measures, observations, people) for request in entry]
+    requests = [request for entry in all_requests(study, values) for request in entry]
     frames["descriptives_by_group"] = tables.frame("descriptives_by_group", by_group(requests))
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
     frames["design_check"] = tables.frame("design_check", design_rows)
@@ -121,7 +122,7 @@ def _comparisons_of_all_data(study: Study, folder: Path, people: People) -> tupl
     if not study.exclusions:
         return [], []
     try:
-        return compared(study, tables.read("measures", folder), tables.read("observations", folder), people)[0], []
+        return compared(study, read_values(folder, people))[0], []
     except PipelineError as error:
         return [], [{"what": "no comparison without the exclusions", "reason": str(error)}]
 

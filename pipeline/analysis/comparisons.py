@@ -7,12 +7,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import pandas as pd
-
 from pipeline.analysis import error_tests, families
 from pipeline.analysis.between_tests import all_groups, mixed_design, pairs_of_groups, welch_t
 from pipeline.analysis.comparison_rows import Answer
-from pipeline.analysis.complete_cases import Request
+from pipeline.analysis.complete_cases import People, Request, Values
 from pipeline.analysis.groups import one_condition_each
 from pipeline.analysis.within_tests import anova, art, crossover_design, friedman_test, mixed_models, paired_t, pairwise
 from pipeline.errors import PipelineError, did_you_mean
@@ -29,9 +27,6 @@ from pipeline.study.measures import has_total, measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 
-People = Mapping[str, Mapping[str, str]]
-"""participants.csv by column: the value of each participant."""
-
 
 def people_of(study: Study, folder: Path) -> People:
     """participants.csv of a study folder by column; empty without that file."""
@@ -41,12 +36,12 @@ def people_of(study: Study, folder: Path) -> People:
     return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
 
 
-def compared(study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None) -> Answer:
+def compared(study: Study, values: Values) -> Answer:
     """Every row of `comparisons`, and every exclusion that results from them, once each.
 
     Raises PipelineError where an entry names no measure of the data or does not fit the design.
     """
-    answers = answered(study, measures, observations, people)
+    answers = answered(study, values)
     rows = [row for one in answers for row in one.rows]
     for row in rows:
         row["details"] = json.dumps(row["details"]) if row["details"] else None
@@ -64,15 +59,13 @@ class Answered:
     exclusions: list[Row]
 
 
-def answered(
-    study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None
-) -> list[Answered]:
+def answered(study: Study, values: Values) -> list[Answered]:
     """Every request and its rows, in the order of study.yaml, with p values adjusted; raises as `compared` does."""
     if study.comparisons and len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
     answers: list[Answered] = []
     by_entry: list[tuple[Comparison, list[Row]]] = []
-    for requests in all_requests(study, measures, observations, people):
+    for requests in all_requests(study, values):
         of_entry = [_answer(request) for request in requests]
         answers += of_entry
         by_entry.append((requests[0].entry, [row for one in of_entry for row in one.rows]))
@@ -89,14 +82,12 @@ def _answer(request: Request) -> Answered:
     return Answered(request, rows, exclusions)
 
 
-def all_requests(
-    study: Study, measures: pd.DataFrame, observations: pd.DataFrame, people: People | None = None
-) -> Iterator[list[Request]]:
+def all_requests(study: Study, values: Values) -> Iterator[list[Request]]:
     """The requests of each entry, one per measure."""
-    known = sorted(set(measures["measure"]), key=measure_order)
+    known = sorted(set(values.measures["measure"]), key=measure_order)
     for entry in study.comparisons:
         named = list(dict.fromkeys(name for wanted in entry.measures for name in _matching(wanted, known)))
-        yield [Request(study, entry, name, measures, observations, people or {}) for name in named]
+        yield [Request(**vars(values), study=study, entry=entry, measure=name) for name in named]
 
 
 def _matching(wanted: str, known: Sequence[str]) -> list[str]:

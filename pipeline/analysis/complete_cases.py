@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,21 +17,38 @@ from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
+People = Mapping[str, Mapping[str, str]]
+"""participants.csv by column: the value of each participant."""
+
 
 @dataclass(frozen=True)
-class Request:
-    """One entry under `comparisons`, for one measure.
+class Values:
+    """The tables that comparisons stand on.
 
-    `observations` are the same values with their period and sequence, `people` participants.csv by column: the
-    value of each participant.
+    `observations` are the values of `measures` with their period and sequence, `target_observations` those of trials
+    by target.
     """
+
+    measures: pd.DataFrame
+    observations: pd.DataFrame
+    target_observations: pd.DataFrame
+    people: People
+
+
+def read_values(folder: Path, people: People) -> Values:
+    """The values that the stage `measure` left in a folder."""
+    names = ("measures", "observations", "target_observations")
+    measures, observations, target_observations = (tables.read(name, folder) for name in names)
+    return Values(measures, observations, target_observations, people)
+
+
+@dataclass(frozen=True)
+class Request(Values):
+    """One entry under `comparisons`, for one measure, and the values of all."""
 
     study: Study
     entry: Comparison
     measure: str
-    measures: pd.DataFrame
-    observations: pd.DataFrame
-    people: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,7 @@ def run(work: Work) -> Outcome:
     tabled = measures_table(work)
     values = pd.concat(
         [
-            selection_values(study, trials),
+            selection_values(study, trials, selections),
             completion_values(work, exclusions),
             *movement_values(movements),
             *rated_values(work),
@@ -121,10 +122,13 @@ def _only_items(scores_by_item: Mapping[str, Sequence[str]]) -> list[str]:
 def _write_values(
     study: Study, measures: pd.DataFrame, values: pd.DataFrame, scores: Collection[str], folder: Path
 ) -> None:
-    """Write one mean per cell, and one per cell, session, period and sequence."""
+    """Write one mean per cell, one per cell, session, period and sequence, and of trials also one per target."""
     observed = [*CELL, "session", "period", "sequence"]
     tables.write("measures", measures, folder)
     tables.write("observations", _with_totals(study, _cells(values, observed), observed, scores), folder)
+    by_target = values[values["target"].notna()]
+    by_target = by_target.assign(factors=[json.dumps({"target": place}) for place in by_target["target"]])
+    tables.write("target_observations", _cells(by_target, observed), folder)
 
 
 def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:

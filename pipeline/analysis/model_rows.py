@@ -11,7 +11,7 @@ import pandas as pd
 
 from pipeline.analysis import complete_cases
 from pipeline.analysis.complete_cases import Request
-from pipeline.analysis.factors import BETWEEN_FACTORS, missing_cells
+from pipeline.analysis.factors import BETWEEN_FACTORS, missing_cells, parsed
 from pipeline.errors import PipelineError
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.mixed import Column, Covariate, Factor
@@ -19,6 +19,7 @@ from pipeline.statistics.result import IntArray
 from pipeline.tables.table import Row
 
 CARRY_OVER = "carry_over"
+TARGET = "target"
 _WHERE = (
     'give a column "period" in the measures, a column "sequence" that lists the conditions in the participants table,'
     ' or the fact "order" in the logs'
@@ -49,7 +50,7 @@ def of_model(request: Request) -> ModelRows:
     terms = list(request.entry.terms)
     names = list(dict.fromkeys(name for term in terms for name in term.split(":")))
     own_columns = ("condition", "period", "sequence", CARRY_OVER)
-    observations, factors = complete_cases.rows_and_factors(request, request.observations)
+    observations, factors = complete_cases.rows_and_factors(request, _observations(request))
     random = [] if request.entry.random is None else [request.entry.random]
     further = [*(name for name in names if name not in own_columns), *random]
     rows = complete_cases.with_factors(request, observations, further)
@@ -71,6 +72,15 @@ def of_model(request: Request) -> ModelRows:
     crossed = {name: _crossed(request, name, means[name]) for name in random}
     values = means["value"].to_numpy(np.float64)
     return ModelRows(values, list(means["participant"]), columns, terms, crossed, left_out)
+
+
+def _observations(request: Request) -> pd.DataFrame:
+    """The values the model takes: of trials by target, where the entry names the targets and no column does."""
+    own = request.observations[request.observations["measure"] == request.measure]
+    if request.entry.random != TARGET or any(TARGET in factors for factors in parsed(own["factors"])):
+        return request.observations
+    by_target = request.target_observations
+    return by_target if request.measure in set(by_target["measure"]) else request.observations
 
 
 def _crossed(request: Request, name: str, values: pd.Series) -> IntArray:

@@ -106,9 +106,13 @@ def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.Da
     ).astype({"factors": "object", "period": "Int64"})
 
 
-def selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
-    """Squared selection errors (mm², px²) and durations (s), one row per trial."""
+def selection_values(study: Study, trials: pd.DataFrame, selections: pd.DataFrame) -> pd.DataFrame:
+    """Squared selection errors (mm², px²) and durations (s), one row per trial, with the trial's `target` by its place.
+
+    A place in mm is what two trials have in common if they are of one target; None where the target is not known.
+    """
     recorded = trials[trials["estimator"] == "recorded"]
+    recorded = recorded.assign(target=_targets(recorded, selections))
     selected = recorded[recorded["squared_error_mm2"].notna()]
     timed = recorded[recorded["duration_s"].notna()]
     parts = [
@@ -118,7 +122,20 @@ def selection_values(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
     if study.display is not None and study.display.unit == "px":
         in_px = parts[0].assign(measure="selection_mse_px2")
         parts.append(in_px.assign(value=in_px["value"] * study.display.px_per_mm**2))
-    return pd.concat(parts)
+    return pd.concat([part.assign(target=recorded["target"].reindex(part.index)) for part in parts])
+
+
+def _targets(trials: pd.DataFrame, selections: pd.DataFrame) -> pd.Series:
+    """`(550, 500)`, the place in mm of each trial's target, with the index of the trials."""
+    key, places = [*CELL, "session", "trial"], [f"target_{axis}_mm" for axis in "xyz"]
+    label = [
+        "(" + ", ".join(f"{value:.6g}" for value in place if not np.isnan(value)) + ")"
+        for place in selections[places].to_numpy(np.float64)
+    ]
+    known = selections[key].assign(target=label)
+    known = known[known["target"] != "()"].drop_duplicates(key)
+    joined = trials[key].merge(known, on=key, how="left")
+    return pd.Series(joined["target"].to_numpy(object), index=trials.index).where(lambda place: place.notna(), None)
 
 
 def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:

@@ -14,6 +14,7 @@ from pipeline.analysis.against.problems import Problem, families_of, problems_of
 from pipeline.analysis.against.programs import LIBRARIES, R, named
 from pipeline.analysis.against.theirs import Theirs, ask
 from pipeline.analysis.comparisons import answered, people_of
+from pipeline.analysis.complete_cases import read_values
 from pipeline.commands import console, junit, r_process
 from pipeline.commands.junit import Case, Suite
 from pipeline.commands.studies import for_each_study
@@ -22,7 +23,6 @@ from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.stages import COMPARE
 from pipeline.statistics import OF_LOGARITHMS
-from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
 UNEXPLAINED = 1  # the exit code
@@ -106,9 +106,8 @@ def _rscript(names: Sequence[str]) -> str | None:
 
 def _outcomes(result: Result, names: Sequence[str], rscript: str | None) -> list[Outcome]:
     """Every row of the study's comparisons, in order, with the agreement of each program."""
-    measured = result.entry("measure")
-    measures, observations = (tables.read(name, measured) for name in ("measures", "observations"))
-    answers = answered(result.study, measures, observations, people_of(result.study, result.folder))
+    values = read_values(result.entry("measure"), people_of(result.study, result.folder))
+    answers = answered(result.study, values)
     problems = [problem for answer in answers for problem in problems_of(answer)]
     problems += families_of(answers)
     of_row: dict[int, list[Agreement]] = {}

@@ -67,19 +67,27 @@ _COMPARISON = (
 )
 _COMPARISON_KEY = ("measure", "test", "effect", "contrast")
 
+_OBSERVED = (
+    *WHO,
+    FACTORS,
+    count("period", "in which place the condition came, from 1; null if not known"),
+    text("sequence", "the order of conditions the participant was given, or its label"),
+    MEASURE,
+    count("n", "values behind the mean"),
+    number("value", "their mean, in the measure's unit"),
+)
+
 STUDY_TABLES = (
     Table(
         "observations",
         "One row per participant, condition, session, period and measure: the mean of its trials or repetitions.",
-        (
-            *WHO,
-            FACTORS,
-            count("period", "in which place the condition came, from 1; null if not known"),
-            text("sequence", "the order of conditions the participant was given, or its label"),
-            MEASURE,
-            count("n", "values behind the mean"),
-            number("value", "their mean, in the measure's unit"),
-        ),
+        _OBSERVED,
+        stages=("measure",),
+    ),
+    Table(
+        "target_observations",
+        "The same as observations for each target of trials by itself; factors has the place of the target in mm.",
+        _OBSERVED,
         stages=("measure",),
     ),
     Table(

@@ -41,6 +41,33 @@ def test_crossed_targets_against_lmertest(tmp_path: Path, steadyhand: Steadyhand
     assert "is left out" not in page
 
 
+def test_the_targets_of_trials_are_those_of_a_column(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    """The same values as times of trials, whose targets are places: each has the same intercept."""
+    steadyhand("compare", study(tmp_path / "column", "models_balanced", "mixed_model, random: target"))
+    (wanted,) = steadyhand.results()["comparisons"]
+    folder = tmp_path / "trials"
+    folder.mkdir()
+    least = min(float(row["value"]) for row in rows("models_balanced"))
+    lines = ["participant,condition,trial,target_x_mm,target_y_mm,selected_x_mm,selected_y_mm,start_s,selection_s"]
+    for number, row in enumerate(rows("models_balanced"), 1):
+        place = f"{10 * (ord(str(row['target'])[-1]) % 50)},5"
+        lines.append(
+            f"{row['participant']},{row['condition']},{number},{place},{place},100,{101 + float(row['value']) - least}"
+        )
+    (folder / "trials.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "study.yaml").write_text(
+        "conditions: [A, B]\ntrials: trials.csv\n"
+        "comparisons:\n  - {measure: trial_time_s, test: mixed_model, random: target}\n",
+        encoding="utf-8",
+    )
+    page = read(steadyhand, folder)
+    found = next(one for one in steadyhand.results()["comparisons"] if one["effect"] == wanted["effect"])
+    for figure in ("effect_size", "statistic", "df2", "p"):
+        assert found[figure] == pytest.approx(wanted[figure], rel=1e-6)
+    assert found["details"]["variances"] == pytest.approx(wanted["details"]["variances"], rel=1e-6)
+    assert "a crossed random intercept for each target" in page
+
+
 def test_targets_without_variance_are_left_out_and_said(tmp_path: Path, steadyhand: Steadyhand) -> None:
     entry = "mixed_model, random: target, missing: available"
     page = read(steadyhand, study(tmp_path / "study", "models_singular", entry))

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from pypdf import PdfReader
 
 from pipeline.analysis.comparisons import compared as rows_of
+from pipeline.analysis.complete_cases import Values
 from pipeline.analysis.descriptives import descriptives
 from pipeline.report.prose.glossary import explained
 from pipeline.report.prose.references import bibliography, escaped, used
@@ -142,7 +143,7 @@ def a_study(
     ]
     measures = tables.frame("measures", cells)
     observations = tables.frame("observations", [{**cell, "n": 1} for cell in cells])
-    rows, _ = rows_of(study, measures, observations)
+    rows, _ = rows_of(study, Values(measures, observations, tables.frame("target_observations", []), {}))
     for row in rows:
         row["details"] = json.loads(row["details"]) if row["details"] else None
     complete = list(
