@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from pipeline.analysis.person_means import person_means
 from pipeline.engine import threads
 from pipeline.engine.executors import PROCESS, executor_of
 from pipeline.engine.folders import cache_in
@@ -92,7 +93,7 @@ class Tables(Mapping[str, pd.DataFrame]):
         known = list(dict.fromkeys(self["measures"]["measure"]))
         if measure not in known:
             raise KeyError(f'there is no measure "{measure}"{did_you_mean(measure, known)}')
-        return tables.participant_means(self["measures"], measure, self.study.conditions)
+        return person_means(self.study, self["measures"], measure)
 
 
 def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str = PROCESS) -> Tables:

@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.kinds_of_values import are_answers
+from pipeline.analysis.person_means import person_means
 from pipeline.statistics import T_OF_SHARES, WILSON
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.descriptive import described, interval_method, summarize
 from pipeline.statistics.estimation import within_intervals
 from pipeline.study.measures import measure, measure_order
 from pipeline.study.settings import Study
-from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
 
@@ -22,7 +22,7 @@ def descriptives(study: Study, measures: pd.DataFrame, observations: pd.DataFram
     """n, mean, SD, median and the interval of the mean, one row per measure and condition."""
     rows: list[Row] = []
     for name in sorted(set(measures["measure"]), key=measure_order):
-        wide = tables.participant_means(measures, name, study.conditions)
+        wide = person_means(study, measures, name)
         described_as = described_values(name, wide, observations)
         for condition in study.conditions:
             values = wide[condition].dropna().to_numpy(np.float64)
@@ -62,7 +62,7 @@ def differences(study: Study, measures: pd.DataFrame) -> list[Row]:
     """The baseline minus each other condition, of the participants who met every condition, with the t interval."""
     rows: list[Row] = []
     for name in sorted(set(measures["measure"]), key=measure_order):
-        complete = tables.participant_means(measures, name, study.conditions).dropna()
+        complete = person_means(study, measures, name).dropna()
         first, *others = study.conditions
         for other in others if len(complete) > 1 else ():
             apart = (complete[first] - complete[other]).to_numpy(np.float64)
@@ -78,7 +78,7 @@ def _by_measure(
 ) -> Iterator[tuple[str, pd.DataFrame, str]]:
     """Each measure with the participants' means by condition, and the method of the intervals of its means."""
     for name in sorted(set(measures["measure"]), key=measure_order):
-        wide = tables.participant_means(measures, name, study.conditions)
+        wide = person_means(study, measures, name)
         yield name, wide, _interval_method(name, wide, observations)
 
 

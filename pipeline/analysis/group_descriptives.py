@@ -9,8 +9,8 @@ import numpy as np
 from pipeline.analysis.complete_cases import Request, rows_and_factors
 from pipeline.analysis.descriptives import described_values
 from pipeline.analysis.groups import CONDITION, between_factor, group_names, group_of_each
+from pipeline.analysis.person_means import person_means
 from pipeline.study.statistical_tests import TESTS
-from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
 
@@ -35,7 +35,7 @@ def by_group(requests: Iterable[Request]) -> list[Row]:
 def _of_measure(request: Request, factor: str) -> list[Row]:
     measured, _ = rows_and_factors(request, request.measures)
     members = group_of_each(request, factor, measured)
-    means = tables.participant_means(request.measures, request.measure, request.study.conditions)
+    means = person_means(request.study, request.measures, request.measure)
     means = means[[str(person) in members for person in means.index]]
     group = np.array([members[str(person)] for person in means.index])
     described = described_values(request.measure, means, request.observations)

@@ -16,7 +16,7 @@ from pipeline.analysis.answer_ranges import remedy, shifted_range
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
-from pipeline.study.scoring_rules import RULES
+from pipeline.study.scoring_rules import RULES, ScoringRule
 from pipeline.study.scoring_settings import ScoringEntry
 from pipeline.tables.table import Row
 from pipeline.words.phrases import counted, listing
@@ -39,6 +39,7 @@ _OTHERS_MIN = 3
 _TLX = (0.0, 100.0)  # however it was asked
 _CENTRED = (-3.0, 3.0)  # answers of the UEQ that are coded around zero, and its scores
 _SCORE = {"percent": (0.0, 100.0), "centred": _CENTRED}
+_ROUNDED = 0.01  # of a step between two scores that were written with two decimals
 _UNITS_APART = 50.0
 _FARTHEST_MM = 20_000.0
 _FAR_FROM_TARGET_MM, _UNDONE = 50.0, 0.2  # the middle distance, and how much of it a mistake leaves once undone
@@ -211,12 +212,20 @@ def rated_limits(name: str, value: FloatArray, scoring: Mapping[str, ScoringEntr
         return None if rule is None and scale == "score" else entry.limits
     if questionnaire == "nasa_tlx":
         return None if scale == "total" else _TLX
-    if rule is None or rule.limits is None:
+    if rule is None or rule.limits is None or _is_points(rule, scale, value):
         return None
     if rule.item(scale) is not None:
         coded = rule.name.startswith("ueq") and value.min() < 0 and value.max() <= _CENTRED[1]
         return _CENTRED if coded else rule.limits
     return next((_SCORE[one.reading] for one in rule.scales if one.name == scale and one.reading in _SCORE), None)
+
+
+def _is_points(rule: ScoringRule, scale: str, value: FloatArray) -> bool:
+    """Are these scores of a scale that shares its name with an item, as nausea of the SSQ: points times a factor?"""
+    factors = [one.factor for one in rule.scales if one.name == scale and one.reading == "points"]
+    return any(bool(np.all(np.abs(value / factor - np.round(value / factor)) < _ROUNDED)) for factor in factors) and (
+        bool(np.any(value != np.round(value)))
+    )
 
 
 def _weighs(scale: str) -> bool:

@@ -12,7 +12,7 @@ from pipeline.analysis.comparison_rows import Answer, change_of, diagnosed, pair
 from pipeline.analysis.complete_cases import CompleteCases, Request
 from pipeline.analysis.estimates import with_direction, with_estimates
 from pipeline.analysis.ratios import on_logarithms, results_of_logarithms, with_ratio, with_ratio_of
-from pipeline.statistics import OK, estimation, pairs
+from pipeline.statistics import FURTHER_TERMS, OK, estimation, pairs
 from pipeline.statistics.anova import rm_anova
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.art import art_anova, art_contrasts
@@ -122,6 +122,9 @@ def mixed_models(request: Request) -> Answer:
 
     results = results_of_logarithms(fitted, model.values) if on_logarithms(request) else fitted(model.values)
     rows = [with_ratio(row_of(request, result)) for result in results]
+    further = [name for name in request.entry.fixed if name != "condition"]
+    if further:
+        rows = [{**row, "details": {**row["details"], FURTHER_TERMS: further}} for row in rows]
     if model_rows.CARRY_OVER in model.columns:
         rows = [
             {**row, "method": f"{row['method']}; without first periods, which have no preceding condition"}

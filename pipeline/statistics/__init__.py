@@ -3,6 +3,9 @@
 Every phrase that `status` can hold is listed here, once.
 """
 
+FURTHER_TERMS = "further_terms"
+"""The key of `details` that lists the fixed terms of a mixed model beside the condition."""
+
 OK = "ok"
 ALL_ZERO = "undefined: all differences are zero"
 NO_ERROR = "undefined: all differences are equal, so there is no error to test against"

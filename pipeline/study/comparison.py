@@ -64,10 +64,6 @@ class Comparison(Frozen):
                 raise ValueError(f"{self.test} does not take {key}; it is for {named}")
         if self.family is not None and self.adjust == "none":
             raise ValueError(f'family "{self.family}" needs an adjustment, such as adjust: holm')
-        if self.test == "tost" and self.bounds is None:
-            raise ValueError("tost needs bounds, in the unit of the measure, such as bounds: [-5, 5]")
-        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
-            raise ValueError(f"bounds need the lower one first, found {list(self.bounds)}")
         for key, names in (("within", self.within), ("fixed", self.terms)):
             if "condition" not in names or len(set(names)) < len(names):
                 raise ValueError(f'{key} of "{self.title}" must contain "condition", and no name twice')
@@ -80,6 +76,19 @@ class Comparison(Frozen):
                     raise ValueError(f'fixed: "{term}" needs "{name}" as a term too')
             if len(parts) > 1 and "period" in parts and self.period_is_slope:
                 raise ValueError(f'fixed: "{term}" needs factor(period) in the place of period')
+        return self
+
+    @model_validator(mode="after")
+    def _bounds_hold_no_difference(self) -> Comparison:
+        if self.test == "tost" and self.bounds is None:
+            raise ValueError("tost needs bounds, in the unit of the measure, such as bounds: [-5, 5]")
+        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
+            raise ValueError(f"bounds need the lower one first, found {list(self.bounds)}")
+        if self.bounds is not None and not self.bounds[0] < 0 < self.bounds[1]:
+            raise ValueError(
+                f"bounds must have 0, no difference, between them, found {list(self.bounds)}: they say from which"
+                " difference on, in either direction, two conditions are not equivalent"
+            )
         return self
 
     @model_validator(mode="after")

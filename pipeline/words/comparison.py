@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pipeline.statistics import OF_LOGARITHMS
+from pipeline.statistics import FURTHER_TERMS, OF_LOGARITHMS
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words.numbers import MINUS, interval
+from pipeline.words.phrases import listing
 
 Row = Mapping[str, Any]
 EFFECTS_OF_CONDITION = ("condition", "treatment")
@@ -33,8 +34,10 @@ def contrast(row: Row) -> str:
 
 
 def test_label(row: Row) -> str:
-    """The test's short name: `paired t`, `paired t of logarithms`."""
-    return TESTS[row["test"]].label + (" of logarithms" if uses_logarithms(row) else "")
+    """The test's short name: `paired t`, `paired t of logarithms`, `mixed model with period`."""
+    further = (row["details"] or {}).get(FURTHER_TERMS, [])
+    terms = f" with {listing([term.replace('_', '-').replace(':', ' × ') for term in further])}" if further else ""
+    return TESTS[row["test"]].label + (" of logarithms" if uses_logarithms(row) else "") + terms
 
 
 def uses_logarithms(row: Row) -> bool:

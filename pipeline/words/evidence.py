@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from pipeline.words.comparison import Row
 from pipeline.words.effect_sizes import effect_size
 from pipeline.words.names import adjustment_label
@@ -87,6 +90,12 @@ def permutation(row: Row, digits: int = 4) -> str:
         return ""
     exact = "exact " if details["permutation_exact"] else ""
     return p_phrase(details["permutation_p"], f"{exact}permutation p", digits)
+
+
+def resampled(details: Mapping[str, Any]) -> Sequence[float]:
+    """A bootstrap's interval, of a ratio or a difference; empty where none was asked for or could be computed."""
+    bounds: Sequence[float] = details.get("bootstrap_ci_ratio_to_first") or details.get("bootstrap_ci_difference") or ()
+    return bounds
 
 
 def bootstrap(row: Row) -> str:

@@ -15,6 +15,7 @@ from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
+from pipeline.words.evidence import resampled
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
 from pipeline.words.numbers import number
 from pipeline.words.phrases import counted, group_sizes, listing, there_were
@@ -248,7 +249,7 @@ def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
     """What is computed in addition to a test: bootstrap intervals and permutation p values, with their seed."""
     seed = f", seed {entry.seed}"
     of = "ratio of geometric means" if entry.transform == "log" else "mean difference"
-    if entry.bootstrap:
+    if entry.bootstrap and any(resampled(row["details"] or {}) for row in rows):
         by_group = "" if entry.is_within else " within their groups"
         yield f"BCa bootstrap intervals of the {of} ({RESAMPLES:,} resamples of participants{by_group}{seed})"
     if entry.permutation:

@@ -14,6 +14,7 @@ from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from pipeline.tables.table import Row
 from pipeline.words.comparison import uses_logarithms
+from pipeline.words.evidence import resampled
 
 PAPER = "feng2017"
 _OF_EFFECT_SIZE = {
@@ -152,7 +153,7 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
 
 def _of_estimates(details: Mapping[str, Any], design: str) -> Iterator[tuple[str, str]]:
     """What an entry asks for beside its test."""
-    if "bootstrap_seed" in details:
+    if resampled(details):
         yield "efron1987", "bootstrap intervals"
     if details.get("permutation_p") is not None:
         yield ("pitman1937" if details["permutation_exact"] else "phipson2010"), "permutation p values"

@@ -10,7 +10,7 @@ from pipeline.report.document.model import Strong, Text
 from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
 from pipeline.report.sections import checks, preregistration
 from pipeline.report.sections.material import Material
-from pipeline.statistics import T_BEYOND
+from pipeline.statistics import OK, T_BEYOND
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import reference_phrase
@@ -119,10 +119,30 @@ def _assumptions(material: Material) -> Iterator[Text]:
         text = f"of the mixed model for {_measures_of(singular)}: it finds no variance between participants, so it"
         yield (Strong("Singular fit "), f"{text} treats all rows as if they came from different people.")
     yield from _left_out_intercepts(rows)
+    yield from _groups_of_one(material)
     undefined = sum(row["status"] != "ok" for row in rows)
     if undefined:
         yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
     yield from _narrow_intervals(material)
+
+
+def _groups_of_one(material: Material) -> Iterator[Text]:
+    """Groups of which a single participant stands for all: nothing tells how far its members lie apart."""
+    tested = {
+        row["measure"] for row in material.rows("comparisons") if row["status"] == OK and _has_a_group_of_one(row)
+    }
+    alone = [row for row in material.rows("descriptives_by_group") if row["group_n"] == 1 and row["measure"] in tested]
+    if alone:
+        groups = listing(list(dict.fromkeys(f"{row['factor']} “{row['group']}”" for row in alone)))
+        text = (
+            f"in {groups}, for {_measures_of(alone)}: its mean, and how it differs from the others, are that person's"
+            " alone, and a mean over the groups counts that person as much as a whole group."
+        )
+        yield (Strong("A single participant "), text)
+
+
+def _has_a_group_of_one(row: Row) -> bool:
+    return 1 in (row["details"] or {}).get("n_groups", ())
 
 
 def _narrow_intervals(material: Material) -> Iterator[Text]:

@@ -14,7 +14,7 @@ from pipeline.tables.table import Row
 from pipeline.words.change import meaningful_reduction
 from pipeline.words.comparison import contrast, test_label, uses_logarithms
 from pipeline.words.effect_sizes import effect_size
-from pipeline.words.evidence import degrees_of_freedom, one_sided_factor, statistic_name, statistic_value
+from pipeline.words.evidence import degrees_of_freedom, one_sided_factor, resampled, statistic_name, statistic_value
 from pipeline.words.names import adjustment_label, measure_label
 from pipeline.words.numbers import NO_VALUE, fraction, interval, number, p_value, percent
 from pipeline.words.phrases import all_of, capitalized, listing
@@ -164,8 +164,8 @@ def _corrected_p(row: Row) -> str:
 def _bootstrap(row: Row) -> str:
     """The bootstrap interval of the mean difference, or why there is none."""
     details = row["details"] or {}
-    bounds = details.get("bootstrap_ci_difference") or details.get("bootstrap_ci_ratio_to_first")
-    return interval(*bounds) if bounds else str(details.get("no_bootstrap", NO_VALUE))
+    bounds = resampled(details)
+    return interval(bounds[0], bounds[1]) if bounds else str(details.get("no_bootstrap", NO_VALUE))
 
 
 ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (

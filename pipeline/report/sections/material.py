@@ -12,6 +12,7 @@ from typing import Any
 import matplotlib.figure
 import pandas as pd
 
+from pipeline.analysis.person_means import person_means
 from pipeline.engine.jobs import Jobs
 from pipeline.report import figures
 from pipeline.report.document.model import Figure
@@ -81,8 +82,8 @@ class Material:
         return list(dict.fromkeys(row["measure"] for row in self.rows("descriptives")))
 
     def participant_means(self, measure: str) -> pd.DataFrame:
-        """One row per participant and one column per condition."""
-        return tables.participant_means(self.measures, measure, self.study.conditions)
+        """One row per participant and one column per condition, as the descriptives count them."""
+        return person_means(self.study, self.measures, measure)
 
     def of_shares(self, measure: str) -> bool:
         """Is each value of a measure a participant's share of answers 0 or 1?"""

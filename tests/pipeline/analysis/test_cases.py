@@ -51,6 +51,8 @@ def test_who_lacks_a_cell_of_a_further_factor_is_not_averaged_over_the_rest(resu
     assert whole == pytest.approx([paired["p"]] * 2)
     of_condition_alone = rows(found, "mixed_model")[0]
     assert of_condition_alone["p"] > 0.1
+    described = {row["condition"]: row["n"] for row in found["descriptives"]}
+    assert described == {"A": 10, "B": 7}  # nobody's mean of B is over the easy task alone
     remarks = [row["remark"] for row in found["design_check"] if row["remark"]]
     assert any("P01 (B × hard), P02 (B × hard) and P03 (B × hard)" in remark for remark in remarks)
 

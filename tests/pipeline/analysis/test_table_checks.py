@@ -83,6 +83,7 @@ def test_what_is_not_what_it_is_taken_for_is_amber(measure: str, values: list[fl
         ("ueq/q1", [-3.0, 3.0, 0.0]),
         ("ueq/q1", [1.0, 7.0, 4.0]),
         ("ssq/total", [0.0, 200.0, 30.0]),
+        ("ssq/nausea", [0.0, 9.54, 28.62, 19.08]),  # the score of that name, not its item
         ("own/q1", [1.0, 500.0, 30.0]),
         ("steps", [1.2e9, 15.0, 1.0]),
         ("time_s", [float("nan"), float("inf"), 3.0]),

@@ -173,20 +173,32 @@ PAIRED = [
 
 
 @pytest.mark.parametrize(("case", "task"), PAIRED)
-def test_tost_against_rs_one_sided_t_tests(folder: Folder, steadyhand: Steadyhand, case: str, task: str) -> None:
+def test_tost_against_rs_one_sided_t_tests(folder: Folder, case: str, task: str) -> None:
     """t.test(alternative = "greater") is the side of a bound at 0, and its 95 % limit the bound at which p is .05;
-    the limits of the two-sided 95 % interval are those at which it is .025."""
+    the limits of the two-sided 95 % interval are those at which it is .025. A study's bounds have 0 between them, so
+    that these are the function's alone."""
     reference = expected(case)["tasks"][task]
     one_sided, interval = reference["paired"]["t_test_one_sided_greater"], reference["paired"]["t_test"]["ci95"]
     limit, far = one_sided["ci95_lower"], 1000 * max(map(abs, interval))
     sides = [(0.0, far), (limit, far), (interval[0], far), (-far, interval[1]), (interval[0], interval[1])]
-    tests = [f"test: tost, bounds: [{low!r}, {high!r}]" for low, high in sides]
-    rows = compared(steadyhand, study_of(folder, case, task, reference["conditions"], tests))
-    for row, p in zip(rows, (one_sided["p"], 0.05, 0.025, 0.025, 0.025), strict=True):
-        same(row["p"], p)
-        assert row["p"] == max(row["details"]["p_lower"], row["details"]["p_upper"])
-    same(rows[0]["statistic"], reference["paired"]["t_test"]["t"])
-    same(rows[0]["details"]["ci90_difference"][0], limit)
+    path = study_of(folder, case, task, reference["conditions"], []) / "measures.csv"
+    measured = pd.read_csv(path).pivot_table(index="participant", columns="condition", values="value")
+    first, second = (measured[name].to_numpy(np.float64) for name in reference["conditions"])
+    results = [tost(first, second, bounds) for bounds in sides]
+    for result, p in zip(results, (one_sided["p"], 0.05, 0.025, 0.025, 0.025), strict=True):
+        same(result.p, p)
+        assert result.p == max(result.details["p_lower"], result.details["p_upper"])
+    same(results[0].statistic, reference["paired"]["t_test"]["t"])
+    same(results[0].details["ci90_difference"][0], limit)
+
+
+def test_bounds_of_a_study_have_no_difference_between_them(folder: Folder, steadyhand: Steadyhand) -> None:
+    """A difference between 2 and 5 is no equivalence, whatever its p."""
+    case, task = PAIRED[0]
+    conditions = expected(case)["tasks"][task]["conditions"]
+    ran = steadyhand("compare", study_of(folder, case, task, conditions, ["test: tost, bounds: [2, 5]"]))
+    assert ran.code == 2
+    assert "bounds must have 0, no difference, between them, found [2.0, 5.0]" in ran.err
 
 
 def test_follow_ups_of_two_factors_are_paired_tests_of_means(folder: Folder, steadyhand: Steadyhand) -> None:
