@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from fusion_core.adaptive import layout, steps
+from fusion_core.adaptive.found import Found, found
 from fusion_core.adaptive.layout import FELT, ORIENTED, READING, ROWS, UNTURNED, Memory, Records
 from fusion_core.checks import require_positive
 from fusion_core.estimator import require_reading, require_readings
@@ -173,6 +174,14 @@ class FusionAdaptive:
         steps.go_through(self.model, memory.state, memory.phone, readings, rising, mean, sd, trace)
         back = np.argsort(order, kind="stable")
         return Track(times, mean[back], sd[back])
+
+    def found(self, samples: Mapping[str, Samples]) -> list[Found]:
+        """What the sensors turned out to be like by the end of a recording, beside what they are stated to be."""
+        require_readings(self.sensors, samples)
+        memory = layout.empty(2 * self._most_kept(samples) + _ROOM)
+        readings = self._readings(samples)
+        steps.go_through(self.model, memory.state, memory.phone, readings, _NO_TIMES, _NO_ROWS, _NO_ROWS, _NO_ROWS)
+        return found(self.model, memory)
 
     def _most_kept(self, samples: Mapping[str, Samples]) -> int:
         """The largest number of the phone's readings within the time that rows are kept."""

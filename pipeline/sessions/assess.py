@@ -18,6 +18,7 @@ from pipeline.sessions.estimators import sensors
 from pipeline.sessions.fusion_checks import fusion_check_rows
 from pipeline.sessions.phone import described
 from pipeline.sessions.recording import Recording, Shown, where_judged
+from pipeline.sessions.sensors_found import sensors_found_rows
 from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
 from pipeline.statistics.arrays import FloatArray
@@ -48,6 +49,8 @@ def run(work: Work) -> Outcome:
     measured, residuals = _noise(study, session.id, loaded)
     tables.write("sensor_noise", tables.of_rows("sensor_noise", measured), work.out)
     tables.write("noise_residuals", residuals, work.out)
+    sensors_found = list(sensors_found_rows(study, session.id, loaded))
+    tables.write("sensors_found", tables.of_rows("sensors_found", sensors_found), work.out)
     events = tables.read_arrow("events", ingested).to_pylist()
     tables.write("trials", tables.of_rows("trials", list(trial_rows(work, events, tracks))), work.out)
     tables.write("selections", tables.of_rows("selections", list(selection_rows(work, events))), work.out)

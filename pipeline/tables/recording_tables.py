@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pipeline.tables.columns import (
+    CI_HIGH,
+    CI_LOW,
     CONDITION,
     ESTIMATOR,
     SESSION,
@@ -113,6 +115,26 @@ SENSOR_NOISE = Table(
     ),
     stages=("assess", "compare"),
     key=("session", "stream"),
+    in_results=True,
+    as_csv=True,
+)
+
+SENSORS_FOUND = Table(
+    "sensors_found",
+    "One row per session, estimator that finds its sensors, and figure: what a sensor is like, beside what is stated.",
+    (
+        SESSION,
+        ESTIMATOR,
+        STREAM,
+        text("quantity", "tracker_noise, tracker_late, mounting_x …, heading, scale, bias_x …, lever_arm_x …"),
+        text("unit", "unit of the figures"),
+        number("value", "as found by the end of the session"),
+        CI_LOW._replace(about="lower end of its 95 % interval"),
+        CI_HIGH._replace(about="upper end of its 95 % interval"),
+        number("stated", "the noise that study.yaml states; 0 of what departs from it; null of a lever arm"),
+    ),
+    stages=("assess", "compare"),
+    key=("session", "estimator", "quantity"),
     in_results=True,
     as_csv=True,
 )

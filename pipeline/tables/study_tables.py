@@ -36,6 +36,7 @@ from pipeline.tables.recording_tables import (
     QUALITY,
     REPLAY_AGREEMENT,
     SENSOR_NOISE,
+    SENSORS_FOUND,
     SHOWN_AT_SELECTION,
 )
 
@@ -333,6 +334,7 @@ STUDY_TABLES = (
         in_results=True,
         as_csv=True,
     ),
+    SENSORS_FOUND,
     Table(
         "measures",
         "One row per participant, condition and measure, and level of further factors.",

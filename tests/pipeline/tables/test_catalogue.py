@@ -72,6 +72,7 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
         "fitts",
         "fitts_points",
         "descriptives_by_group",
+        "sensors_found",
     )
     assert in_results_of("replay") == ["accuracy", "replay_means", "replay_exclusions"]
     assert written_by("replay") == ["accuracy", "replay_trials", "replay_means", "replay_exclusions"]
