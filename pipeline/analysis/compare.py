@@ -85,7 +85,9 @@ def run(work: Work) -> Outcome:
     frames["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, frames["trials"]))
     if study.printed is not None:
         path = work.folder / study.printed
-        frames["printed"] = compare_printed(path, frames["descriptives"], frames["comparisons"])
+        frames["printed"] = compare_printed(
+            path, frames["descriptives"], frames["comparisons"], frames["accuracy_means"]
+        )
     if isinstance(study.simulation, SelectionSimulation) and study.repeats is not None:
         repeats = study_tables.read_repeats(work.folder / study.repeats, study.conditions)
         rows = list(reductions(study.simulation, study.conditions, repeats))

@@ -288,8 +288,31 @@ class Family(Frozen):
     adjust: Literal["none", "holm", "bonferroni", "benjamini_hochberg"] = "none"
 
 
+class PrintedAccuracy(Frozen):
+    """What is printed of an estimator's error, beside what the study's recordings give for one of its estimators.
+
+    `percent_below` is by how much its RMSE is printed to be below that of the estimator `than`.
+    """
+
+    estimator: Id
+    label: str
+    rmse_mm: Number | None = None
+    sd_mm: Number | None = None
+    percent_below: Number | None = None
+    than: Id | None = None
+
+    @model_validator(mode="after")
+    def _says_than_what(self) -> PrintedAccuracy:
+        if (self.percent_below is None) != (self.than is None):
+            raise ValueError("accuracy: percent_below and than go together: by how much below which estimator")
+        return self
+
+
 class Publication(Frozen):
-    """printed.yaml. `n` participants stand behind every mean and test unless it says otherwise."""
+    """printed.yaml. `n` participants stand behind every mean and test unless it says otherwise.
+
+    `note` says in the report what a reader should know of the figures and the study's own, such as why they differ.
+    """
 
     source: str
     n: Count | None = None
@@ -297,7 +320,9 @@ class Publication(Frozen):
     rounding: Literal["nearest", "cut_off"] = "nearest"
     sd: Literal["sample", "population"] = "sample"
     intervals: Literal["t", "any"] = "any"
-    measures: tuple[Measure, ...]
+    measures: tuple[Measure, ...] = ()
+    accuracy: tuple[PrintedAccuracy, ...] = ()
+    note: str = ""
     totals: tuple[Total, ...] = ()
     shares: tuple[Share, ...] = ()
     counts: tuple[Parts, ...] = ()
@@ -306,8 +331,9 @@ class Publication(Frozen):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Publication:
-        if not self.measures:
-            raise ValueError("measures: needs one or more")
+        if not self.measures and not self.accuracy:
+            listed = "measures" in self.model_fields_set
+            raise ValueError("measures: needs one or more" if listed else '"measures" is missing')
         names = tuple(measure.name for measure in self.measures)
         unique("measures: name", names)
         for field, entries in (("totals", self.totals), ("families", self.families)):

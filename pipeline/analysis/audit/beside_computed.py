@@ -10,9 +10,19 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.audit.audit import audit
+from pipeline.analysis.audit.finding import REMARK
 from pipeline.analysis.audit.phrases import label
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study.printed import Cell, Measure, PrintedTest, Publication, Reduction, Total, load_publication
+from pipeline.study.printed import (
+    Cell,
+    Measure,
+    PrintedAccuracy,
+    PrintedTest,
+    Publication,
+    Reduction,
+    Total,
+    load_publication,
+)
 from pipeline.study.rounded import Rounded
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
@@ -21,7 +31,9 @@ _STATISTIC_NAMES = {"t": "t", "F": "F", "chi2": "chi2", "W": "W+"}
 _ROUND_OFF = Fraction(1, 10**6)  # of a unit in the last digit: what arithmetic leaves of a value halfway
 
 
-def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame) -> pd.DataFrame:
+def compare_printed(
+    path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame, accuracy_means: pd.DataFrame
+) -> pd.DataFrame:
     """The table `printed`: each figure with its computed value, then the findings of the audit.
 
     Raises PipelineError where the file does not fit the study's results: an unknown measure, condition or test.
@@ -30,8 +42,10 @@ def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.Data
     `pipeline.analysis.audit.finding` where printed figures are checked against each other.
     """
     publication = load_publication(path)
-    computed = _Computed(path, descriptives, comparisons)
+    computed = _Computed(path, descriptives, comparisons, accuracy_means)
     rows = [_row(*figure) for figure in _figures(publication, computed)]
+    if publication.note:
+        rows.append({"what": "These figures", "check": NOTE, "printed": publication.note, "verdict": REMARK})
     for finding in audit(publication):
         rows.append(
             {
@@ -45,6 +59,9 @@ def compare_printed(path: Path, descriptives: pd.DataFrame, comparisons: pd.Data
         )
     return tables.frame("printed", [{**row, "source": publication.source} for row in rows])
 
+
+NOTE = "note"
+"""The `check` of the row that holds a publication's note."""
 
 Figure = tuple[str, Rounded, float]
 """What the figure is, as it is printed, and its computed value (NaN where undefined)."""
@@ -63,6 +80,8 @@ def _figures(publication: Publication, computed: _Computed) -> Iterator[Figure]:
                 yield what, reduction.percent, computed.reduction(measure.measure, reduction)
         for test in measure.tests:
             yield from _of_test(computed, measure, measure.measure, test)
+    for estimate in publication.accuracy:
+        yield from _of_accuracy(computed, estimate)
     for total in publication.totals:
         names = [measure.measure for measure in publication.named(total.measures)]
         if None not in names:
@@ -74,6 +93,16 @@ def _of_cell(computed: _Computed, measure: Measure, name: str, condition: str, c
         figure = getattr(cell, column)
         if figure is not None:
             yield f"{measure.name}, {condition}: {column}", figure, computed.descriptive(name, condition, column)
+
+
+def _of_accuracy(computed: _Computed, printed: PrintedAccuracy) -> Iterator[Figure]:
+    for column, what in (("rmse_mm", "RMSE"), ("sd_mm", "stated SD")):
+        figure = getattr(printed, column)
+        if figure is not None:
+            yield f"{printed.label}: {what}, mm", figure, computed.accuracy(printed.estimator, column)
+    if printed.percent_below is not None and printed.than is not None:
+        own, other = (computed.accuracy(name, "rmse_mm") for name in (printed.estimator, printed.than))
+        yield f"{printed.label}: RMSE below that of {printed.than}, %", printed.percent_below, 100 * (1 - own / other)
 
 
 def _of_test(computed: _Computed, measure: Measure, name: str, test: PrintedTest) -> Iterator[Figure]:
@@ -103,8 +132,11 @@ def _row(what: str, printed: Rounded, value: float) -> Row:
 class _Computed:
     """Looks up, in a study's descriptives and comparisons, the figures that a publication prints."""
 
-    def __init__(self, path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame) -> None:
+    def __init__(
+        self, path: Path, descriptives: pd.DataFrame, comparisons: pd.DataFrame, accuracy_means: pd.DataFrame
+    ) -> None:
         self._path, self._descriptives, self._comparisons = path, descriptives, comparisons
+        self._accuracy_means = accuracy_means
 
     def descriptive(self, measure: str, condition: str, column: str) -> float:
         """A condition's mean, sd or median; as `rmse` the root of its mean."""
@@ -113,6 +145,10 @@ class _Computed:
         if pd.isna(value):
             return np.nan
         return float(np.sqrt(value)) if column == "rmse" else float(value)
+
+    def accuracy(self, estimator: str, column: str) -> float:
+        """An estimator's error or stated SD, the mean over sessions."""
+        return float(self._rows(self._accuracy_means, "estimator", estimator).iloc[0][column])
 
     def reduction(self, measure: str, reduction: Reduction) -> float:
         """In percent of the first figure."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,27 +15,31 @@ from pipeline.report.figures.wording import listed
 from pipeline.words.numbers import milliseconds
 
 
-def _lead_words(lead_curves: pd.DataFrame) -> Words:
-    """Where each curve peaks."""
+def _lead_words(lead_curves: pd.DataFrame, lag_s: Mapping[str, float]) -> Words:
+    """Where each curve peaks, and how late the estimator is by the better measure."""
     parts = []
     for name, rows in lead_curves.groupby("estimator", sort=False):
         peak = peak_s(rows)
-        parts.append(f"{name} has no peak within half a second" if peak is None else f"{name} {milliseconds(peak)} ms")
+        place = "has no peak within half a second" if peak is None else f"{milliseconds(peak)} ms"
+        lag = lag_s.get(str(name))
+        parts.append(f"{name} {place}" + ("" if lag is None else f" (lag {milliseconds(lag)} ms)"))
     peaks = f"Peaks: {listed(parts)}."
     where = lead_curves["session"].iloc[0]
+    lags = " Lag: behind the reference, where the squared error is least." if lag_s else ""
     return Words(
         f"How far each estimator is ahead of the tracker as it arrived, by the paper's method (session {where})."
-        f" {peaks} Where the top is flat, the place of its peak is uncertain.",
+        f" {peaks}{lags} A peak at 0 need not mean that nothing is gained: an estimate shares the noise of the"
+        " frame that it was made from, and a single reach has a flat top.",
         f"Cross-correlation with the tracker against lead. {peaks}",
     )
 
 
 @drawing(_lead_words)
 @styled
-def lead(lead_curves: pd.DataFrame) -> Figure:
+def lead(lead_curves: pd.DataFrame, lag_s: Mapping[str, float]) -> Figure:
     """Cross-correlation of each estimator with the tracker as it arrived, peaks marked (paper, Fig. 9).
 
-    `lead_curves` has the columns of that table, of one session.
+    `lead_curves` has the columns of that table, of one session; `lag_s` the estimators' lags in it, for the caption.
     """
     figure, (axes,) = panels(height=2.9)
     for index, (estimator, rows) in enumerate(lead_curves.groupby("estimator", sort=False)):

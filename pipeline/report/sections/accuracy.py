@@ -202,8 +202,14 @@ def _session_figures(material: Material) -> list[Block]:
         blocks.append(material.drawn("estimates", figures.estimates, excerpts, contradicted(material)))
         blocks += _overlaid(material, excerpts)
     if len(curves):
-        blocks.append(material.drawn("lead", figures.lead, curves))
+        blocks.append(material.drawn("lead", figures.lead, curves, _lags_in(material, str(curves["session"].iloc[0]))))
     return blocks
+
+
+def _lags_in(material: Material, session: str) -> dict[str, float]:
+    """The lag of each estimator in a session, where it is known."""
+    rows = (row for row in material.rows("accuracy") if row["session"] == session and row["lag_s"] is not None)
+    return {row["estimator"]: row["lag_s"] for row in rows}
 
 
 def _overlaid(material: Material, excerpts: pd.DataFrame) -> list[Block]:

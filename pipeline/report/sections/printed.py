@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pipeline.analysis.audit.beside_computed import NOTE
 from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED
 from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table, Text, columns
 from pipeline.report.sections.material import Material
@@ -19,8 +20,11 @@ def section(material: Material) -> Section | None:
     if not rows:
         return None
     figures = [row for row in rows if row["check"] is None]
-    held = [row for row in rows if row["check"] is not None]
+    held = [row for row in rows if row["check"] not in (None, NOTE)]
     blocks: list[Block] = []
+    notes = tuple((str(row["printed"]),) for row in rows if row["check"] == NOTE)
+    if notes:
+        blocks.append(Notice("Before you compare", notes, "information"))
     if figures:
         blocks += _beside_computed(figures)
     if held:
@@ -31,7 +35,7 @@ def section(material: Material) -> Section | None:
 def _beside_computed(figures: Sequence[Row]) -> list[Block]:
     agreeing = sum(row["verdict"] == "agrees" for row in figures)
     text: Text = (
-        f"{figures[0]['source']} prints {counted(len(figures), 'figure')} of this study. ",
+        f"{figures[0]['source']} prints {counted(len(figures), 'figure')} that this study has too. ",
         Strong(f"{agreeing} of them are reproduced to the last printed digit"),
         f", {len(figures) - agreeing} {'is' if len(figures) - agreeing == 1 else 'are'} not.",
     )

@@ -108,12 +108,15 @@ def curve(name: str, peak_s: float) -> pd.DataFrame:
 
 def test_the_peaks_of_the_lead_are_named(tmp_path: Path) -> None:
     curves = pd.concat([curve("fusion", 10 / 90), curve("raw", 0.0), curve("off", 3.0), curve("late", -9 / 90)])
-    shown = texts(figures.lead(curves), tmp_path)
+    shown = texts(figures.lead(curves, {}), tmp_path)
     assert {"fusion: peak at +111 ms", "raw: peak at 0 ms", "late: peak at −100 ms", "off"} <= set(shown)
     assert any("(ms)" in text for text in shown)
-    said = figures.lead.words(curves).caption
+    said = figures.lead.words(curves, {}).caption
     assert "fusion +111 ms; raw 0 ms; off has no peak within half a second; late −100 ms" in said
-    saved(figures.lead(curves.assign(correlation_mm2=0.0)), tmp_path)
+    assert "Lag:" not in said
+    beside = figures.lead.words(curves, {"raw": 0.114, "fusion": 0.002}).caption
+    assert "fusion +111 ms (lag +2 ms); raw 0 ms (lag +114 ms);" in beside
+    saved(figures.lead(curves.assign(correlation_mm2=0.0), {}), tmp_path)
 
 
 def test_noise_names_unit_number_and_tails(tmp_path: Path) -> None:
