@@ -6,6 +6,9 @@ from pipeline.engine.stage import Stage
 from pipeline.study.folder import PREREGISTERED
 from pipeline.study.settings import Study
 
+TABLES_AS_GIVEN = ("format", "columns", "missing")
+"""How the study's own tables are written; for a stage that reads one."""
+
 STAGES: tuple[Stage, ...] = (
     Stage(
         "ingest",
@@ -40,7 +43,9 @@ STAGES: tuple[Stage, ...] = (
             "conditions",
             "display",
             "exclusions",
-            "missing",
+            *TABLES_AS_GIVEN,
+            "wide",
+            "practice",
             "scoring",
             "factors",
             "participants",
@@ -66,6 +71,7 @@ STAGES: tuple[Stage, ...] = (
             "factors",
             "alpha",
             "exclusions",
+            *TABLES_AS_GIVEN,
             "participants",
             "printed",
             "streams",

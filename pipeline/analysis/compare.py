@@ -30,6 +30,7 @@ from pipeline.study.measures import measure_order
 from pipeline.study.preregistration import read_preregistered
 from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
+from pipeline.study.table_file import TableFile, table_file
 from pipeline.tables import results
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import GATHERED, TABLES
@@ -89,7 +90,8 @@ def run(work: Work) -> Outcome:
             path, frames["descriptives"], frames["comparisons"], frames["accuracy_means"]
         )
     if isinstance(study.simulation, SelectionSimulation) and study.repeats is not None:
-        repeats = study_tables.read_repeats(work.folder / study.repeats, study.conditions)
+        file = TableFile(work.folder / study.repeats, "repeats", study.conditions)
+        repeats = study_tables.read_repeats(file)
         rows = list(reductions(study.simulation, study.conditions, repeats))
         frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
     facts = _participant_facts(work, measures, tables.read("exclusions", measured))
@@ -159,11 +161,12 @@ def _participant_facts(work: Work, measures: pd.DataFrame, exclusions: pd.DataFr
     """
     counting = (session for session in work.sessions if not work.study.exclusion_of(session))
     people = set(measures["participant"]) | {str(session.participant) for session in counting}
-    if work.study.participants is None:
+    file = table_file(work.study, work.folder, "participants")
+    if file is None:
         unscored = exclusions.loc[exclusions["what"] == UNDEFINED, "participant"].dropna()
         everybody = people | set(unscored)
         return {"n": len(people)} if everybody == people else {"n": len(people), "listed": len(everybody)}
-    return study_tables.participant_facts(study_tables.read_participants(work.folder / work.study.participants), people)
+    return study_tables.participant_facts(study_tables.read_participants(file), people)
 
 
 def _session_exclusions(work: Work) -> list[Row]:

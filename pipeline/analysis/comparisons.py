@@ -25,14 +25,16 @@ from pipeline.study.comparison import Comparison, matching_measures
 from pipeline.study.csv_tables import read_participants
 from pipeline.study.measures import has_total, measure_order
 from pipeline.study.settings import Study
+from pipeline.study.table_file import table_file
 from pipeline.tables.table import Row
 
 
 def people_of(study: Study, folder: Path) -> People:
     """participants.csv of a study folder by column; empty without that file."""
-    if study.participants is None:
+    file = table_file(study, folder, "participants")
+    if file is None:
         return {}
-    table = read_participants(folder / study.participants).set_index("participant")
+    table = read_participants(file).set_index("participant")
     return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
 
 

@@ -139,15 +139,28 @@ def with_factors(request: Request, table: pd.DataFrame, factors: Sequence[str]) 
             if rows[factor].isna().any():
                 known = sorted({key for fact in facts for key in fact} | {"condition"})
                 hint = did_you_mean(factor, known)
-                raise PipelineError(f'study.yaml: comparisons: "{request.measure}" has no factor "{factor}"{hint}')
+                raise PipelineError(
+                    f'study.yaml: comparisons: "{request.measure}" has no factor "{factor}"{hint}; a column of the'
+                    f" trials or questionnaires is one if factors lists it: factors: {{{factor}: within}}"
+                )
     return rows
 
 
 def levels_of(study: Study, factor: str, values: pd.Series) -> list[str]:
-    """A factor's levels: conditions in the study's order, numbers by size, others by the alphabet."""
+    """A factor's levels: as study.yaml orders them, else numbers by size, others by the alphabet.
+
+    Raises PipelineError for a level of the data that study.yaml does not list.
+    """
     if factor == "condition":
         return list(study.conditions)
     levels = sorted(set(values))
+    stated = study.factors[factor].levels if factor in study.factors else ()
+    if stated:
+        for level in levels:
+            if level not in stated:
+                hint = did_you_mean(level, stated)
+                raise PipelineError(f'study.yaml: factors: {factor} has no level "{level}", and the data do{hint}')
+        return [level for level in stated if level in levels]
     numbers = pd.to_numeric(pd.Series(levels), errors="coerce")
     return levels if numbers.isna().any() else [levels[index] for index in numbers.argsort(kind="stable")]
 

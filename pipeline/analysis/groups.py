@@ -97,7 +97,7 @@ def mixed(request: Request) -> MixedCases:
 
 def between_factor(request: Request) -> str:
     """The factor whose levels are the groups: the entry's `between`, or the study's only one."""
-    of_entry, declared = request.entry.between, list(request.study.factors)
+    of_entry, declared = request.entry.between, request.study.between_factors
     if of_entry is not None:
         return of_entry
     if len(declared) == 1:

@@ -9,30 +9,32 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.analysis import orders, table_checks
+from pipeline.analysis import further_columns, orders, table_checks
 from pipeline.analysis.copied_logs import copied_rows
 from pipeline.analysis.missing import check_exclusion, excludable, finite_values, gaps, incomplete_trials, matches
+from pipeline.analysis.practice_trials import Tables, without_practice
 from pipeline.analysis.scores import instruments, items_of, reliability, score_values
 from pipeline.analysis.values import (
     CELL,
     all_movements,
     all_trials,
     completion_values,
+    given_table,
     measures_table,
     movement_values,
     rated_values,
     selection_values,
-    table_path,
     tabled_values,
 )
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.measures import has_total, reported_scales
-from pipeline.study.settings import Study
+from pipeline.study.settings import Exclusion, Study
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 
+THROUGHPUT = "throughput_bits_s"
 ALL_DATA = "all_data"
 """The folder of `measures` and `observations` without the exclusions of study.yaml; written only where it has some."""
 
@@ -40,9 +42,10 @@ ALL_DATA = "all_data"
 def run(work: Work) -> Outcome:
     """Write the study's trials, measures and exclusions; raises PipelineError for a table that cannot be used."""
     study = work.study
-    exclusions: list[Row] = []
     (trials, selections), movements = all_trials(work), all_movements(work)
-    tabled = measures_table(work)
+    every_trial = trials
+    given, exclusions = without_practice(study, Tables(trials, selections, movements, measures_table(work)))
+    trials, selections, movements, tabled = given.trials, given.selections, given.movements, given.measures
     values = pd.concat(
         [
             selection_values(study, trials, selections),
@@ -53,20 +56,22 @@ def run(work: Work) -> Outcome:
         ]
     ).reset_index(drop=True)
     _check_sources(values)
-    checked = _table_checks(work, values, selections)
+    checked = [*_table_checks(work, values, selections), *further_columns.check_rows(study, every_trial)]
     scored_by = instruments(study, sorted(set(values["measure"])))
     scores_by_item = items_of(scored_by)
     agreement = list(reliability(scored_by, values))
     scores = score_values(scored_by, values, exclusions)
     score_names = {name for instrument in scored_by for name in instrument.scores}
     values = pd.concat([values[~values["measure"].isin(_only_items(scores_by_item))], scores]).reset_index(drop=True)
-    known, all_values = excludable(work, values, trials) if study.exclusions else values[:0], values
+    known, all_values = excludable(work, values, every_trial) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
         check_exclusion(excluded, known)
         values = values[~matches(excluded, values)]
         if excluded.measure is None:
             trials, selections, movements = (rows[~matches(excluded, rows)] for rows in (trials, selections, movements))
-        exclusions.append({**excluded.model_dump(), "what": "excluded in study.yaml"})
+        exclusions.append(_listed(excluded))
+    if any(excluded.trial is not None and excluded.measure is None for excluded in study.exclusions):
+        values = _with_sequences_of(movements, values)
     exclusions += incomplete_trials(trials, movements)
     values = finite_values(values, exclusions)
     measures = _with_totals(study, _cells(values, CELL), CELL, score_names)
@@ -92,15 +97,32 @@ def run(work: Work) -> Outcome:
     return Outcome()
 
 
+def _listed(excluded: Exclusion) -> Row:
+    """The row of `exclusions` for a decision of study.yaml; the table has no column for a trial."""
+    trial = "" if excluded.trial is None else f"trial {excluded.trial}: "
+    row = excluded.model_dump(exclude={"trial"})
+    return {**row, "what": "excluded in study.yaml", "reason": f"{trial}{excluded.reason}"}
+
+
+def _with_sequences_of(movements: pd.DataFrame, values: pd.DataFrame) -> pd.DataFrame:
+    """Values with the throughput of the movements that are left: a sequence is of many trials."""
+    kept = values[values["measure"] != THROUGHPUT]
+    anew = pd.concat([rows for rows in movement_values(movements) if THROUGHPUT in set(rows["measure"])] or [kept[:0]])
+    whole = values[values["measure"] == THROUGHPUT][["participant", "condition", "session"]].drop_duplicates()
+    return pd.concat([kept, anew.merge(whole, on=["participant", "condition", "session"])]).reset_index(drop=True)
+
+
 def _table_checks(work: Work, values: pd.DataFrame, selections: pd.DataFrame) -> list[Row]:
     """Rows of `checks` for what people typed or exported; what comes from logs was checked with them."""
     typed = {str(name) for name in (work.study.questionnaires, work.study.measures) if name is not None}
-    path = table_path(work, "trials")
-    if path is None:
+    file = given_table(work, "trials")
+    if file is None:
         return table_checks.check_rows(values[values["source"].isin(typed)], None, work.study.scoring)
+    theirs = {ours: given for given, ours in file.headers.items()}
     timed = (values["source"] == "the trials") & (values["measure"] == "trial_time_s")
-    trials = values[values["source"].isin(typed) | timed].replace({"source": {"the trials": path.name}})
-    return table_checks.check_rows(trials, selections, work.study.scoring)
+    trials = values[values["source"].isin(typed) | timed].replace({"source": {"the trials": file.path.name}})
+    times = (theirs.get("start_s", "start_s"), theirs.get("selection_s", "selection_s"))
+    return table_checks.check_rows(trials, selections, work.study.scoring, times)
 
 
 def _starts(work: Work) -> pd.DataFrame:
@@ -133,13 +155,13 @@ def _write_values(
 
 def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The tables `orders` and `sequences`: who met the conditions in which order, and the orders' labels."""
-    path = table_path(work, "participants")
+    file = given_table(work, "participants")
     return orders.gathered(
         work.study.conditions,
         work.sessions,
         tables.read("session_orders", work.entries["ingest"]),
         None if tabled is None else tabled[0],
-        None if path is None else study_tables.read_participants(path),
+        None if file is None else study_tables.read_participants(file),
     )
 
 

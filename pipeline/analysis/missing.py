@@ -11,7 +11,7 @@ import pandas as pd
 
 from pipeline.analysis.factors import BETWEEN_FACTORS, factors_of, folded, missing_cells
 from pipeline.analysis.groups import one_condition_each
-from pipeline.analysis.values import CELL, table_path
+from pipeline.analysis.values import CELL, given_table
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study import csv_tables as study_tables
@@ -20,9 +20,12 @@ from pipeline.tables.table import Row
 
 
 def matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
-    """Which rows an exclusion of study.yaml removes: one flag per row."""
-    matching = pd.Series(True, index=rows.index)
-    for column in ("participant", "condition", "session", "measure"):
+    """Which rows an exclusion of study.yaml removes: one flag per row.
+
+    One of a trial removes none of rows that are of no single trial, such as means.
+    """
+    matching = pd.Series(excluded.trial is None or "trial" in rows, index=rows.index)
+    for column in ("participant", "condition", "session", "trial", "measure"):
         wanted = getattr(excluded, column)
         if wanted is not None and column in rows:
             matching &= (rows[column] == wanted).fillna(False)
@@ -32,7 +35,7 @@ def matches(excluded: Exclusion, rows: pd.DataFrame) -> pd.Series:
 def excludable(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     """Every combination of ids that an exclusion may name: what is in the data, totals, and sessions set aside."""
     session_ids = [session.ids for session in (*work.sessions, *(aside for aside, _ in work.set_aside))]
-    columns = [*CELL, "session", "measure"]
+    columns = [*CELL, "session", "trial", "measure"]
     totals = values[values["measure"].str.contains("/")].copy()
     totals["measure"] = totals["measure"].str.partition("/")[0] + "/total" if len(totals) else totals["measure"]
     sessions = pd.DataFrame(session_ids, columns=columns).astype("object")
@@ -48,14 +51,15 @@ def excludable(work: Work, values: pd.DataFrame, trials: pd.DataFrame) -> pd.Dat
 
 def check_exclusion(excluded: Exclusion, known: pd.DataFrame) -> None:
     """PipelineError for an exclusion that matches nothing in the data: it is likely misspelt."""
-    for column in ("participant", "session", "measure"):
+    for column in ("participant", "session", "trial", "measure"):
         wanted, present = getattr(excluded, column), sorted(set(known[column].dropna()))
         if wanted is not None and wanted not in present:
-            hint = did_you_mean(wanted, present)
+            hint = did_you_mean(str(wanted), map(str, present))
             raise PipelineError(f'study.yaml: exclusions: there is no {column} "{wanted}" in the data{hint}')
     if not matches(excluded, known).any():
-        named = ", ".join(f"{key} {value}" for key, value in excluded.model_dump().items() if value and key != "reason")
-        raise PipelineError(f"study.yaml: exclusions: nothing in the data fits {named}; there is nothing to exclude")
+        raise PipelineError(
+            f"study.yaml: exclusions: nothing in the data fits {excluded.named}; there is nothing to exclude"
+        )
 
 
 def incomplete_trials(trials: pd.DataFrame, movements: pd.DataFrame) -> list[Row]:
@@ -114,9 +118,9 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
     listed = set(measures["participant"]) | {str(session.participant) for session in work.sessions}
     rows: list[Row] = []
     without: list[str] = []
-    path = table_path(work, "participants")
-    if path is not None:
-        named = study_tables.read_participants(path)["participant"]
+    file = given_table(work, "participants")
+    if file is not None:
+        named = study_tables.read_participants(file)["participant"]
         for participant in sorted(listed - set(named)):
             hint = did_you_mean(participant, sorted(named)) if len(named) else ""
             reason = f"kept; check its spelling{hint}"

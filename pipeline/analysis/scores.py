@@ -16,14 +16,13 @@ from pipeline.analysis.answer_ranges import remedy, shifted_range
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.questionnaire_scores import MISSING, OUT_OF_RANGE, Fault, cronbach_alpha, participant_scores
 from pipeline.study.comparison import matching_measures
-from pipeline.study.scoring_rules import RULES, ScoringRule
+from pipeline.study.scoring_rules import RULES, ScoringRule, is_weight, weighed_item
 from pipeline.study.scoring_settings import OWN_RULES
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 from pipeline.words.phrases import listing
 
 _CELL = ["participant", "condition", "session"]
-_WEIGHT = "weight"
 _SHOWN = 6
 _REASONS_MAX = 3
 UNDEFINED = "score undefined"
@@ -65,15 +64,16 @@ def instruments(study: Study, measures: Sequence[str]) -> list[Instrument]:
 def _instrument(study: Study, questionnaire: str, given: Sequence[str]) -> Instrument | None:
     entry = study.scoring.get(questionnaire)
     if entry is None:
+        _refuse_unused_weights(questionnaire, given)
         rule = RULES.get(questionnaire)
         if rule is None or rule.limits is None or rule.weighted:
             return None
         limits = rule.limits
     else:
-        rule, limits = entry.rule_for([scale for scale in given if not _is_weight(scale)]), entry.limits
+        rule, limits = entry.rule_for([scale for scale in given if not is_weight(scale)]), entry.limits
     own = entry is not None and entry.rule in OWN_RULES
-    items = {scale: item for scale in given if not _is_weight(scale) and (item := scale if own else rule.item(scale))}
-    weights = {scale: item for scale in given if _is_weight(scale) and (item := rule.item(_weighed(scale)))}
+    items = {scale: item for scale in given if not is_weight(scale) and (item := scale if own else rule.item(scale))}
+    weights = {scale: item for scale in given if is_weight(scale) and (item := rule.item(weighed_item(scale)))}
     missing = [item for item in rule.items if item not in set(items.values())]
     if missing and entry is None:
         return None  # scores already computed, or another version: nothing says that this rule is meant
@@ -90,13 +90,16 @@ def _instrument(study: Study, questionnaire: str, given: Sequence[str]) -> Instr
     return Instrument(questionnaire, rule, limits, items, weights, entry is not None and entry.range is not None)
 
 
-def _is_weight(scale: str) -> bool:
-    """`weight_mental` and `mental_weight` are a participant's weights, not ratings."""
-    return scale.startswith(f"{_WEIGHT}_") or scale.endswith(f"_{_WEIGHT}")
-
-
-def _weighed(scale: str) -> str:
-    return scale.removeprefix(f"{_WEIGHT}_").removesuffix(f"_{_WEIGHT}")
+def _refuse_unused_weights(questionnaire: str, given: Sequence[str]) -> None:
+    """Raise PipelineError for the weights of a NASA-TLX that no rule uses: they would be compared as if rated."""
+    tlx = RULES["weighted_tlx"]
+    weights = [scale for scale in given if is_weight(scale) and tlx.item(weighed_item(scale))]
+    if len(weights) == len(tlx.items):
+        raise PipelineError(
+            f'study.yaml: scoring: "{questionnaire}" has the weights {listing(weights[:_SHOWN])}, and no rule says what'
+            f" to do with them; write scoring: {{{questionnaire}: {{rule: weighted_tlx, range: [0, 100]}}}}, with the"
+            " lowest and the highest answer of your sheet"
+        )
 
 
 def items_of(scored_by: Sequence[Instrument]) -> dict[str, list[str]]:
@@ -139,8 +142,8 @@ def score_values(scored_by: Sequence[Instrument], values: pd.DataFrame, exclusio
                     rows.append({**who, "period": period, "measure": f"{prefix}{score}", "value": value})
             exclusions += _undefined(who, instrument, result.faults)
     columns = [*_CELL, "period", "measure", "value"]
-    scores = pd.DataFrame(rows, columns=columns).assign(factors=None, source="the scores")
-    return scores.astype({"value": "float64", "factors": "object", "period": "Int64"})
+    scores = pd.DataFrame(rows, columns=columns).assign(factors=None, trial=None, source="the scores")
+    return scores.astype({"value": "float64", "factors": "object", "period": "Int64", "trial": "Int64"})
 
 
 def _moved(instrument: Instrument, answers: pd.DataFrame) -> tuple[float, float] | None:

@@ -16,8 +16,9 @@ from pipeline.analysis.answer_ranges import remedy, shifted_range
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.measures import measure
-from pipeline.study.scoring_rules import RULES, ScoringRule
+from pipeline.study.scoring_rules import RULES, ScoringRule, is_weight
 from pipeline.study.scoring_settings import ScoringEntry
+from pipeline.study.yaml_text import flow
 from pipeline.tables.table import Row
 from pipeline.words.phrases import counted, listing
 
@@ -32,6 +33,7 @@ UNIT, MISSING_CODE, SCALE, ITEMS, TARGETS, ORDER = (
 
 _LONG_S, _LONG_TRIAL_S = 10_000.0, 200.0  # median of a session's time, and of a single trial's or movement's
 _OF_A_TRIAL = ("trial", "movement", "reaction", "response", "selection")
+_IN_MS = ("start_ms", "selection_ms")
 _SINCE_1970 = {1e9: "seconds", 1e12: "milliseconds", 1e15: "microseconds", 1e18: "nanoseconds"}
 _CODES = (-9.0, -99.0, -999.0, -9999.0, 99.0, 999.0, 9999.0)
 _FAR = 3.0  # times the largest of the others: a code, not a slow participant
@@ -49,12 +51,16 @@ _ITEMS_MIN = 2
 
 
 def check_rows(
-    values: pd.DataFrame, selections: pd.DataFrame | None, scoring: Mapping[str, ScoringEntry] = MappingProxyType({})
+    values: pd.DataFrame,
+    selections: pd.DataFrame | None,
+    scoring: Mapping[str, ScoringEntry] = MappingProxyType({}),
+    times: tuple[str, str] | None = None,
 ) -> list[Row]:
     """Rows of the table `checks`.
 
     `values` are those of tables, one a row: `participant`, `measure`, `value` and the `source` they stand in.
     `selections` have the targets and selections of trials.csv; None where there is none. `scoring` is study.yaml's.
+    `times` are the headers of start and selection in trials.csv, if there is one.
     """
     findings: list[Finding] = []
     moved = dict(moved_ranges(values, scoring))
@@ -62,7 +68,7 @@ def check_rows(
     findings += missing_items(values, scoring)
     for (name, source), rows in values[np.isfinite(values["value"])].groupby(["measure", "source"], sort=False):
         value = rows["value"].to_numpy(np.float64)
-        findings += unit_of_time(str(name), str(source), value)
+        findings += unit_of_time(str(name), str(source), value, times)
         findings += missing_code(str(name), str(source), value, rows["participant"])
         if str(name).partition("/")[0] not in moved:
             findings += rated_range(str(name), str(source), value, scoring)
@@ -71,8 +77,11 @@ def check_rows(
     return rows_of(findings)
 
 
-def unit_of_time(name: str, source: str, value: FloatArray) -> Iterator[Finding]:
-    """Seconds that are milliseconds, and times of day where a duration is expected."""
+def unit_of_time(name: str, source: str, value: FloatArray, times: tuple[str, str] | None = None) -> Iterator[Finding]:
+    """Seconds that are milliseconds, and times of day where a duration is expected.
+
+    `times` are the headers of the columns that a trial's time is computed from.
+    """
     middle = float(np.median(np.abs(value)))
     check = of(UNIT, name)
     for unit, what in _SINCE_1970.items():
@@ -90,9 +99,12 @@ def unit_of_time(name: str, source: str, value: FloatArray) -> Iterator[Finding]
     if middle <= limit:
         yield Finding(check, "green", found, expected)
         return
+    keys = ""
+    if times is not None and name == "trial_time_s":
+        keys = f", or write columns: {{trials: {flow(dict(zip(times, _IN_MS, strict=True)))}}} in study.yaml"
     message = (
         f'"{name}" in {source} has a median of {middle:.4g} s: the values are probably milliseconds; divide them by '
-        "1000"
+        f"1000{keys}"
     )
     yield Finding(check, "amber", found, expected, message)
 
@@ -147,7 +159,7 @@ def moved_ranges(values: pd.DataFrame, scoring: Mapping[str, ScoringEntry]) -> I
         if rule is None or rule.limits is None or (entry is not None and entry.range is not None):
             continue
         scales = [_scale(name) for name in rows["measure"]]
-        answers = rows[[rule.item(scale) is not None and not _weighs(scale) for scale in scales]]
+        answers = rows[[rule.item(scale) is not None and not is_weight(scale) for scale in scales]]
         moved = shifted_range(answers, rule.limits)
         if moved is not None:
             sources = listing(list(dict.fromkeys(answers["source"].astype(str))))
@@ -206,7 +218,7 @@ def rated_limits(name: str, value: FloatArray, scoring: Mapping[str, ScoringEntr
     questionnaire, slash, scale = name.partition("/")
     entry = scoring.get(questionnaire)
     rule = RULES.get(entry.rule if entry is not None else questionnaire)
-    if not slash or _weighs(scale):
+    if not slash or is_weight(scale):
         return None
     if entry is not None and (rule is None or rule.item(scale) is not None):
         return None if rule is None and scale == "score" else entry.limits
@@ -226,11 +238,6 @@ def _is_points(rule: ScoringRule, scale: str, value: FloatArray) -> bool:
     return any(bool(np.all(np.abs(value / factor - np.round(value / factor)) < _ROUNDED)) for factor in factors) and (
         bool(np.any(value != np.round(value)))
     )
-
-
-def _weighs(scale: str) -> bool:
-    """A participant's weight of a scale is no rating."""
-    return "weight" in scale
 
 
 def targets(selections: pd.DataFrame) -> Iterator[Finding]:

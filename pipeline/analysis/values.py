@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, with_movements
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Study
+from pipeline.study.table_file import TableFile, table_file
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Row
@@ -23,24 +23,26 @@ from pipeline.tables.table import Row
 CELL = ["participant", "condition"]
 
 
-def table_path(work: Work, field: str) -> Any:
-    """The path of a table that study.yaml names, such as `participants`; None where it names none."""
-    name = getattr(work.study, field)
-    return None if name is None else work.folder / name
+def given_table(work: Work, table: str) -> TableFile | None:
+    """A table that study.yaml names, such as `participants`; None where it names none."""
+    return table_file(work.study, work.folder, table)
 
 
 def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown; selections."""
+    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown; selections.
+
+    Those of trials.csv have further columns: `factors`, and those of the study's own.
+    """
     trials = tables.read("trials", work.entries["assess"])
-    path = table_path(work, "trials")
-    if path is None:
+    file = given_table(work, "trials")
+    if file is None:
         return trials, tables.read("selections", work.entries["assess"])
     if len(trials):
         raise PipelineError(
-            f"{path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:` out of "
-            "study.yaml"
+            f"{file.path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:`"
+            " out of study.yaml"
         )
-    table = study_tables.read_trials(path, work.study.conditions, work.study.missing)
+    table = study_tables.read_trials(file)
     squared = np.zeros(len(table))
     for axis in "xyz":
         # A trial counts over the axes its target has; a selection that lacks one of them cannot be measured.
@@ -59,23 +61,30 @@ def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
     selected = targets.assign(
         session=tabled["session"], **{f"{axis}_mm": table[f"selected_{axis}_mm"] for axis in "xyz"}
     )
-    return tables.as_table("trials", tabled), tables.as_table("selections", selected)
+    own = table[study_tables.own_columns_of_trials(table)].assign(factors=factors_of_rows(work.study, table))
+    return pd.concat([tables.as_table("trials", tabled), own], axis=1), tables.as_table("selections", selected)
+
+
+def factors_of_rows(study: Study, table: pd.DataFrame) -> pd.Series:
+    """The levels of the factors that are columns of a table, as JSON text; None for a row without any."""
+    names = [name for name in study.factors if name in table and name not in CELL]
+    levels = [{k: v for k, v in zip(names, row, strict=True) if v} for row in table[names].to_numpy()]
+    return pd.Series([json.dumps(facts) if facts else None for facts in levels], index=table.index, dtype="object")
 
 
 def all_movements(work: Work) -> pd.DataFrame:
     """The movements of all sessions, or of trials.csv in the order of their starts."""
-    path = table_path(work, "trials")
-    if path is None:
+    file = given_table(work, "trials")
+    if file is None:
         return tables.read("movements", work.entries["assess"])
-    table = study_tables.read_trials(path, work.study.conditions, work.study.missing).sort_values(
-        "start_s", kind="stable"
-    )
+    table = study_tables.read_trials(file).sort_values("start_s", kind="stable")
+    table["factors"] = factors_of_rows(work.study, table)
     table["left_s"] = table["selection_s"]
     for axis in "xyz":
         table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
     cells = [_with_widths(work.study, with_movements(rows)) for _, rows in table.groupby([*CELL, "session"], sort=True)]
     from_trials = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
-    return tables.as_table("movements", from_trials)
+    return tables.as_table("movements", from_trials).assign(factors=from_trials["factors"])
 
 
 def _with_widths(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
@@ -91,19 +100,20 @@ def _with_widths(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
-    """Rows of one measure: participant, condition, session, factors, period, measure, value, and source."""
+    """Rows of one measure: participant, condition, session, trial, factors, period, measure, value, and source."""
     return pd.DataFrame(
         {
             "participant": rows["participant"],
             "condition": rows["condition"],
             "session": rows["session"],
-            "factors": None,
+            "trial": rows.get("trial", pd.NA),
+            "factors": rows.get("factors"),
             "period": pd.NA,
             "measure": measure,
             "value": rows[column].astype("float64"),
             "source": source,
         }
-    ).astype({"factors": "object", "period": "Int64"})
+    ).astype({"factors": "object", "period": "Int64", "trial": "Int64"})
 
 
 def selection_values(study: Study, trials: pd.DataFrame, selections: pd.DataFrame) -> pd.DataFrame:
@@ -141,12 +151,13 @@ def _targets(trials: pd.DataFrame, selections: pd.DataFrame) -> pd.Series:
 def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """Throughput (bits/s), one row per sequence of a session, and measures of the hand's path, one row per trial."""
     figures = ("amplitude_mm", "moved_mm", "along_mm", "duration_s", "width_mm")
+    cell = [*CELL, "session", *(["factors"] if "factors" in moved else [])]
     rows = [
-        (*cell, throughput)
-        for cell, trials in moved.groupby([*CELL, "session"], dropna=False, sort=True)
+        (*key, throughput)
+        for key, trials in moved.groupby(cell, dropna=False, sort=True)
         for throughput in movements.throughputs(*(trials[name].to_numpy(np.float64) for name in figures))
     ]
-    sequences = pd.DataFrame(rows, columns=[*CELL, "session", "throughput"])
+    sequences = pd.DataFrame(rows, columns=[*cell, "throughput"])
     yield _values(sequences, "throughput_bits_s", "throughput", "the trials")
     covered = moved["path_length_mm"].where(moved["path_length_mm"] > 0)
     for_measures = moved.assign(efficiency=moved["shortest_mm"] / covered)
@@ -159,15 +170,22 @@ def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 
 def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
-    """Seconds from session_start to the last selection, one row per session with both; `exclusions` lists the rest."""
+    """Seconds from session_start to the last selection, one row per session with both; `exclusions` lists the rest.
+
+    Where a session's first trials are practice, from the start of the first trial after them.
+    """
     rows = []
+    practised = 0 if work.study.practice is None else work.study.practice.trials or 0
     for session, folder in sorted(zip(work.sessions, work.entries["ingest"], strict=True), key=lambda pair: pair[0].id):
         events = tables.read_arrow("events", folder).to_pylist()
         who: Row = session.ids
         begins, selections = (
             [event["time_ns"] for event in events if event["type"] == kind] for kind in ("session_start", "selection")
         )
-        stray = sum(place < 0 for _, place in selections_by_trial(events)[1])
+        starts, placed = selections_by_trial(events)
+        if practised:
+            begins = [event["time_ns"] for event in starts[practised:]]
+        stray = sum(place < 0 for _, place in placed)
         if stray:
             reason = f"{stray} without the trial_start of their trial"
             exclusions.append({**who, "what": "selections outside any trial", "reason": reason})
@@ -184,18 +202,19 @@ def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
 
 def rated_values(work: Work) -> Iterator[pd.DataFrame]:
     """Ratings from questionnaires."""
-    path = table_path(work, "questionnaires")
-    if path is not None:
-        ratings = study_tables.read_questionnaires(path, work.study.conditions, work.study.missing)
+    file = given_table(work, "questionnaires")
+    if file is not None:
+        ratings = study_tables.read_questionnaires(file)
         ratings["session"] = ratings.get("session")
+        ratings["factors"] = factors_of_rows(work.study, ratings)
         names = ratings["questionnaire"] + "/" + ratings["scale"]
         yield _values(ratings, "", "rating", str(work.study.questionnaires)).assign(measure=names)
 
 
 def measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
     """The table of measures and its further factors, if the study has one."""
-    path = table_path(work, "measures")
-    return None if path is None else study_tables.read_measures(path, work.study.conditions, work.study.missing)
+    file = given_table(work, "measures")
+    return None if file is None else study_tables.read_measures(file)
 
 
 def tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:
@@ -203,7 +222,10 @@ def tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> 
     if tabled is None:
         return
     table, factors = tabled
-    rows = _values(table.assign(session=None), "", "value", str(work.study.measures)).assign(measure=table["measure"])
+    numbered = pd.to_numeric(table["trial"], errors="coerce") if "trial" in table else pd.Series(np.nan, table.index)
+    trial = numbered.where(numbered == numbered.round())
+    own = table[["participant", "condition", "value"]].assign(session=None, trial=trial)
+    rows = _values(own, "", "value", str(work.study.measures)).assign(measure=table["measure"])
     if "period" in table:
         rows["period"] = table["period"]
     if factors:

@@ -13,7 +13,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import yaml
 from pydantic import Field
@@ -25,6 +25,7 @@ from pipeline.study.folder import PREREGISTERED
 from pipeline.study.preregistration_settings import Preregistration
 from pipeline.study.scoring_settings import Scoring
 from pipeline.study.settings import Exclusion, Study
+from pipeline.study.table_settings import Factor
 from pipeline.study.yaml_text import parse, read_yaml
 
 _HEAD = """\
@@ -40,7 +41,7 @@ class Registered(Frozen):
     title: str = ""
     conditions: Annotated[tuple[Id, ...], Field(min_length=1)]
     shown: Mapping[Id, str] = {}
-    factors: Mapping[Id, Literal["between"]] = {}
+    factors: Mapping[Id, Factor] = {}
     scoring: Mapping[Id, Scoring] = {}
     comparisons: tuple[Comparison, ...] = ()
     alpha: Annotated[float, Field(gt=0, lt=1)] = 0.05

@@ -57,6 +57,20 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
+_WEIGHT = re.compile(r"(?:weight|w)_(?P<first>.+)|(?P<last>.+)_(?:weight|w)", re.IGNORECASE)
+
+
+def is_weight(name: str) -> bool:
+    """`weight_mental`, `w_mental` and `mental_weight` are a participant's weights, not ratings."""
+    return _WEIGHT.fullmatch(name) is not None
+
+
+def weighed_item(name: str) -> str:
+    """The item that a weight is of, as the data call it; the name itself where it is no weight's."""
+    weight = _WEIGHT.fullmatch(name)
+    return weight["first"] or weight["last"] if weight else name
+
+
 def own_rule(
     items: Iterable[str],
     reading: Literal["mean", "sum"],

@@ -14,6 +14,7 @@ from pipeline.study.scoring_settings import Scoring
 from pipeline.study.session import Session, check_pattern
 from pipeline.study.simulation import Simulation, Task
 from pipeline.study.streams import AccelerationStream, PositionStream, Sensing, Stream
+from pipeline.study.table_settings import Columns, Factor, Formats, Practice, Wide
 
 
 class Events(Frozen):
@@ -45,23 +46,33 @@ class Estimators(Frozen):
 
 
 class Exclusion(Frozen):
-    """What the user excludes: a participant, one of their conditions, or a session, in one measure or in all."""
+    """What the user excludes: a participant, a condition or trial of theirs, or a session, in one measure or in all.
+
+    A trial alone is that number of everybody's.
+    """
 
     participant: Id | None = None
     condition: Id | None = None
     session: Id | None = None
+    trial: Annotated[int, Field(ge=-(2**53), le=2**53)] | None = None
     measure: Id | None = None
     reason: str = Field(min_length=1)
 
     @model_validator(mode="after")
     def _names_someone(self) -> Exclusion:
-        if self.participant is None and self.session is None:
-            raise ValueError("needs a participant or a session to exclude")
+        if self.participant is None and self.session is None and self.trial is None:
+            raise ValueError("needs a participant or a session to exclude, or a trial")
         return self
 
+    @property
+    def named(self) -> str:
+        """What it names, for readers: `participant P01, trial 3`."""
+        stated = self.model_dump(exclude={"reason"}, exclude_none=True)
+        return ", ".join(f"{key} {value}" for key, value in stated.items())
+
     def covers(self, **ids: str | None) -> bool:
-        """Whether it excludes what has these ids: everything that it names is the same."""
-        return all(getattr(self, key) in (None, value) for key, value in ids.items())
+        """Whether it excludes all that has these ids: what it names is the same, and it is not one trial alone."""
+        return self.trial is None and all(getattr(self, key) in (None, value) for key, value in ids.items())
 
 
 _Bound = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
@@ -114,8 +125,12 @@ class Study(Frozen):
     measures: str | None = None
     printed: str | None = None
     repeats: str | None = None
-    factors: Mapping[Id, Literal["between"]] = {}
+    factors: Mapping[Id, Factor] = {}
+    format: Formats = Formats()
+    columns: Columns = Columns()
+    wide: Wide = Wide()
     missing: tuple[Finite | str, ...] = ()
+    practice: Practice | None = None
     scoring: Mapping[Id, Scoring] = {}
     comparisons: tuple[Comparison, ...] = ()
     question: tuple[tuple[Id, Id], ...] = ()
@@ -139,6 +154,8 @@ class Study(Frozen):
         for name, estimator in self.estimators.items():
             for stream in estimator.use or ():
                 known(f"estimators.{name}.use", stream, self.sensor_streams)
+        if "condition" in self.factors and self.factors["condition"] != Factor(kind="between"):
+            raise ValueError("factors: condition can be between alone; its levels and their order are `conditions`")
         self._comparisons_fit()
         self._question_fits()
         self._families_fit()
@@ -192,6 +209,11 @@ class Study(Frozen):
             return tuple((self.conditions[0], other) for other in self.conditions[1:])
         pairs = (sorted(pair, key=self.conditions.index) for pair in self.question)
         return tuple(dict.fromkeys((first, second) for first, second in pairs))
+
+    @property
+    def between_factors(self) -> tuple[str, ...]:
+        """The columns that tell groups of participants apart."""
+        return tuple(name for name, factor in self.factors.items() if factor.kind == "between")
 
     def exclusion_of(self, session: Session) -> Exclusion | None:
         """The first decision by which a session is left out as a whole."""

@@ -61,6 +61,9 @@ for _tag, _pattern in _NUMBERS.items():
     _UniqueKeyLoader.add_implicit_resolver(_tag, re.compile(rf"^(?:{_pattern})$"), list("-+.0123456789"))
 
 
+_PLAIN = re.compile(r"[^\W\d_/][\w /.()*-]*|/[\w/.-]*|[^\W\d][\w/.-]*")
+
+
 class _TextLoader(_UniqueKeyLoader):
     """A loader that leaves numbers as text, so that 0.050 keeps its last digit."""
 
@@ -114,6 +117,26 @@ def read_values(text: str) -> list[Any]:
     if not isinstance(values, list) or any(value is None for value in values):
         raise ValueError("a value is missing")
     return values
+
+
+def flow(value: object) -> str:
+    """A value as it stands in study.yaml on one line: `{Teilnehmer: participant, "Ziel X": target_x_mm}`."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{flow(key)}: {flow(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(flow, value)) + "]"
+    if isinstance(value, str):
+        return value if _is_plain(value) else json.dumps(value, ensure_ascii=False)
+    return json.dumps(value)
+
+
+def _is_plain(text: str) -> bool:
+    """Whether a text needs no quotes in YAML, on one line and among brackets."""
+    return bool(_PLAIN.fullmatch(text)) and text == text.strip() and _loaded(text) == text
+
+
+def _loaded(text: str) -> object:
+    return yaml.load(text, Loader=_UniqueKeyLoader)  # noqa: S506 - safe
 
 
 def parse(model: type[_Model], content: dict[str, Any], path: Path | str) -> _Model:

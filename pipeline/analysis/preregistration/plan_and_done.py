@@ -84,8 +84,7 @@ def _exclusions(plan: Sequence[Exclusion], now: Sequence[Exclusion]) -> Iterator
 
 
 def _excluded(one: Exclusion) -> str:
-    named = [f"{key} {value}" for key, value in one.model_dump().items() if value and key != "reason"]
-    return f"{', '.join(named)} ({one.reason})"
+    return f"{one.named} ({one.reason})"
 
 
 def _answers(plan: Preregistration, now: Preregistration) -> Iterator[Row]:

@@ -21,5 +21,7 @@ def point(what: str, planned: str, done: str, verdict: str | None = None, measur
 def as_text(value: Any) -> str:
     if hasattr(value, "model_dump"):
         parts = value.model_dump(mode="json", exclude_defaults=True)
+        if not isinstance(parts, dict):  # a factor that is between or within, without its levels
+            return str(parts)
         return ", ".join(f"{key}: {as_text(part)}" for key, part in parts.items())
     return ", ".join(map(as_text, value)) if isinstance(value, list | tuple) else str(value)

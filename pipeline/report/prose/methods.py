@@ -69,7 +69,7 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
         how = "not compared"
     comparison = f"{counted(len(conditions), 'condition')}, {how}: {listing(conditions)}"
     yield f"{there_are} and {comparison}; {conditions[0]} was the baseline."
-    groups = [factor for factor in study.factors if factor != "condition"]
+    groups = [factor for factor in study.between_factors if factor != "condition"]
     if groups and designs - {"within"}:
         yield f"Participants were compared between the levels of {listing(groups)}."
         if results["descriptives_by_group"]:
@@ -275,8 +275,7 @@ def _follow_up(entry: Comparison, rows: Sequence[Row]) -> str:
 def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:
     """Who was excluded and why, and how much else is missing."""
     for exclusion in study.exclusions:
-        named = [f"{key} {value}" for key, value in exclusion.model_dump().items() if value and key != "reason"]
-        yield f"Excluded: {', '.join(named)} ({exclusion.reason.strip().rstrip('.')})."
+        yield f"Excluded: {exclusion.named} ({exclusion.reason.strip().rstrip('.')})."
     aside = sum(row["what"] == "session set aside" for row in rows)
     if aside:
         yield f"{counted(aside, 'session')} could not be used and {'was' if aside == 1 else 'were'} set aside."

@@ -159,7 +159,7 @@ def _indices(study: Study) -> list[str]:
 def _conditions(study: Study) -> list[str]:
     """The conditions, who meets which, and further factors."""
     conditions = f"{len(study.conditions)}: {listing(list(study.conditions))}; {study.conditions[0]} is the baseline."
-    groups = [name for name in study.factors if name != "condition"]
+    groups = [name for name in study.between_factors if name != "condition"]
     each = "Each participant meets one condition." if "condition" in study.factors else ""
     if not each and any(TESTS[entry.test].design != "between" for entry in study.comparisons):
         each = "Each participant meets every condition."
@@ -212,8 +212,7 @@ def _outliers(study: Study) -> Iterator[str]:
 def _exclusions(study: Study) -> Iterator[str]:
     yield _stated("Exclusions", study.preregistration.exclusion_rules)
     for exclusion in study.exclusions:
-        named = [f"{key} {value}" for key, value in exclusion.model_dump().items() if value and key != "reason"]
-        yield f"Excluded already: {', '.join(named)} ({exclusion.reason})"
+        yield f"Excluded already: {exclusion.named} ({exclusion.reason})"
 
 
 def _missing(study: Study) -> Iterator[str]:

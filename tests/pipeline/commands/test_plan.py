@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.study.csv_tables import read_participants
+from pipeline.study.table_file import TableFile
 from tests.pipeline.helpers import Ran, run
 
 Plan = Callable[..., Ran]
@@ -47,7 +48,7 @@ def test_orders_are_balanced_within_each_group(plan: Plan, tmp_path: Path, seed:
     assert ran.code == 0
     assert "training: 6 none and 6 short." in ran.err
     assert ran.err.count("Counterbalancing is complete.") == 2
-    table = read_participants(path)
+    table = read_participants(TableFile(path))
     for group in ("none", "short"):
         assert table[table["training"] == group]["sequence"].nunique() == 6
 

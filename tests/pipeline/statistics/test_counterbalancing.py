@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from pipeline.statistics.counterbalancing import allocated, assigned, balance, nested, williams_design
 from pipeline.study.csv_tables import read_participants
+from pipeline.study.table_file import TableFile
 from tests.pipeline.helpers import Ran, run
 
 CONDITIONS = st.integers(2, 12)
@@ -109,7 +110,7 @@ def test_the_table_is_a_participants_table(plan: Plan, tmp_path: Path) -> None:
     assert ran.code == 0
     assert "Counterbalancing is complete." in ran.err
     assert "Each condition is in each period 2 times, and directly follows each other one 2 times" in ran.err
-    table = read_participants(path)
+    table = read_participants(TableFile(path))
     assert list(table) == ["participant", "sequence", "period_1", "period_2", "period_3", "period_4"]
     assert list(table["participant"]) == [f"P0{number}" for number in range(1, 9)]
     assert table.iloc[0]["sequence"] == "laser > cube, red > object > Größe"
