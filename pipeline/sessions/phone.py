@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from fusion_core import Samples, Sensor
 from fusion_core.phone.calibration import Body, Calibration, calibrate, with_mounting
@@ -12,19 +13,16 @@ from fusion_core.phone.orientation import (
     carry_forward,
     heading,
     level_rotation,
-    nearest,
     rotate,
     rotations,
     turn_about_vertical,
 )
+from pipeline.sessions.tilt import tilts
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns
 
-_MM_PER_M = 1000.0
 _HEADING_SD_RAD = 0.3  # above it an orientation is not known
-_TILT_S = 2.0  # of VQF: how long it averages accelerations to find the vertical, while the hand moves
-_GYROSCOPE_BIAS_DEG_S = 10.0  # of VQF: phones are off by up to 4°/s
 
 IN_LOG, CARRIED, FOUND = "in_log", "carried", "found"
 
@@ -56,6 +54,12 @@ class Imu:
     gyroscope_rad_s: FloatArray
     sensor: Sensor
 
+    def until(self, count: int) -> Imu:
+        """The first `count` readings."""
+        return Imu(
+            self.time[:count], self.arrival[:count], self.force_mm_s2[:count], self.gyroscope_rad_s[:count], self.sensor
+        )
+
 
 Tracker = tuple[Samples, Sensor]
 """Positions of all three axes, and the sensor they are from."""
@@ -75,31 +79,58 @@ def aligned(imu: Imu, logged: FloatArray, stream: AccelerationStream, tracker: T
     Causal: each acceleration is based on what was known when it arrived.
     """
     gravity = np.array(stream.gravity_mm_s2)
-    in_log, rising = np.isfinite(logged).all(axis=1), bool(np.all(np.diff(imu.time) >= 0))
-    origin = CARRIED if in_log.any() else FOUND
-    if origin == FOUND:
-        turned = _orientation_from_motion(imu, gravity, tracker)
-    else:
-        turned = carry_forward(imu.time, logged, imu.gyroscope_rad_s) if rising else logged
+    turned, origins = _orientations(imu, logged, gravity, tracker)
     known = np.isfinite(turned).all(axis=1)
-    origins = {IN_LOG: int(in_log.sum()), origin: int((known & ~in_log).sum())}
     rotation = rotations(turned[known]) if known.any() else np.empty((0, 3, 3))
     body = Body(imu.time[known], imu.arrival[known], imu.force_mm_s2[known], rotation, gravity)
     return _with_mounting(Phone(body, origins, int((~known).sum())), stream, imu.sensor, tracker)
 
 
+def _orientations(
+    imu: Imu, logged: FloatArray, gravity: FloatArray, tracker: Tracker | None
+) -> tuple[FloatArray, dict[str, int]]:
+    """Orientations (n, 4), NaN where unknown, and how many are from where.
+
+    Up to the first one in the log they are found from the motion; after it, gaps are carried on by the gyroscope.
+    """
+    in_log = np.isfinite(logged).all(axis=1)
+    first = int(np.argmax(in_log)) if in_log.any() else len(logged)
+    turned = logged.copy()
+    turned[:first] = _orientation_from_motion(imu.until(first), gravity, tracker)
+    rows = first + np.flatnonzero(_not_older(imu.time[first:]))
+    turned[rows] = carry_forward(imu.time[rows], logged[rows], imu.gyroscope_rad_s[rows])
+    known = np.logical_and(np.isfinite(turned).all(axis=1), ~in_log)
+    after = np.arange(len(known)) >= first
+    origins = {IN_LOG: int(in_log.sum())}
+    if in_log.any():
+        origins[CARRIED] = int((known & after).sum())
+    if (known & ~after).any() or not in_log.any():
+        origins[FOUND] = int((known & ~after).sum())
+    return turned, origins
+
+
+def _not_older(time: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which readings (n,), in order of arrival, were not measured before one that had arrived already."""
+    in_order: npt.NDArray[np.bool_] = time >= np.maximum.accumulate(time)
+    return in_order
+
+
 def _orientation_from_motion(imu: Imu, gravity: FloatArray, tracker: Tracker | None) -> FloatArray:
-    """Orientations (n, 4) for a log without any: tilt by VQF, heading from the motion; NaN until both are known."""
+    """Orientations (n, 4) for a log without any: tilt by VQF, heading from the motion; NaN until both are known.
+
+    It stays NaN at a reading that was measured before one that had arrived already.
+    """
     unknown = np.full((len(imu.time), 4), np.nan)
-    if tracker is None or len(imu.time) < 2 or np.any(np.diff(imu.time) <= 0) or not len(tracker[0]):
+    if tracker is None or not len(imu.time) or not len(tracker[0]):
         return unknown
-    tilted = _tilt(imu)
+    tilted = tilts(imu.time, imu.gyroscope_rad_s, imu.force_mm_s2)
+    rows = np.flatnonzero(np.isfinite(tilted).all(axis=1))
     up, down = level_rotation(gravity), np.array([0.0, 0.0, -float(np.linalg.norm(gravity))])
-    upright = Samples(imu.time, imu.arrival, rotate(tilted, imu.force_mm_s2) + down)
+    upright = Samples(imu.time[rows], imu.arrival[rows], rotate(tilted[rows], imu.force_mm_s2[rows]) + down)
     positions = replace(tracker[0], value=rotate(up * np.array([-1.0, -1.0, -1.0, 1.0]), tracker[0].value))
     angle, sd = heading(positions, tracker[1], upright, imu.sensor)
     known = sd < _HEADING_SD_RAD
-    unknown[known] = _turned(up, turn_about_vertical(tilted[known], angle[known]))
+    unknown[rows[known]] = _turned(up, turn_about_vertical(tilted[rows[known]], angle[known]))
     return unknown
 
 
@@ -108,29 +139,6 @@ def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
 
     both: FloatArray = (Rotation.from_quat(first) * Rotation.from_quat(then)).as_quat()
     return both
-
-
-def _tilt(imu: Imu) -> FloatArray:
-    """Orientations (n, 4) up to the heading, by VQF (Laidig and Seel 2023), which needs a regular grid.
-
-    Each is that of the newest grid point before the reading, extrapolated by the gyroscope, so that none depends on
-    later readings.
-    """
-    from scipy.spatial.transform import Rotation
-    from vqf import VQF
-
-    time, gyroscope = imu.time, imu.gyroscope_rad_s
-    step_s = float(np.median(np.diff(time)))
-    grid = np.arange(time[0], time[-1] + step_s / 2, step_s)
-    on_grid = [
-        np.ascontiguousarray(np.stack([np.interp(grid, time, column) for column in values.T], axis=1))
-        for values in (gyroscope, imu.force_mm_s2 / _MM_PER_M)
-    ]
-    estimated = VQF(step_s, tauAcc=_TILT_S, biasClip=_GYROSCOPE_BIAS_DEG_S).updateBatch(*on_grid)["quat6D"]
-    at = nearest(grid, time)
-    rest = Rotation.from_rotvec(gyroscope * (time - grid[at])[:, None])
-    turned: FloatArray = (Rotation.from_quat(estimated[at][:, [1, 2, 3, 0]]) * rest).as_quat()
-    return turned
 
 
 def _with_mounting(found: Phone, stream: AccelerationStream, sensor: Sensor, tracker: Tracker | None) -> Phone:
