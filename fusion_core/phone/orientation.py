@@ -36,6 +36,18 @@ def rotations(quaternion_xyzw: FloatArray) -> FloatArray:
     return np.stack(columns, axis=2)
 
 
+def rotation(quaternion_xyzw: FloatArray) -> FloatArray:
+    """The rotation matrix (3, 3) of one quaternion (4,): as `rotations`, and many times as fast for one alone."""
+    x, y, z, w = (quaternion_xyzw / np.linalg.norm(quaternion_xyzw)).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
 def carry_forward(
     time: FloatArray, quaternion_xyzw: FloatArray, angular_velocity_rad_s: FloatArray, longest_s: float = 1.0
 ) -> FloatArray:

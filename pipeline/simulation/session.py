@@ -16,7 +16,7 @@ from pipeline.sessions.estimators import build_estimator, sensors
 from pipeline.sessions.recording import seeded
 from pipeline.simulation import layout as layouts
 from pipeline.simulation import loop_steps, people, sensing
-from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, IntArray, Layout, Sway, hand_at
+from pipeline.simulation.hand_steps import DONE, PHASE, PLANS, STEP, STEP_S, Hand, IntArray, Layout, Sway, hand_at
 from pipeline.simulation.loop_steps import TAP_S, TAP_X, TAP_Y, Sensing, Session
 from pipeline.simulation.motion import minimum_jerk
 from pipeline.statistics.arrays import FloatArray
@@ -190,9 +190,38 @@ def simulate(setting: Setting, participant: str, condition: str, *, compiled: bo
     return outcome
 
 
-def _attempt(
-    setting: Setting, participant: str, condition: str, length_s: float, compiled: bool
-) -> tuple[Outcome, bool]:
+@dataclass(frozen=True)
+class Prepared:
+    """A session that has not begun: its sensors' times and noise, the arrays that a loop fills in, and the participant.
+
+    `walking` is what `loop_steps.walk` and `run` take first. Times in `readings` and `instants` are s since the first
+    arrival.
+    """
+
+    names: tuple[str, str]
+    frames: sensing.Frames
+    phone: sensing.Phone
+    readings: Readings
+    rotation: FloatArray
+    instant_ns: IntArray
+    instants: FloatArray
+    walking: tuple[Any, ...]
+
+    @property
+    def hand(self) -> Hand:
+        """The participant's hand."""
+        hand: Hand = self.walking[4]
+        return hand
+
+    @property
+    def session(self) -> Session:
+        """The record that the loop writes."""
+        session: Session = self.walking[8]
+        return session
+
+
+def prepare(setting: Setting, participant: str, condition: str, length_s: float) -> Prepared:
+    """A session of at most `length_s`, ready to run."""
     settings, (names, tracker, imu_name, imu) = setting.simulation, setting.streams
     draws = partial(seeded, str(settings.seed), participant, condition)
     frames = sensing.frames(tracker, settings.instruments, length_s, draws)
@@ -224,26 +253,36 @@ def _attempt(
     session.trace[0, :2] = begin
     hand = hand_at(begin, settings.still_before_s)
     walking = (person, setting.layout, *_sways(settings), hand, draws("hand"), sensed, readings, session)
-    estimator, instants = setting.shown(condition), _since(instant_ns, origin_ns)
-    ready = live(estimator, (names, imu_name), readings, rotation, instants) if compiled else None
-    if ready is not None:
-        loop_steps.run(*walking, ready, instants)
+    instants = _since(instant_ns, origin_ns)
+    return Prepared((names, imu_name), frames, phone, readings, rotation, instant_ns, instants, walking)
+
+
+def _attempt(
+    setting: Setting, participant: str, condition: str, length_s: float, compiled: bool
+) -> tuple[Outcome, bool]:
+    ready = prepare(setting, participant, condition, length_s)
+    estimator, gravity_mm_s2 = setting.shown(condition), np.array(setting.streams[3].gravity_mm_s2)
+    shows = live(estimator, ready.names, ready.readings, ready.rotation, ready.instants) if compiled else None
+    if shows is not None:
+        loop_steps.run(*ready.walking, shows, ready.instants)  # type: ignore[call-arg]
     else:
-        _run_uncompiled(estimator, (names, imu_name), (phone, rotation, np.array(imu.gravity_mm_s2)), instants, walking)
+        held = ready.phone, ready.rotation, gravity_mm_s2
+        _run_uncompiled(estimator, ready.names, held, ready.instants, ready.walking)
+    hand, session, readings = ready.hand, ready.session, ready.readings
     step, shown_until = int(hand.progress[STEP]), int(session.next[2])
     outcome = Outcome(
-        settings.still_before_s,
+        setting.simulation.still_before_s,
         step * STEP_S,
         setting.layout.targets_mm,
         session.taps,
         int(hand.progress[PLANS]),
         session.trace[: step + 1],
         session.shown[:shown_until],
-        _first(frames, int(session.next[0])),
+        _first(ready.frames, int(session.next[0])),
         readings.frame_mm[: session.next[0]],
-        _first(phone, int(session.next[1])),
+        _first(ready.phone, int(session.next[1])),
         readings.force_mm_s2[: session.next[1]],
-        instant_ns[:shown_until],
+        ready.instant_ns[:shown_until],
     )
     return outcome, bool(hand.progress[PHASE] == DONE)
 
@@ -276,7 +315,7 @@ def _run_uncompiled(
             if is_frame:
                 sample = Sample(readings.frame_time[row], arrival, readings.frame_mm[row].copy())
             else:
-                force = _felt(phone, gravity_mm_s2, session.trace, row)
+                force = felt(phone, gravity_mm_s2, session.trace, row)
                 value = readings.force_mm_s2[row].copy()
                 sample = Sample(readings.force_time[row], arrival, value, rotation[row], force)
             state = estimator.update(state, names[0 if is_frame else 1], sample)
@@ -285,7 +324,7 @@ def _run_uncompiled(
         session.next[2] = index + 1
 
 
-def _felt(phone: sensing.Phone, gravity_mm_s2: FloatArray, trace: FloatArray, row: int) -> FloatArray:
+def felt(phone: sensing.Phone, gravity_mm_s2: FloatArray, trace: FloatArray, row: int) -> FloatArray:
     """The specific force of a reading (3,), in the phone's frame, as the log will have it."""
     time_ns = int(phone.time_ns[row])
     step = max(-(-time_ns // loop_steps.STEP_NS), 1)

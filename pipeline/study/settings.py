@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pipeline.study.comparison import Comparison
 from pipeline.study.fields import Axes, Finite, Frozen, Id, Positive, known, unique
 from pipeline.study.preregistration_settings import Preregistration
+from pipeline.study.recording import Recording
 from pipeline.study.scoring_settings import Scoring
 from pipeline.study.session import Session, check_pattern
 from pipeline.study.simulation import Simulation, Task
@@ -140,6 +141,7 @@ class Study(Frozen):
     preregistration: Preregistration = Preregistration()
     task: Task | None = None
     simulation: Simulation | None = None
+    recording: Recording | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
@@ -160,6 +162,8 @@ class Study(Frozen):
         self._question_fits()
         self._families_fit()
         self._sensors_fit()
+        for name in self.recording.senders if self.recording is not None else ():
+            known("recording: senders", name, self.streams)
         for kind in ("reference", "display"):
             named = [name for name, stream in self.streams.items() if stream.kind == kind]
             if len(named) > 1:

@@ -10,7 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from fusion_core import Samples, Sensor
 from fusion_core.phone.calibration import Body, calibrate, with_mounting
-from fusion_core.phone.orientation import carry_forward, heading, level_rotation, rotate, rotations, turn_about_vertical
+from fusion_core.phone.orientation import (
+    carry_forward,
+    heading,
+    level_rotation,
+    rotate,
+    rotation,
+    rotations,
+    turn_about_vertical,
+)
 from pipeline.statistics.arrays import FloatArray
 
 TRACKER, IMU = Sensor("position", 8.0, 0.1), Sensor("acceleration", 100.0)
@@ -42,6 +50,11 @@ def test_rotations_turn_as_quaternions_do() -> None:
     quaternion = Rotation.random(20, random_state=1).as_quat()
     vectors = np.random.default_rng(1).normal(0, 1, (20, 3))
     np.testing.assert_allclose(np.einsum("nij,nj->ni", rotations(quaternion), vectors), rotate(quaternion, vectors))
+
+
+def test_one_rotation_alone_is_as_among_many() -> None:
+    turned = turns(np.arange(0.0, 3.0, 0.1)).as_quat() * 1.1
+    np.testing.assert_allclose([rotation(one) for one in turned], rotations(turned), atol=1e-15)
 
 
 def test_a_gap_in_the_orientation_is_carried_on_by_the_gyroscope_for_a_second() -> None:

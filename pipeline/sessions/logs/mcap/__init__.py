@@ -14,9 +14,9 @@ from pipeline.sessions.logs.mcap.container import MAGIC, walk_log
 from pipeline.sessions.logs.mcap.payload import counted, decode
 from pipeline.sessions.logs.mcap.schemas import content_of
 from pipeline.sessions.logs.mcap.walk import Walk
-from pipeline.sessions.logs.mcap.writer import Message, in_order, write
+from pipeline.sessions.logs.mcap.writer import LogWriter, Message, in_order, write
 
-__all__ = ["MAGIC", "Message", "in_order", "read", "write"]
+__all__ = ["MAGIC", "LogWriter", "Message", "in_order", "read", "write"]
 
 
 def read(path: Path, wanted: Iterable[Wanted]) -> Log:

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -56,7 +57,7 @@ _CHUNK_BYTES = 64 * 1024  # so that a crash loses seconds, not the session
 
 @dataclass(frozen=True)
 class Message:
-    """One message to write: `values` as in `Readings.values`, or an event."""
+    """One message to write: `values` as in `Readings.values`, or an event, or with `anything` any object of JSON."""
 
     topic: str
     content: Content
@@ -66,29 +67,56 @@ class Message:
     event: Mapping[str, object] | None = None
 
 
+class LogWriter:
+    """Writes a log message by message into an open file: what `flush` has returned from can be read, end or no end."""
+
+    def __init__(self, file: BinaryIO, facts: Mapping[str, str]) -> None:
+        from mcap.writer import CompressionType, Writer
+
+        self._writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer.start(profile="ros2", library="steadyhand")
+        self._writer.add_metadata("session", dict(facts))
+        self._schemas = {
+            "position": self._schema(SCHEMAS["position"], "ros2msg", _POINT_STAMPED),
+            "acceleration": self._schema(SCHEMAS["acceleration"], "ros2msg", _IMU),
+            "events": self._schema("steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA)),
+        }
+        self._channels: dict[str, int] = {}
+        self._sequence = 0
+
+    def _schema(self, name: str, encoding: str, text: str) -> int:
+        return int(self._writer.register_schema(name, encoding, text.encode()))
+
+    def add(self, message: Message) -> None:
+        """One more message. `ValueError` as `encoded` raises it."""
+        payload = encoded(message)
+        if message.topic not in self._channels:
+            if message.content == "anything" and message.content not in self._schemas:
+                self._schemas["anything"] = self._schema("steadyhand.Record", "jsonschema", '{"type": "object"}')
+            encoding = "cdr" if message.event is None else "json"
+            schema = self._schemas[message.content]
+            self._channels[message.topic] = self._writer.register_channel(message.topic, encoding, schema)
+        channel = self._channels[message.topic]
+        self._writer.add_message(channel, message.arrival_ns, payload, message.stamp_ns, self._sequence)
+        self._sequence += 1
+
+    def flush(self) -> None:
+        """Hand everything written so far to the file."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def finish(self) -> None:
+        """Write the summary, after which nothing can be added."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+
 def write(path: Path, facts: Mapping[str, str], messages: Iterable[Message]) -> None:
     """Write a log; it appears under its name only once it is whole."""
-    from mcap.writer import CompressionType, Writer
-
     partial = path.with_name(path.name + ".partial")
     with partial.open("wb") as file:
-        writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library="steadyhand")
-        writer.add_metadata("session", dict(facts))
-        schemas = {
-            "position": writer.register_schema(SCHEMAS["position"], "ros2msg", _POINT_STAMPED.encode()),
-            "acceleration": writer.register_schema(SCHEMAS["acceleration"], "ros2msg", _IMU.encode()),
-            "events": writer.register_schema("steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA).encode()),
-        }
-        channels: dict[str, int] = {}
-        for sequence, message in enumerate(messages):
-            if message.topic not in channels:
-                encoding = "json" if message.content == "events" else "cdr"
-                channels[message.topic] = writer.register_channel(message.topic, encoding, schemas[message.content])
-            writer.add_message(
-                channels[message.topic], message.arrival_ns, encoded(message), message.stamp_ns, sequence
-            )
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer = LogWriter(file, facts)
+        for message in messages:
+            writer.add(message)
+        writer.finish()
     partial.replace(path)
 
 

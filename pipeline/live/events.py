@@ -1,0 +1,171 @@
+"""What happens to a running study, and what it wants done: the whole language between its core and the world.
+
+All times are ns of recorder time: the epoch of the wall clock at start plus what a monotonic clock counted since, so
+that a wall clock that is set changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.live.messages import Incoming
+from pipeline.live.outgoing import Outgoing
+from pipeline.sessions.logs.mcap import Message
+
+Role = Literal["operator", "phone", "questionnaire"]
+Values = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A page has connected; `client` tells its connection from all others."""
+
+    role: Role
+    client: int
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class Left:
+    """A page's connection is gone."""
+
+    role: Role
+    client: int
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class Said:
+    """A page's message, parsed and within all limits."""
+
+    role: Role
+    client: int
+    message: Incoming
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A sensor's reading in SI and the tracker's frame.
+
+    `values` are a position (3,) in m, or specific force (3,) in m/s², angular velocity (3,) in rad/s and orientation
+    xyzw (4,), NaN where unknown. `stamp_ns` is None where the sender states no time, `seq` where it does not count.
+    """
+
+    stream: str
+    stamp_ns: int | None
+    arrival_ns: int
+    values: Values
+    seq: int | None = None
+
+
+@dataclass(frozen=True)
+class Tick:
+    """Time has passed."""
+
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class Disk:
+    """What the journal says now and then; `fault` is why it cannot write, in a sentence with its remedy."""
+
+    at_ns: int
+    free_bytes: int
+    log_bytes: int | None = None
+    written_ns: int | None = None
+    fault: str | None = None
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A record of `Save` is on disk."""
+
+    token: str
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A log is under its final name. `agreement_mm` is how far what was shown is from the replay of the log."""
+
+    file: str
+    at_ns: int
+    agreement_mm: float | None = None
+    shown: int = 0
+
+
+Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed
+
+
+@dataclass(frozen=True)
+class Tell:
+    """Send a message to one page."""
+
+    client: int
+    message: Outgoing
+
+
+@dataclass(frozen=True)
+class Show:
+    """Send an estimate to a phone; it was made at `made_ns`, of everything that had arrived by then."""
+
+    client: int
+    message: Outgoing
+    made_ns: int
+
+
+@dataclass(frozen=True)
+class Open:
+    """Begin the log of an attempt, with its facts."""
+
+    participant: str
+    condition: str
+    facts: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Write:
+    """Put a message into the open log."""
+
+    message: Message
+
+
+@dataclass(frozen=True)
+class Close:
+    """End the open log: under its final name, or set aside."""
+
+    set_aside: bool = False
+
+
+@dataclass(frozen=True)
+class Resolve:
+    """Give a log that was cut its final name, or set it (or a finished one) aside."""
+
+    participant: str
+    condition: str
+    set_aside: bool
+
+
+@dataclass(frozen=True)
+class Save:
+    """Append a record to the file of answers; `Saved` comes back with the token once it is on disk."""
+
+    record: Mapping[str, object]
+    token: str = ""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Write the study's tables anew."""
+
+    participants: tuple[Mapping[str, str], ...]
+    ratings: tuple[Mapping[str, str], ...]
+
+
+Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables
+
+Actions = tuple[Action, ...]
+NOTHING: Actions = ()

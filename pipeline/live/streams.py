@@ -1,0 +1,122 @@
+"""Streams of study.yaml as a running study needs them: what is logged, and what an estimator makes of it.
+
+A reading becomes a sample in the same way as when a report reads the log (`pipeline.sessions.recording`), from the very
+numbers that are logged. So what was shown is what a replay gives; a test holds the two against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from fusion_core import Sample
+from fusion_core.phone.orientation import rotation
+from pipeline.errors import PipelineError
+from pipeline.statistics.arrays import FloatArray
+from pipeline.study.settings import Study
+from pipeline.study.streams import AccelerationStream, PositionStream, ReferenceStream
+from pipeline.tables.columns import S_PER_NS
+
+_MM_PER_M = 1000.0
+_ALL_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class LiveStream:
+    """A stream that readings come from. `late_ns` is subtracted from its stamps, as `stamp: arrival` says."""
+
+    name: str
+    topic: str
+    content: Literal["position", "acceleration"]
+    is_sensor: bool
+    stamps_arrival: bool
+    late_ns: int
+    axes: tuple[int, ...]
+    gravity_mm_s2: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+
+def live_streams(study: Study, where: str) -> dict[str, LiveStream]:
+    """The streams that have senders. Raises PipelineError, beginning with `where`, for what cannot be recorded live."""
+    assert study.recording is not None  # noqa: S101 - checked before
+    found = {}
+    for name in study.recording.senders:
+        stream = study.streams[name]
+        late = stream.latency_s if stream.stamp == "arrival" or isinstance(stream, ReferenceStream) else 0.0
+        common = (name, stream.topic)
+        stamps, late_ns = stream.stamp == "arrival", round(late / S_PER_NS)
+        if isinstance(stream, AccelerationStream):
+            if stream.calibrate_s or any(stream.lever_arm_mm) or any(stream.mounting_xyzw[:3]):
+                raise PipelineError(
+                    f"{where}: streams.{name}: a live study does not correct for the phone's mounting; leave out"
+                    " mounting_xyzw, lever_arm_mm and calibrate_s, or show fusion_adaptive, which finds it"
+                )
+            axes = tuple(_ALL_AXES.index(axis) for axis in study.axes)
+            gravity = np.array(stream.gravity_mm_s2)
+            found[name] = LiveStream(*common, "acceleration", True, stamps, late_ns, axes, gravity)
+        elif isinstance(stream, PositionStream | ReferenceStream):
+            is_sensor = isinstance(stream, PositionStream)
+            of_stream = study.axes_of(name) if is_sensor else study.axes
+            axes = tuple(_ALL_AXES.index(axis) for axis in of_stream)
+            found[name] = LiveStream(*common, "position", is_sensor, stamps, late_ns, axes)
+        else:
+            raise PipelineError(
+                f"{where}: recording: senders: {name} is of kind {stream.kind}, which is not recorded live"
+            )
+    return found
+
+
+def sample_of(
+    stream: LiveStream, stamp_ns: int, arrival_ns: int, values: tuple[float, ...], origin_ns: int
+) -> Sample | None:
+    """A logged reading as an estimator takes it; None for an acceleration without an orientation."""
+    time, arrival = (stamp_ns - stream.late_ns - origin_ns) * S_PER_NS, (arrival_ns - origin_ns) * S_PER_NS
+    axes = list(stream.axes)
+    if stream.content == "position":
+        return Sample(time, arrival, np.array(values)[axes] * _MM_PER_M)
+    quaternion = np.array(values[6:10])
+    if not np.isfinite(quaternion).all():
+        return None
+    turn, force = rotation(quaternion), np.array(values[:3]) * _MM_PER_M
+    acceleration = turn @ force + stream.gravity_mm_s2
+    return Sample(time, arrival, acceleration[axes], turn[axes], force)
+
+
+def required(study: Study, where: str) -> Mapping[str, str]:
+    """The study's streams and topics that a live study cannot do without, by what they are for.
+
+    Raises PipelineError, beginning with `where`, naming what is missing.
+    """
+    if study.recording is None:
+        raise PipelineError(f"{where}: has no `recording:`, which says how it is run; docs/live.md shows one")
+    display = study.stream_of_kind("display")
+    needs = {
+        "streams: a stream of kind display, for what was shown": display,
+        "events: a topic": study.events.topic if study.events else None,
+        "task": study.task and "task",
+        "sessions: {participant} and {condition} in the name of the logs": _names_both(study),
+        "streams: a stream of kind position": study.tracker,
+        "participants: the name of a file to be written": study.participants,
+    }
+    if study.recording.questionnaires:
+        needs["questionnaires: the name of a file to be written"] = study.questionnaires
+    for what, found in needs.items():
+        if not found:
+            raise PipelineError(f"{where}: a live study needs {what}")
+    if not {"x", "y"} <= set(study.axes):
+        raise PipelineError(f"{where}: axes: a live study shows x and y, found {list(study.axes)}")
+    for condition in study.conditions:
+        if condition not in study.shown:
+            raise PipelineError(f'{where}: shown: has no estimator for "{condition}"; add the one it displays')
+    for name, stream in study.sensor_streams.items():
+        if name not in study.recording.senders:
+            raise PipelineError(f"{where}: recording: senders: has none for {name}, of kind {stream.kind}; add one")
+    assert display is not None and study.events is not None  # noqa: S101
+    return {"display": study.streams[display].topic, "events": study.events.topic}
+
+
+def _names_both(study: Study) -> str | None:
+    pattern = study.sessions or ""
+    return pattern if "{participant}" in pattern and "{condition}" in pattern and "{session}" not in pattern else None

@@ -1,0 +1,203 @@
+"""`recording:` in study.yaml: how a study is run live, and which sender each stream comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from pipeline.errors import did_you_mean
+from pipeline.study.fields import Finite, Frozen, Id, Positive, Seconds, Vector, unique
+
+Port = Annotated[int, Field(ge=1, le=65535)]
+SignedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Unit = Literal["mm", "cm", "m", "g", "m_s2", "deg_s", "rad_s"]
+
+METRES: Mapping[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+M_S2: Mapping[str, float] = {"g": 9.80665, "m_s2": 1.0}
+RAD_S: Mapping[str, float] = {"deg_s": 0.017453292519943295, "rad_s": 1.0}
+"""What one of a unit is in SI."""
+
+SENDERS = ("phone", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")
+"""The kinds of senders."""
+
+
+class UdpJson(Frozen):
+    """Datagrams of JSON. `source` is the address they must come from."""
+
+    port: Port
+    source: str = "any"
+
+
+class Osc(Frozen):
+    """Open Sound Control: the arguments `fields` of messages to `address`."""
+
+    port: Port
+    address: str = Field(pattern="^/")
+    fields: tuple[Annotated[int, Field(ge=0, le=63)], ...] = (0, 1, 2)
+
+
+class Lsl(Frozen):
+    """A Lab Streaming Layer outlet by name."""
+
+    name: str = Field(min_length=1)
+    channels: tuple[Annotated[int, Field(ge=0, le=1023)], ...] = (0, 1, 2)
+
+
+class Camera(Frozen):
+    """A webcam that sees a printed ArUco marker."""
+
+    device: Annotated[int, Field(ge=0, le=63)] = 0
+    marker: Annotated[int, Field(ge=0, le=49)] = 7
+    marker_mm: Positive = 50.0
+    size: tuple[Annotated[int, Field(ge=160, le=7680)], Annotated[int, Field(ge=120, le=4320)]] = (1280, 720)
+
+
+class Rosbridge(Frozen):
+    """A topic of a rosbridge server."""
+
+    url: str = Field(pattern="^wss?://")
+    topic: str = Field(min_length=1)
+    type: str = Field(min_length=1)
+
+
+class Foxglove(Frozen):
+    """A topic of a server that speaks Foxglove's WebSocket protocol."""
+
+    url: str = Field(pattern="^wss?://")
+    topic: str = Field(min_length=1)
+
+
+class Demo(Frozen):
+    """A simulated sender."""
+
+
+class Sender(Frozen):
+    """Where a stream's readings come from, and how they are turned into SI in the tracker's frame.
+
+    `axes` permutes and flips, then `rotation_xyzw` turns and `translation_mm` moves (positions only).
+    """
+
+    phone: Literal["motion"] | None = None
+    udp_json: UdpJson | None = None
+    osc: Osc | None = None
+    lsl: Lsl | None = None
+    camera: Camera | None = None
+    rosbridge: Rosbridge | None = None
+    foxglove: Foxglove | None = None
+    demo: Demo | None = None
+    axes: tuple[SignedAxis, SignedAxis, SignedAxis] = ("x", "y", "z")
+    unit: tuple[Unit, ...] | Unit = ()
+    rotation_xyzw: tuple[Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 1.0)
+    translation_mm: Vector = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Sender:
+        kinds = [kind for kind in SENDERS if getattr(self, kind) is not None]
+        if len(kinds) != 1:
+            found = " and ".join(kinds) if kinds else "none"
+            raise ValueError(f"needs one of {', '.join(SENDERS)}; found {found}")
+        if {axis[-1] for axis in self.axes} != {"x", "y", "z"}:
+            raise ValueError(f"axes needs each of x, y and z once, found {list(self.axes)}")
+        if not sum(part**2 for part in self.rotation_xyzw) > 0:
+            raise ValueError("rotation_xyzw is all zeros; no rotation is [0, 0, 0, 1]")
+        for table in (METRES, M_S2, RAD_S):
+            if sum(unit in table for unit in self.units) > 1:
+                raise ValueError(f"unit names the same quantity twice: {', '.join(self.units)}")
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Which of the kinds it is."""
+        return next(kind for kind in SENDERS if getattr(self, kind) is not None)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Its units, as a tuple."""
+        return (self.unit,) if isinstance(self.unit, str) else self.unit
+
+
+class Phone(Frozen):
+    """`window: true_size` shows millimetres as they are in the hand, `fit` scales the window to the screen."""
+
+    frame: Literal["screen"] = "screen"
+    window: Literal["fit", "true_size"] = "fit"
+
+
+class Practice(Frozen):
+    """How many targets are practised before each task; they are not logged as trials."""
+
+    targets: Annotated[int, Field(ge=0, le=99)] = 0
+
+
+class Selection(Frozen):
+    """The button on the phone: on which side, how large, and how long it confirms a press."""
+
+    button: Literal["left", "right"] = "right"
+    mm: Annotated[float, Field(ge=5, le=60)] = 12.0
+    confirm_ms: Annotated[float, Field(ge=0, le=2000)] = 150.0
+
+
+class Item(Frozen):
+    """One line of a questionnaire: `steps` + 1 marks from `low` to `high`."""
+
+    id: Id
+    text: str = Field(min_length=1)
+    low: str = Field(min_length=1)
+    high: str = Field(min_length=1)
+    steps: Annotated[int, Field(ge=1, le=100)] = 20
+
+
+class Questionnaire(Frozen):
+    """A questionnaire of the study's own; ratings are 0 … steps, from left to right."""
+
+    id: Id
+    title: str = ""
+    items: Annotated[tuple[Item, ...], Field(min_length=1, max_length=60)]
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Questionnaire:
+        unique("items", tuple(item.id for item in self.items))
+        return self
+
+
+def _nasa_tlx() -> Questionnaire:
+    """NASA-TLX (Hart and Staveland 1988); its definitions are among the pages' texts, in their languages."""
+    low_high = dict.fromkeys(("mental", "physical", "temporal", "effort", "frustration"), ("very low", "very high"))
+    ends = {**low_high, "performance": ("perfect", "failure")}
+    order = ("mental", "physical", "temporal", "performance", "effort", "frustration")
+    items = tuple(Item(id=name, text=name, low=ends[name][0], high=ends[name][1]) for name in order)
+    return Questionnaire(id="nasa_tlx", title="NASA-TLX", items=items)
+
+
+BUILT_IN: Mapping[str, Questionnaire] = {"nasa_tlx": _nasa_tlx()}
+"""Questionnaires that need no definition in study.yaml."""
+
+
+def _built_in(value: object) -> object:
+    """A built-in questionnaire stands by its name alone."""
+    if not isinstance(value, str):
+        return value
+    if value not in BUILT_IN:
+        raise ValueError(f"there is no questionnaire of that name{did_you_mean(value, BUILT_IN)}")
+    return BUILT_IN[value]
+
+
+class Recording(Frozen):
+    """How a study is run live."""
+
+    phone: Phone = Phone()
+    blind: Literal["participant", "both"] = "participant"
+    practice: Practice = Practice()
+    selection: Selection = Selection()
+    advance: Literal["selection"] = "selection"
+    abort_after_s: Annotated[Seconds, Field(ge=10, le=600)] = 240.0
+    questionnaires: tuple[Annotated[Questionnaire, BeforeValidator(_built_in)], ...] = ()
+    countdown_s: Annotated[float, Field(ge=0, le=60)] = 3.0
+    senders: Annotated[Mapping[Id, Sender], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Recording:
+        unique("questionnaires", tuple(one.id for one in self.questionnaires))
+        return self
