@@ -102,12 +102,13 @@ def tab() -> Iterator[Tab]:
     sandbox = ("--no-sandbox",) if os.geteuid() == 0 else ()  # root has no other way
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         words = [found(), *_FLAGS, *sandbox, f"--user-data-dir={profile}", "about:blank"]
-        # The browser reads from descriptor 3 and writes to 4.
+        # The browser reads from descriptor 3 and writes to 4. The shell is handed the pipes as its input and output,
+        # because some shells take no descriptor above 9 by its number.
         process = subprocess.Popen(
-            ["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh", *words],
-            pass_fds=(to_browser, from_browser),
+            ["/bin/sh", "-c", 'exec "$@" 3<&0 4>&1 </dev/null >/dev/null', "sh", *words],
+            stdin=to_browser,
+            stdout=from_browser,
             stderr=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
             cwd=Path(profile),
         )
         os.close(to_browser)

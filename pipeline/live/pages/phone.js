@@ -1,0 +1,274 @@
+// The phone's page: it sends its motion, draws the newest estimate at each frame, and says which one was on the screen when
+// the button was pressed. What task it is, what is a trial and what counts is the server's; it knows no condition's name.
+
+import { draw, handAt, placed } from "./picture.js";
+import { buttonSize, listenToPresses } from "./press.js";
+import { askPermission, startMotion } from "./sensors.js";
+import { clockMs, Link } from "./socket.js";
+import { fill, filled, loadTexts, taskName } from "./texts.js";
+
+const STALE_MS = 300; // without news: the picture is not to be trusted
+const MOUSE_EVERY_MS = 1000 / 60;
+const ACTIVE = new Set(["practice", "running"]);
+
+const texts = await loadTexts("phone");
+const at = (id) => document.getElementById(id);
+const [picture, button, stage] = ["picture", "select", "stage"].map(at);
+const context = picture.getContext("2d");
+
+const phone = {
+  link: null,
+  permission: "unavailable",
+  wakeLock: null,
+  task: null, // the last `welcome`
+  state: { state: "waiting" },
+  estimate: null, // the last `show`
+  drawnN: null, // the number of the estimate that is on the screen
+  connection: "connecting",
+  said: "",
+  stale: false,
+  box: null,
+  look: null,
+  problemsSeen: false,
+};
+
+// ── Start: permission, wake lock, connection
+
+const leftHanded = at("left-handed");
+leftHanded.checked = localStorage.getItem("left-handed") === "yes";
+leftHanded.addEventListener("change", () => localStorage.setItem("left-handed", leftHanded.checked ? "yes" : "no"));
+
+async function start() {
+  const asked = askPermission(); // first of all: a browser that asks does so only right after the tap
+  document.documentElement.requestFullscreen?.().then(() => screen.orientation.lock?.("landscape")).catch(() => {});
+  phone.permission = await asked;
+  await keepAwake();
+  await begin();
+}
+
+// After a reload nobody need tap again where the browser lets it be; a phone that is back at once goes on with its trial.
+async function startAgain() {
+  phone.permission = await askPermission();
+  if (phone.permission === "denied") return showOnly("begin");
+  await keepAwake();
+  return begin();
+}
+
+async function begin() {
+  sessionStorage.setItem("started", "yes");
+  showOnly("stage");
+  show();
+  if (["granted", "unneeded"].includes(phone.permission)) {
+    const comes = await startMotion((message) => phone.link?.sendReading(message));
+    if (!comes) phone.permission = "unavailable";
+  }
+  phone.link = new Link("phone", { hello, receive, status, pings: true });
+  watchBattery();
+}
+
+function hello() {
+  return {
+    type: "hello",
+    page: "phone",
+    version: 1,
+    agent: navigator.userAgent,
+    screen: { w: innerWidth, h: innerHeight, ratio: devicePixelRatio },
+    permission: phone.permission,
+    secure: isSecureContext,
+    wake_lock: Boolean(phone.wakeLock),
+  };
+}
+
+async function keepAwake() {
+  phone.wakeLock = (await navigator.wakeLock?.request("screen").catch(() => null)) ?? null;
+}
+
+document.addEventListener("visibilitychange", async () => {
+  const visible = document.visibilityState === "visible";
+  phone.link?.send({ type: "visible", visible, t: clockMs() });
+  if (visible && phone.link) await keepAwake(); // the browser takes the lock away whenever the page is hidden
+});
+
+async function watchBattery() {
+  const battery = await navigator.getBattery?.().catch(() => null);
+  const send = () => phone.link.send({ type: "battery", level: battery.level });
+  battery?.addEventListener("levelchange", send);
+  if (battery) send();
+}
+
+// ── What is wrong with this browser, and the way out
+
+function problems() {
+  const sensors = isSecureContext ? { denied: "denied", unavailable: "unavailable" }[phone.permission] : "insecure";
+  return [sensors, phone.wakeLock ? null : "no_wake_lock"].filter(Boolean);
+}
+
+function showProblems() {
+  const found = problems();
+  if (!found.length || phone.problemsSeen || phone.task.mouse) return;
+  const words = found.flatMap((name) => [["dt", name], ["dd", `${name}_remedy`]]);
+  at("problem-list").replaceChildren(...words.map(([tag, name]) => element(tag, texts.problem[name])));
+  at("go-on").textContent = texts.problem[found[0] === "no_wake_lock" ? "go_on" : "display_only"];
+  showOnly("problems");
+  at("problems-title").scrollIntoView();
+}
+
+function element(tag, text) {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  return made;
+}
+
+at("start").addEventListener("click", start);
+at("go-on").addEventListener("click", () => {
+  phone.problemsSeen = true;
+  showOnly("stage");
+});
+at("try-again").addEventListener("click", () => {
+  sessionStorage.removeItem("started"); // a page loaded anew asks anew, within a tap
+  location.reload();
+});
+
+function showOnly(id) {
+  for (const part of ["begin", "problems", "stage"]) at(part).hidden = part !== id;
+  if (id === "stage") fit();
+}
+
+// ── From the server
+
+function receive(message) {
+  const { type } = message;
+  if (type === "show") return takeEstimate(message);
+  if (type === "welcome") takeTask(message);
+  else if (type === "state") phone.state = message;
+  else if (type === "say") phone.said = message.text;
+  show();
+  return requestDrawing();
+}
+
+function takeTask(message) {
+  phone.task = message;
+  showProblems();
+  fit();
+}
+
+function status(name) {
+  phone.connection = name;
+  if (name !== "open") phone.estimate = null; // what was on the screen before a break is no news after it
+  show();
+}
+
+let staleTimer = 0;
+function takeEstimate(message) {
+  phone.estimate = message;
+  if (phone.stale || !staleTimer) setStale(false);
+  clearTimeout(staleTimer);
+  staleTimer = setTimeout(() => setStale(true), STALE_MS);
+  requestDrawing();
+}
+
+function setStale(stale) {
+  phone.stale = stale;
+  show();
+}
+
+// ── Drawing: at most once a frame, and the newest only
+
+let frame = 0;
+function requestDrawing() {
+  frame ||= requestAnimationFrame(() => {
+    frame = 0;
+    if (!phone.task || !phone.estimate || stage.hidden) return;
+    context.clearRect(0, 0, picture.width, picture.height);
+    draw(context, phone.task, phone.box, phone.estimate, phone.state.target, phone.look);
+    if (phone.drawnN === phone.estimate.n) return;
+    const isFirst = phone.drawnN === null;
+    phone.drawnN = phone.estimate.n;
+    if (isFirst) show();
+    phone.link.send({ type: "drawn", n: phone.drawnN, t: clockMs() }); // also says that no older one will be drawn
+  });
+}
+
+function fit() {
+  const [width, height, ratio] = [stage.clientWidth, stage.clientHeight, devicePixelRatio];
+  if (!phone.task || !width) return;
+  Object.assign(picture, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  phone.box = placed(phone.task, width, height, side());
+  const size = buttonSize(phone.task.button.mm);
+  Object.assign(button.style, { width: `${size}px`, height: `${size}px` });
+  stage.classList.toggle("left", side() === "left");
+  const { box } = phone;
+  Object.assign(at("message").style, { left: `${box.left + box.width / 2}px`, top: `${box.top + box.height / 2}px` });
+  requestDrawing();
+}
+
+function side() {
+  const stated = phone.task.button.side;
+  return leftHanded.checked ? { left: "right", right: "left" }[stated] : stated;
+}
+
+function readLook() {
+  const style = getComputedStyle(document.documentElement);
+  const names = ["ink", "soft", "paper", "beyond", "path", "target"];
+  phone.look = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  requestDrawing();
+}
+
+new ResizeObserver(fit).observe(stage);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readLook);
+readLook();
+
+// ── Words and the button's state
+
+function show() {
+  const { state, target } = phone.state;
+  const ready = phone.connection === "open" && ACTIVE.has(state);
+  const waits = ready && phone.stale;
+  stage.classList.toggle("stale", waits || phone.connection !== "open" || state === "paused");
+  button.disabled = !ready || waits || phone.drawnN === null;
+  at("message").textContent = words(state, ready, waits);
+  at("message").classList.toggle("count", state === "countdown");
+  at("badge").textContent = phone.task ? badge(state, target) : "";
+}
+
+function words(state, ready, waits) {
+  if (phone.connection !== "open") return texts.common.connection[phone.connection];
+  if (phone.said) return phone.said;
+  if (ready) return waits ? texts.wait : "";
+  const seconds = phone.state.seconds_left;
+  return state === "countdown" && seconds ? `${Math.ceil(seconds)}` : texts.state[state];
+}
+
+function badge(state, target) {
+  const { task, of, targets_mm } = phone.task;
+  const name = filled(texts.of, { task: taskName(texts, task), of });
+  const practice = state === "practice" ? texts.state.practice : null;
+  const place = ACTIVE.has(state) ? filled(texts.target, { number: target + 1, of: targets_mm.length }) : null;
+  return [name, practice, place].filter(Boolean).join(" · ");
+}
+
+// ── Selecting, and the mouse as the hand
+
+const presses = listenToPresses(button, {
+  confirmMs: () => phone.task.confirm_ms ?? 150,
+  begin: () => phone.drawnN,
+  select: (n, { t, pressed_ms }) => phone.link.send({ type: "select", n, t, pressed_ms }),
+});
+
+picture.addEventListener("pointerdown", (event) => {
+  if (phone.task?.mouse && event.button === 0) presses.down(event);
+});
+
+let mouseSent = 0;
+stage.addEventListener("pointermove", (event) => {
+  if (!phone.task?.mouse || event.timeStamp - mouseSent < MOUSE_EVERY_MS) return;
+  mouseSent = event.timeStamp;
+  const box = stage.getBoundingClientRect();
+  const { x, y } = handAt(phone.task, box.width, box.height, event.clientX - box.left, event.clientY - box.top);
+  phone.link.send({ type: "mouse", t: clockMs(event.timeStamp), x, y });
+});
+
+fill(document, texts);
+if (sessionStorage.getItem("started")) startAgain();
+else showOnly("begin");
