@@ -127,11 +127,13 @@ function drawWayBack(context, task, box, estimate, look) {
   const nearest = nearestOnPath(task.path_mm, estimate);
   const [dx, dy] = [(nearest[0] - estimate.x) * box.scale, (estimate.y - nearest[1]) * box.scale];
   if (!task.window_mm || (Math.abs(dx) < box.width / 2 && Math.abs(dy) < box.height / 2)) return;
-  const reach = 0.8 * Math.min(box.width / 2 / Math.abs(dx), box.height / 2 / Math.abs(dy));
-  const tip = [box.left + box.width / 2 + dx * reach, box.top + box.height / 2 + dy * reach];
-  context.strokeStyle = look.path;
-  context.lineWidth = 5;
-  drawChevron(context, tip, Math.atan2(-dy, dx), 20);
+  const reach = 0.6 * Math.min(box.width / 2 / Math.abs(dx), box.height / 2 / Math.abs(dy));
+  context.save();
+  context.translate(box.left + box.width / 2 + dx * reach, box.top + box.height / 2 + dy * reach);
+  context.rotate(Math.atan2(dy, dx));
+  context.fillStyle = look.path;
+  context.fill(new Path2D("M 22 0 L -6 16 L -6 6 L -26 6 L -26 -6 L -6 -6 L -6 -16 Z"));
+  context.restore();
 }
 
 export function nearestOnPath(path_mm, { x, y }) {
