@@ -48,8 +48,8 @@ compiled: .venv/installed
 mutants: .venv/installed ## small faults put into accuracy, statistics and analysis: which does no test notice? (half an hour)
 	@$(python) -m tests.mutants $(ARGS)
 
-test-browser: .venv/installed ## the pages in Chromium at three widths, with axe-core (needs chromium; npm for axe-core)
-	@$(python) -m tests.browser
+test-browser: .venv/installed ## the pages in Chromium at three widths, with axe-core (needs chromium; npm for axe-core); ARGS=reports or live: some of them
+	@$(python) -m tests.browser $(ARGS)
 
 test-pdf: .venv/installed ## the PDFs against PDF/UA-1 and PDF/A-2a by veraPDF (needs maven and a JDK)
 	@$(python) -m tests.browser.pdf

@@ -1,14 +1,20 @@
-"""`make test-browser`: the pages at three widths, with the keyboard's and the scripts' work, and axe-core."""
+"""`make test-browser`: the pages at three widths, with the keyboard's and the scripts' work, and axe-core.
+
+`ARGS=reports` takes the reports' pages alone, `ARGS=live` those of the live study, `ARGS="live reload"` some of them.
+"""
 
 from __future__ import annotations
 
 import sys
 import tempfile
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 from tests.browser import axe
-from tests.browser.chromium import BrowserError, Event, Tab, found, tab
+from tests.browser.chromium import BrowserError, Tab, found, tab
+from tests.browser.complaints import complaint
+from tests.browser.live.run import looks, results
 from tests.browser.studies import written
 
 WIDTHS = {390: 844, 768: 1024, 1280: 900}
@@ -46,7 +52,7 @@ def _at_width(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
     if checker is not None:
         opened.evaluate(f"{checker};0")
         yield from opened.evaluate("accessibilityFaults()")
-    yield from filter(None, map(_complaint, opened.events))
+    yield from filter(None, (complaint(event, ("file:", "data:")) for event in opened.events))
 
 
 def _finds_faults(folder: Path, opened: Tab, checker: str | None) -> list[str]:
@@ -58,21 +64,15 @@ def _finds_faults(folder: Path, opened: Tab, checker: str | None) -> list[str]:
     return [f"a page with this fault passed: {fault}" for fault in wanted if fault not in found]
 
 
-def _complaint(event: Event) -> str | None:
-    """What is wrong about something the browser said: an error, or a request that leaves the machine."""
-    method, told = event.get("method"), event.get("params", {})
-    if method == "Runtime.exceptionThrown":
-        return f"an exception: {told['exceptionDetails'].get('exception', {}).get('description')}"
-    if method == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning"):
-        return f"the console: {[one.get('value') for one in told['args']]}"
-    if method == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-        return f"the log: {told['entry']['text']}"
-    if method == "Network.requestWillBeSent" and not told["request"]["url"].startswith(("file:", "data:")):
-        return f"a request leaves: {told['request']['url'][:200]}"
-    return None
+def _reports(checker: str | None) -> Iterator[tuple[str, list[str]]]:
+    with tempfile.TemporaryDirectory() as folder, tab() as opened:
+        yield "faults are found", _finds_faults(Path(folder), opened, checker)
+        for page in written(Path(folder), "html"):
+            name = page.relative_to(Path(folder) / "out")
+            yield f"{name} ({page.stat().st_size / 1e6:.2f} MB)", list(check(page, opened, checker))
 
 
-def main() -> int:
+def main(part: str = "", *words: str) -> int:
     """Print what is wrong with each page; 1 where anything is, 2 where there is no browser."""
     counts = {True: 0, False: 0}
 
@@ -83,11 +83,13 @@ def main() -> int:
     try:
         found()
         checker = axe.source()
-        with tempfile.TemporaryDirectory() as folder, tab() as opened:
-            say("faults are found", _finds_faults(Path(folder), opened, checker))
-            for page in written(Path(folder), "html"):
-                name = page.relative_to(Path(folder) / "out")
-                say(f"{name} ({page.stat().st_size / 1e6:.2f} MB)", list(check(page, opened, checker)))
+        if part != "live":
+            for name, faults in _reports(checker):
+                say(name, faults)
+        if part != "reports":
+            wanted = " ".join(words)
+            for name, faults in chain(results(wanted), looks(checker, wanted)):
+                say(name, faults)
     except (BrowserError, RuntimeError) as error:
         print(f"make test-browser: {error}", file=sys.stderr)
         return 2
@@ -96,4 +98,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))

@@ -95,13 +95,13 @@ class Tab:
 
 
 @contextmanager
-def tab() -> Iterator[Tab]:
-    """A browser of its own with one page, gone afterwards."""
+def tab(*flags: str) -> Iterator[Tab]:
+    """A browser of its own with one page, gone afterwards; `flags` for its command line besides."""
     to_browser, ours_out = os.pipe()
     ours_in, from_browser = os.pipe()
     sandbox = ("--no-sandbox",) if os.geteuid() == 0 else ()  # root has no other way
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        words = [found(), *_FLAGS, *sandbox, f"--user-data-dir={profile}", "about:blank"]
+        words = [found(), *_FLAGS, *flags, *sandbox, f"--user-data-dir={profile}", "about:blank"]
         # The browser reads from descriptor 3 and writes to 4. The shell is handed the pipes as its input and output,
         # because some shells take no descriptor above 9 by its number.
         process = subprocess.Popen(

@@ -260,14 +260,20 @@ picture.addEventListener("pointerdown", (event) => {
   if (phone.task?.mouse && event.button === 0) presses.down(event);
 });
 
-let mouseSent = 0;
+// The last place before each sending, so that a mouse that stops is known where it stopped.
+let moved = null;
 stage.addEventListener("pointermove", (event) => {
-  if (!phone.task?.mouse || event.timeStamp - mouseSent < MOUSE_EVERY_MS) return;
-  mouseSent = event.timeStamp;
-  const box = stage.getBoundingClientRect();
-  const { x, y } = handAt(phone.task, box.width, box.height, event.clientX - box.left, event.clientY - box.top);
-  phone.link.send({ type: "mouse", t: clockMs(event.timeStamp), x, y });
+  if (!phone.task?.mouse) return;
+  if (!moved) setTimeout(sendMouse, MOUSE_EVERY_MS);
+  moved = event;
 });
+
+function sendMouse() {
+  const { left, top, width, height } = stage.getBoundingClientRect();
+  const { x, y } = handAt(phone.task, width, height, moved.clientX - left, moved.clientY - top);
+  phone.link.send({ type: "mouse", t: clockMs(moved.timeStamp), x, y });
+  moved = null;
+}
 
 fill(document, texts);
 if (sessionStorage.getItem("started")) startAgain();

@@ -8,7 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import uvicorn
@@ -44,7 +44,9 @@ class LiveServer:
     def say(self, role: str, **message: Any) -> None:
         """Send to every open page of a role."""
         for one in tuple(self._open[role]):
-            asyncio.run_coroutine_threadsafe(one.send_text(json.dumps(message)), self._loop).result(5)
+            # A page may just have gone.
+            with suppress(RuntimeError, WebSocketDisconnect):
+                asyncio.run_coroutine_threadsafe(one.send_text(json.dumps(message)), self._loop).result(5)
 
     def cut(self, role: str, code: int = 1012) -> None:
         """Close the sockets of a role."""
@@ -65,7 +67,7 @@ class LiveServer:
         for messages in self.received.values():
             messages.clear()
 
-    async def socket(self, opened: WebSocket) -> None:
+    async def connection(self, opened: WebSocket) -> None:
         """One page's connection, from its first message to its last."""
         role = opened.path_params["role"]
         await opened.accept()
@@ -94,7 +96,7 @@ class LiveServer:
                 Route("/pages/{path:path}", _file),
                 Route("/qr/{role}.svg", lambda _: Response(_SQUARE, media_type="image/svg+xml")),
                 Route("/join", _join, methods=["POST"]),
-                WebSocketRoute("/socket/{role}", self.socket),
+                WebSocketRoute("/socket/{role}", self.connection),
             ]
         )
 

@@ -1,0 +1,1 @@
+"""The live study's pages in a real browser, against a stand-in for its server."""

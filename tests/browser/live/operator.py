@@ -1,0 +1,175 @@
+"""The operator's page: its one big button, reasons, notes, lights, by mouse and by keys; and the way in by a key."""
+
+from __future__ import annotations
+
+import json
+import time
+
+from tests.browser.chromium import Tab
+from tests.browser.live.acts import focused, is_seen, key, mouse, place, sized, text, value, wait_for, write
+from tests.browser.live.samples import HOSTILE, Message, lights, ready, state
+from tests.browser.live.server import KEY, LiveServer, until
+
+
+def _opened(tab: Tab, server: LiveServer, content: Message) -> None:
+    sized(tab, 1440, 900)
+    tab.open(f"{server.address}/operator")
+    server.wait("operator", "hello")
+    _shows(tab, server, content)
+
+
+def _shows(tab: Tab, server: LiveServer, content: Message) -> None:
+    server.say("operator", **content)
+    until(lambda: text(tab, "#study") == content["study"], "the state is shown")
+
+
+def _click(tab: Tab, selector: str) -> None:
+    point = place(tab, selector)
+    for kind in ("mousePressed", "mouseReleased"):
+        mouse(tab, kind, point["x"], point["y"])
+
+
+def _tab_to(tab: Tab, name: str) -> None:
+    for _ in range(60):
+        if focused(tab) == name:
+            return
+        key(tab, "Tab")
+    raise AssertionError(f"{name} is not reached by the Tab key")
+
+
+def _asked(server: LiveServer, count: int) -> tuple[str, str]:
+    last = server.wait("operator", "do", count)[-1]
+    return last["what"], last["text"]
+
+
+def the_state_is_shown(tab: Tab, server: LiveServer) -> None:
+    """Who is where, what is next, that the log replays; words from a study are text and nothing else."""
+    _opened(tab, server, state())
+    assert text(tab, "#who") == "P01, Task 2"
+    assert text(tab, "#phase") == "Running."
+    assert text(tab, "#clock") == "Trial 3, 14 s"
+    assert text(tab, "#big") == "Abort Task 2 of P01"
+    assert "1.2·10⁻¹² mm apart over 5012" in text(tab, "#agreement")
+    rows = tab.evaluate("[...document.querySelectorAll('#participants tbody tr')].map(r => r.innerText)")
+    assert len(rows) == 12
+    assert "2 of 6" in rows[0]
+    assert "left" in rows[1]
+    assert HOSTILE in text(tab, "#problems")
+    assert tab.evaluate("document.querySelectorAll('main b, header b').length") == 0
+
+
+def one_big_button_begins(tab: Tab, server: LiveServer) -> None:
+    """What it says is asked for; a refusal is shown with its reason, as text."""
+    _opened(tab, server, ready("green"))
+    assert text(tab, "#big") == "Start Task 1 of P01"
+    _click(tab, "#big")
+    assert _asked(server, 1) == ("start", "")
+    server.say("operator", type="refused", id=server.said("operator", "do")[0]["id"], why=HOSTILE)
+    until(lambda: text(tab, "#answer") == f"Not done: {HOSTILE}", "the reason")
+
+
+def a_red_check_wants_a_reason(tab: Tab, server: LiveServer) -> None:
+    """By keys alone: the question comes up, an empty reason is not taken, a typed one goes out, Escape asks nothing."""
+    _opened(tab, server, ready("red"))
+    _tab_to(tab, "big")
+    key(tab, "Enter")
+    wait_for(tab, "#reason")
+    assert focused(tab) == "reason-text"
+    key(tab, "Enter")
+    until(lambda: is_seen(tab, "#reason-missing"), "it wants a reason")
+    write(tab, "The floor shakes.")
+    key(tab, "Enter")
+    assert _asked(server, 1) == ("start", "The floor shakes.")
+    assert not is_seen(tab, "#reason")
+    _click(tab, "button[data-do=skip]")
+    wait_for(tab, "#reason")
+    _click(tab, "#reason-cancel")
+    time.sleep(0.2)
+    assert len(server.said("operator", "do")) == 1
+
+
+def a_note_with_a_key(tab: Tab, server: LiveServer) -> None:
+    """N, the note, Enter; and that it was taken is said."""
+    _opened(tab, server, state())
+    key(tab, "n")
+    assert focused(tab) == "note-text"
+    write(tab, "Laughs, n times")
+    key(tab, "Enter")
+    assert _asked(server, 1) == ("note", "Laughs, n times")
+    server.say("operator", type="done", id=server.said("operator", "do")[0]["id"])
+    until(lambda: text(tab, "#answer") == "Noted.", "it says so")
+    assert value(tab, "#note-text", "it.value") == ""
+
+
+def a_second_page_only_looks_on(tab: Tab, server: LiveServer) -> None:
+    """All is shown, nothing can be done, but taking over."""
+    _opened(tab, server, state(read_only=True))
+    buttons = "[...document.querySelectorAll('#now button')].every(b => b.disabled)"
+    assert tab.evaluate(buttons)
+    _click(tab, "#read-only button")
+    assert _asked(server, 1) == ("take_over", "")
+    _shows(tab, server, state())
+    until(lambda: not is_seen(tab, "#read-only"), "it may act")
+    assert not value(tab, "#big", "it.disabled")
+
+
+def lights_differ_in_more_than_colour(tab: Tab, server: LiveServer) -> None:
+    """A sign, a word for those who hear the page, a sentence; what gets worse is said once."""
+    _opened(tab, server, state())
+    server.say("operator", **lights())
+    until(lambda: "Known to 6 ms." in text(tab, "#changed"), "the amber one is said")
+    lamps = tab.evaluate("[...document.querySelectorAll('#light-list .lamp')].map(l => [l.textContent, l.ariaLabel])")
+    assert lamps == [["✓", "good"], ["✓", "good"], ["!", "look"], ["–", "nothing known"]]
+    server.say("operator", **lights("red"))
+    until(lambda: text(tab, "#changed") == "Phone: act. Scan the code with the phone.", "the red one is said")
+    assert text(tab, "#drawn-hz") == "59.8 Hz"
+    assert text(tab, "#round-trip") == "–"
+    assert value(tab, "#traces", "it.getContext('2d').getImageData(0, 0, it.width, it.height).data.some(Boolean)")
+
+
+def a_break_is_shown(tab: Tab, server: LiveServer) -> None:
+    """Nothing can be asked for meanwhile."""
+    _opened(tab, server, state())
+    server.cut("operator")
+    until(lambda: "was lost" in text(tab, "#connection"), "it says so")
+    assert value(tab, "#big", "it.disabled")
+    server.wait("operator", "hello", 2)
+    _shows(tab, server, state())
+    assert not is_seen(tab, "#connection")
+
+
+def the_key_leaves_the_address(tab: Tab, server: LiveServer) -> None:
+    """The operator's and the phone's; a wrong one is said."""
+    tab.open(f"{server.address}/operator#k={KEY}")
+    server.wait("operator", "hello")
+    assert tab.evaluate("location.hash") == ""
+    tab.open(f"{server.address}/join#k={KEY}")
+    until(lambda: tab.evaluate("location.pathname + location.hash") == "/phone", "the phone's page opens")
+    for address, words in ((f"{server.address}/join#k=wrong", "not valid any more"), ("/join", "not complete")):
+        tab.evaluate(f"location.href = {json.dumps('/pages/icon.svg')}")
+        tab.open(address if address.startswith("http") else server.address + address)
+        until(lambda words=words: words in text(tab, "#status"), words)  # type: ignore[misc]
+        assert tab.evaluate("location.hash") == ""
+
+
+def a_sheet_for_paper(tab: Tab, server: LiveServer) -> None:
+    """In print there are the orders alone, blind where the operator is."""
+    _opened(tab, server, state())
+    tab.call("Emulation.setEmulatedMedia", media="print")
+    assert is_seen(tab, "#sheet")
+    assert not is_seen(tab, "main")
+    rows = tab.evaluate("[...document.querySelectorAll('#sheet-table tbody tr')].map(r => r.innerText)")
+    assert rows[0].split() == ["P01", "a", "b", "c"]
+
+
+CASES = (
+    the_state_is_shown,
+    one_big_button_begins,
+    a_red_check_wants_a_reason,
+    a_note_with_a_key,
+    a_second_page_only_looks_on,
+    lights_differ_in_more_than_colour,
+    a_break_is_shown,
+    the_key_leaves_the_address,
+    a_sheet_for_paper,
+)

@@ -1,0 +1,321 @@
+"""The phone's page: what it sends, draws and says, with a good browser and with those that lack something."""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+from typing import Any
+
+from tests.browser.chromium import Tab
+from tests.browser.live.acts import (
+    fake_sensors,
+    fingers,
+    is_seen,
+    key,
+    mouse,
+    place,
+    sized,
+    text,
+    touch,
+    value,
+    wait_for,
+)
+from tests.browser.live.samples import Message, running, show, welcome
+from tests.browser.live.server import LiveServer, until
+
+_NO_WAKE_LOCK = "Object.defineProperty(navigator, 'wakeLock', {value: undefined})"
+_DENIED = "DeviceMotionEvent.requestPermission = async () => 'denied'"
+_DENIED_WITHOUT_TAP = """
+DeviceMotionEvent.requestPermission = async () => {
+  if (!navigator.userActivation.isActive) throw new DOMException("no tap", "NotAllowedError");
+  return "granted";
+};"""
+_COUNTS_LOCKS = """
+globalThis.locks = 0;
+const request = WakeLock.prototype.request;
+WakeLock.prototype.request = function (...words) { globalThis.locks += 1; return request.apply(this, words); };"""
+
+
+def _greets(task: Message) -> Any:
+    def answer(server: LiveServer, role: str, message: Message) -> None:
+        if message["type"] == "hello":
+            server.say(role, **task)
+            server.say(role, **running())
+
+    return answer
+
+
+def _opened(tab: Tab, server: LiveServer, *, sensors: bool = True, script: str = "", **task: Any) -> None:
+    """The page, begun by touch, in a task."""
+    server.answer = _greets(welcome(**task))
+    sized(tab, 854, 480)
+    if sensors:
+        fake_sensors(tab)
+    if script:
+        tab.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+    tab.open(f"{server.address}/phone")
+    wait_for(tab, "#start")
+    touch(tab, "#start")
+    server.wait("phone", "hello")
+
+
+def _shown(server: LiveServer, n: int, x: float = -550.0) -> Message:
+    server.say("phone", **show(n, x))
+    until(lambda: any(drawn["n"] == n for drawn in server.said("phone", "drawn")), f"{n} is drawn")
+    return server.said("phone", "drawn")[-1]
+
+
+def readings_go_out_as_the_browser_gives_them(tab: Tab, server: LiveServer) -> None:
+    """Motion in m/s² and °/s with its signs, orientation as a quaternion, a hello that says what this phone can."""
+    _opened(tab, server)
+    hello = server.wait("phone", "hello")[0]
+    assert {name: hello[name] for name in ("permission", "secure", "wake_lock")} == {
+        "permission": "granted",
+        "secure": True,
+        "wake_lock": True,
+    }
+    assert hello["screen"] == {"w": 854, "h": 480, "ratio": 1}
+    motions = server.wait("phone", "motion", 30)
+    assert [round(part, 1) for part in motions[0]["a"]] == [0.1, 9.8, 0.3]
+    assert [round(part) for part in motions[0]["r"]] == [29, 14, -7]
+    steps = [later["seq"] - sooner["seq"] for sooner, later in pairwise(motions)]
+    assert set(steps) == {1}
+    assert all(later["t"] > sooner["t"] for sooner, later in pairwise(motions))
+    turned = server.wait("phone", "orientation", 2)[-1]
+    assert [round(part, 2) for part in turned["q"]] == [0.1, 0.2, 0.3, 0.93]
+    assert turned["absolute"] is False
+
+
+def flipped_signs_are_passed_on(tab: Tab, server: LiveServer) -> None:
+    """A browser that gives gravity with the other sign is not corrected here."""
+    fake_sensors(tab, up=-9.8)
+    _opened(tab, server, sensors=False)
+    assert round(server.wait("phone", "motion")[0]["a"][1], 1) == -9.8
+
+
+def pings_tell_the_clock(tab: Tab, server: LiveServer) -> None:
+    """Frequent at first; each brings the four times of the answer before."""
+    _opened(tab, server)
+    pings = server.wait("phone", "ping", 20)
+    assert "last" not in pings[0]
+    lasts = [ping["last"] for ping in pings if "last" in ping]
+    assert len(lasts) >= 15
+    assert all(last["t1"] <= last["t4"] and last["t2"] <= last["t3"] for last in lasts)
+    assert {last["t1"] for last in lasts} <= {ping["t1"] for ping in pings}
+
+
+def the_newest_estimate_wins(tab: Tab, server: LiveServer) -> None:
+    """Of many that come at once the last is drawn, older ones never, and each drawn one is acknowledged once."""
+    _opened(tab, server)
+    for n in range(1, 41):
+        server.say("phone", **show(n))
+    until(lambda: server.said("phone", "drawn")[-1:] != [] and server.said("phone", "drawn")[-1]["n"] == 40, "40 drawn")
+    numbers = [drawn["n"] for drawn in server.said("phone", "drawn")]
+    assert numbers == sorted(set(numbers))
+
+
+def a_press_names_what_was_seen(tab: Tab, server: LiveServer) -> None:
+    """By finger, mouse and key: one selection each, with the number that was drawn and the instant of touching."""
+    _opened(tab, server)
+    drawn = _shown(server, 7)
+    point = place(tab, "#select")
+    fingers(tab, "touchStart", point)
+    assert value(tab, "#select", "it.classList.contains('pressed')")
+    server.say("phone", **show(8))
+    time.sleep(0.08)
+    fingers(tab, "touchEnd")
+    chosen = server.wait("phone", "select")[0]
+    assert chosen["n"] == 7
+    assert chosen["t"] >= drawn["t"] - 1
+    assert 60 <= chosen["pressed_ms"] <= 400
+    sized(tab, 1440, 900)
+    _shown(server, 9)
+    point = place(tab, "#select")
+    for kind in ("mousePressed", "mouseReleased"):
+        mouse(tab, kind, point["x"], point["y"])
+    _shown(server, 10)
+    key(tab, " ")
+    assert [select["n"] for select in server.wait("phone", "select", 3)] == [7, 9, 10]
+    time.sleep(0.6)
+    assert len(server.said("phone", "select")) == 3
+
+
+def silence_greys_the_picture(tab: Tab, server: LiveServer) -> None:
+    """Without news for 0.3 s: wait, and no selection; with news it goes on."""
+    _opened(tab, server)
+    _shown(server, 1)
+    assert not value(tab, "#select", "it.disabled")
+    until(lambda: text(tab, "#message") == "Please wait", "it says wait")
+    assert value(tab, "#stage", "it.classList.contains('stale')")
+    assert value(tab, "#select", "it.disabled")
+    _shown(server, 2)
+    assert text(tab, "#message") == ""
+    assert not value(tab, "#stage", "it.classList.contains('stale')")
+
+
+def what_the_study_says_is_shown(tab: Tab, server: LiveServer) -> None:
+    """Countdown, words from the computer (as text only), the end, and that another phone is in use."""
+    _opened(tab, server)
+    server.say("phone", **running("countdown") | {"seconds_left": 2.2})
+    until(lambda: text(tab, "#message") == "3", "the countdown")
+    server.say("phone", type="say", text="<b>Wait.</b>")
+    until(lambda: text(tab, "#message") == "<b>Wait.</b>", "the words")
+    server.say("phone", type="say", text="")
+    for state, words in (("done", "is done"), ("second", "Another phone"), ("finished", "All tasks")):
+        server.say("phone", **running(state))
+        until(lambda words=words: words in text(tab, "#message"), state)  # type: ignore[misc]
+        assert value(tab, "#select", "it.disabled")
+
+
+def without_a_wake_lock_it_says_so(tab: Tab, server: LiveServer) -> None:
+    """What to set, and it goes on."""
+    _opened(tab, server, script=_NO_WAKE_LOCK)
+    assert server.wait("phone", "hello")[0]["wake_lock"] is False
+    wait_for(tab, "#problems")
+    assert "automatic lock" in text(tab, "#problem-list")
+    assert text(tab, "#go-on") == "Go on"
+    touch(tab, "#go-on")
+    _shown(server, 1)
+
+
+def without_permission_it_is_a_display(tab: Tab, server: LiveServer) -> None:
+    """It says what was denied and the way out, and can go on as a display."""
+    _opened(tab, server, script=_DENIED)
+    assert server.wait("phone", "hello")[0]["permission"] == "denied"
+    wait_for(tab, "#problems")
+    assert "does not let this page use the motion sensors" in text(tab, "#problem-list")
+    touch(tab, "#go-on")
+    _shown(server, 1)
+    assert server.said("phone", "motion") == []
+
+
+def without_sensors_it_says_so(tab: Tab, server: LiveServer) -> None:
+    """A browser whose sensors say nothing."""
+    _opened(tab, server, sensors=False)
+    assert server.wait("phone", "hello")[0]["permission"] == "unavailable"
+    wait_for(tab, "#problems")
+    assert "no motion readings" in text(tab, "#problem-list")
+
+
+def without_a_secure_connection_it_says_so(tab: Tab, server: LiveServer) -> None:
+    """Plain http from elsewhere than this machine."""
+    server.address = server.address.replace("127.0.0.1", "phone.test")
+    _opened(tab, server)
+    assert server.wait("phone", "hello")[0]["secure"] is False
+    wait_for(tab, "#problems")
+    assert "secure connection" in text(tab, "#problem-list")
+    assert "adb reverse" in text(tab, "#problem-list")
+
+
+def in_the_demo_the_mouse_is_the_hand(tab: Tab, server: LiveServer) -> None:
+    """No word of missing sensors; the pointer's place goes out, a click selects."""
+    _opened(tab, server, sensors=False, mouse=True)
+    wait_for(tab, "#picture")
+    assert not is_seen(tab, "#problems")
+    sized(tab, 1440, 900)
+    _shown(server, 1)
+    mouse(tab, "mouseMoved", 720, 450)
+    mouse(tab, "mouseMoved", 360, 225)
+
+    def is_there() -> bool:
+        said = server.said("phone", "mouse")[-1:]
+        return bool(said) and abs(said[0]["x"] + 500) < 3 and abs(said[0]["y"] - 750) < 3
+
+    until(is_there, "the mouse's last place is known")
+    _shown(server, 2)
+    for kind in ("mousePressed", "mouseReleased"):
+        mouse(tab, kind, 360, 225)
+    assert [select["n"] for select in server.wait("phone", "select")] == [2]
+
+
+def a_reload_goes_on_without_a_tap(tab: Tab, server: LiveServer) -> None:
+    """Back by itself, with its motion, and nothing is sent twice."""
+    _opened(tab, server)
+    _shown(server, 3)
+    touch(tab, "#select")
+    server.wait("phone", "select")
+    tab.open(f"{server.address}/phone")
+    server.wait("phone", "hello", 2)
+    _shown(server, 4)
+    assert len(server.said("phone", "select")) == 1
+    server.received["phone"] = []
+    server.wait("phone", "motion", 5)
+
+
+def a_reload_that_needs_a_tap_asks_for_it(tab: Tab, server: LiveServer) -> None:
+    """A browser that gives motion only within a tap."""
+    _opened(tab, server, script=_DENIED_WITHOUT_TAP)
+    tab.open(f"{server.address}/phone")
+    wait_for(tab, "#start")
+    touch(tab, "#start")
+    assert server.wait("phone", "hello", 2)[1]["permission"] == "granted"
+
+
+def a_break_is_mended(tab: Tab, server: LiveServer) -> None:
+    """After a lost connection the page comes back by itself, and says meanwhile what is the matter."""
+    _opened(tab, server)
+    _shown(server, 1)
+    server.cut("phone")
+    until(lambda: "was lost" in text(tab, "#message"), "it says so")
+    assert value(tab, "#select", "it.disabled")
+    server.wait("phone", "hello", 2)
+    _shown(server, 2)
+    assert text(tab, "#message") == ""
+
+
+def a_page_that_is_not_signed_in_stops(tab: Tab, server: LiveServer) -> None:
+    """It says what to do, and does not try for ever."""
+    _opened(tab, server)
+    server.refuses.add("phone")
+    server.cut("phone")
+    until(lambda: "scan the code" in text(tab, "#message"), "it says so")
+    time.sleep(1.2)
+    assert len(server.said("phone", "hello")) == 1
+
+
+def a_phone_that_slept_says_so(tab: Tab, server: LiveServer) -> None:
+    """Hidden and seen again: both are told, and the wake lock is asked for anew."""
+    _opened(tab, server, script=_COUNTS_LOCKS)
+    before = tab.evaluate("locks")
+    for seen in ("hidden", "visible"):
+        tab.evaluate(
+            f"Object.defineProperty(document, 'visibilityState', {{value: '{seen}', configurable: true}});"
+            "document.dispatchEvent(new Event('visibilitychange'))"
+        )
+    assert [message["visible"] for message in server.wait("phone", "visible", 2)] == [False, True]
+    until(lambda: tab.evaluate("locks") == before + 1, "the lock is asked for again")
+
+
+def left_handers_have_the_button_left(tab: Tab, server: LiveServer) -> None:
+    """And the page remembers it."""
+    _opened(tab, server)
+    assert place(tab, "#select")["x"] > 700
+    tab.evaluate("sessionStorage.clear()")
+    tab.open(f"{server.address}/phone")
+    wait_for(tab, "#start")
+    touch(tab, "#left-handed")
+    touch(tab, "#start")
+    server.wait("phone", "hello", 2)
+    until(lambda: place(tab, "#select")["x"] < 150, "the button is left")
+
+
+CASES = (
+    readings_go_out_as_the_browser_gives_them,
+    flipped_signs_are_passed_on,
+    pings_tell_the_clock,
+    the_newest_estimate_wins,
+    a_press_names_what_was_seen,
+    silence_greys_the_picture,
+    what_the_study_says_is_shown,
+    without_a_wake_lock_it_says_so,
+    without_permission_it_is_a_display,
+    without_sensors_it_says_so,
+    without_a_secure_connection_it_says_so,
+    in_the_demo_the_mouse_is_the_hand,
+    a_reload_goes_on_without_a_tap,
+    a_reload_that_needs_a_tap_asks_for_it,
+    a_break_is_mended,
+    a_page_that_is_not_signed_in_stops,
+    a_phone_that_slept_says_so,
+    left_handers_have_the_button_left,
+)
