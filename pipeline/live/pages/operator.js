@@ -14,8 +14,9 @@ const texts = await loadTexts("operator");
 const at = (id) => document.getElementById(id);
 const announce = announcer(at("changed"), texts);
 let state = null;
+let stateAt = 0;
 let count = 0;
-const asked = new Map(); // id -> what was asked for
+const asked = new Map(); // id -> { what, text }, not answered yet
 
 fill(document, texts);
 if (location.hash) await exchangeKey();
@@ -25,6 +26,7 @@ const link = new Link("operator", {
   status: (name) => {
     at("connection").textContent = name === "open" ? "" : texts.common.connection[name];
     at("connection").hidden = name === "open";
+    if (name !== "open") asked.clear(); // what was under way may have been done or not: the state will tell
     if (state) showButtons();
   },
 });
@@ -41,6 +43,7 @@ function receive(message) {
 
 function showState(message) {
   state = message;
+  stateAt = performance.now();
   at("study").textContent = state.study;
   at("demo").hidden = !state.demo;
   at("read-only").hidden = !state.read_only;
@@ -58,21 +61,31 @@ function showNow() {
   const { now, phase, agreement } = state;
   at("phase").textContent = texts.phase[phase];
   at("who").textContent = now ? filled(texts.who, { participant: now.participant, task: taskName(texts, `${now.task}`) }) : "";
-  at("clock").textContent = now ? clock(now) : "";
+  showClock();
   at("agreement").hidden = !agreement;
   if (agreement) at("agreement").textContent = filled(texts.agreement, { mm: power(agreement.mm), n: agreement.n });
 }
 
-function clock({ trial, seconds, seconds_left }) {
-  if (seconds_left !== null && seconds_left !== undefined) return filled(texts.countdown, { seconds: Math.ceil(seconds_left) });
-  return trial ? filled(texts.trial, { trial, seconds: Math.round(seconds) }) : "";
+// The state comes with each change only, so the seconds since then are counted here.
+function showClock() {
+  at("clock").textContent = state?.now ? clock(state.now, (performance.now() - stateAt) / 1000) : "";
 }
+
+function clock({ trial, seconds, seconds_left: left }, since) {
+  if (state.phase === "countdown" && Number.isFinite(left)) {
+    return filled(texts.countdown, { seconds: Math.max(0, Math.ceil(left - since)) });
+  }
+  const running = state.phase === "running";
+  return trial ? filled(texts.trial, { trial, seconds: Math.floor(seconds + (running ? since : 0)) }) : "";
+}
+
+setInterval(showClock, 200);
 
 // 1.2e-12 as 1.2·10⁻¹²
 function power(value) {
   const [digits, exponent] = value.toExponential(1).split("e");
   const raised = [...exponent.replace("+", "")].map((sign) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(sign)]).join("");
-  return value === 0 || value >= 0.01 ? `${value}` : `${digits}·10${raised}`;
+  return value === 0 || value >= 0.01 ? `${Number(value.toPrecision(3))}` : `${digits}·10${raised}`;
 }
 
 function showProblems() {
@@ -123,30 +136,37 @@ document.addEventListener("click", (event) => {
 });
 
 async function wish(what) {
+  if ([...asked.values()].some((one) => one.what === what)) return; // a double click
   const red = what === "start" && state.checks.some(({ light }) => light === "red");
-  if (!red && !NEEDS_REASON.has(what)) return ask(what, "");
-  const text = await reason(what);
-  return text === null ? null : ask(what, text);
+  if (red || NEEDS_REASON.has(what)) await askWithReason(what, "");
+  else ask(what, "");
+}
+
+async function askWithReason(what, why) {
+  const text = await reason(what, why);
+  if (text !== null) ask(what, text);
 }
 
 function ask(what, text) {
   const id = `d${Date.now().toString(36)}-${(count += 1)}`;
-  asked.set(id, what);
+  asked.set(id, { what, text });
   at("answer").textContent = link.send({ type: "do", what, text, id }) ? "" : texts.common.connection.lost;
 }
 
 function answered({ type, id, why }) {
-  const what = asked.get(id);
+  const { what, text } = asked.get(id) ?? {};
   asked.delete(id);
   at("answer").textContent = type === "refused" ? filled(texts.refused, { why }) : what === "note" ? texts.noted : "";
+  if (type === "refused" && what === "start" && !text) askWithReason(what, why); // a reason may overrule it
 }
 
 // A typed reason; null where it was thought better of.
-function reason(what) {
+function reason(what, why) {
   const dialog = at("reason");
   const name = what === state.next.do ? state.next.label : texts.do[what];
   at("reason-title").textContent = filled(texts.reason.title, { what: name });
   at("reason-do").textContent = texts.do[what];
+  at("reason-why").textContent = why;
   at("reason-text").value = "";
   at("reason-missing").hidden = true;
   dialog.returnValue = "";

@@ -20,6 +20,7 @@ const phone = {
   link: null,
   permission: "unavailable",
   wakeLock: null,
+  battery: null,
   task: null, // the last `welcome`
   state: { state: "waiting" },
   estimate: null, // the last `show`
@@ -40,10 +41,20 @@ leftHanded.addEventListener("change", () => localStorage.setItem("left-handed", 
 
 async function start() {
   const asked = askPermission(); // first of all: a browser that asks does so only right after the tap
-  document.documentElement.requestFullscreen?.().then(() => screen.orientation.lock?.("landscape")).catch(() => {});
+  fillScreen();
   phone.permission = await asked;
   await keepAwake();
   await begin();
+}
+
+// Where the browser can; it is as well without.
+async function fillScreen() {
+  try {
+    await document.documentElement.requestFullscreen();
+    await screen.orientation.lock("landscape");
+  } catch {
+    // iPhones have neither
+  }
 }
 
 // After a reload nobody need tap again where the browser lets it be; a phone that is back at once goes on with its trial.
@@ -63,7 +74,9 @@ async function begin() {
     if (!comes) phone.permission = "unavailable";
   }
   phone.link = new Link("phone", { hello, receive, status, pings: true });
-  watchBattery();
+  phone.battery = await navigator.getBattery?.().catch(() => null);
+  phone.battery?.addEventListener("levelchange", sendBattery);
+  sendBattery();
 }
 
 function hello() {
@@ -89,11 +102,8 @@ document.addEventListener("visibilitychange", async () => {
   if (visible && phone.link) await keepAwake(); // the browser takes the lock away whenever the page is hidden
 });
 
-async function watchBattery() {
-  const battery = await navigator.getBattery?.().catch(() => null);
-  const send = () => phone.link.send({ type: "battery", level: battery.level });
-  battery?.addEventListener("levelchange", send);
-  if (battery) send();
+function sendBattery() {
+  if (phone.battery) phone.link.send({ type: "battery", level: phone.battery.level });
 }
 
 // ── What is wrong with this browser, and the way out
@@ -154,7 +164,8 @@ function takeTask(message) {
 
 function status(name) {
   phone.connection = name;
-  if (name !== "open") phone.estimate = null; // what was on the screen before a break is no news after it
+  if (name === "open") sendBattery();
+  else phone.estimate = null; // what was on the screen before a break is no news after it
   show();
 }
 

@@ -9,6 +9,7 @@ const CROWDED = 4429;
 const NEVER_OPENED = 4; // tries after which "connecting" turns into advice
 const PING_MS = { first: 50, later: 250 };
 const FIRST_PINGS_MS = 2000;
+const SILENT_MS = 1500; // without a pong: a phone that slept or changed its network may hold a dead connection for minutes
 const CLOGGED_BYTES = 8192; // about 50 readings: more would only arrive late
 
 // ms since the epoch of this page's clock; of an event where its time stamp is given.
@@ -27,7 +28,7 @@ export class Link {
   }
 
   connect() {
-    this.status(this.everOpen ? "lost" : this.failures < NEVER_OPENED ? "connecting" : "unreachable");
+    this.status(this.trouble);
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket/${this.role}`);
     this.socket = socket;
     socket.onopen = () => this.opened();
@@ -35,9 +36,14 @@ export class Link {
     socket.onclose = (event) => this.closed(event.code);
   }
 
+  get trouble() {
+    if (this.everOpen) return "lost";
+    return this.failures < NEVER_OPENED ? "connecting" : "unreachable";
+  }
+
   opened() {
     this.everOpen = true;
-    this.openedAt = performance.now();
+    this.openedAt = this.heardAt = performance.now();
     this.send(this.hello());
     this.status("open");
     if (this.pings) this.ping();
@@ -46,6 +52,7 @@ export class Link {
   received(text) {
     this.failures = 0; // not at opening: a server that closes at once is not to be asked four times a second
     const arrived = clockMs();
+    this.heardAt = performance.now();
     const message = JSON.parse(text);
     if (message.type !== "pong") this.receive(message);
     else this.answered = { t1: message.t1, t2: message.t2, t3: message.t3, t4: arrived };
@@ -57,18 +64,30 @@ export class Link {
       this.status("forbidden");
       return;
     }
-    this.status(code === CROWDED ? "crowded" : this.everOpen ? "lost" : "connecting");
     const delay = DELAYS_MS[Math.min(this.failures, DELAYS_MS.length - 1)];
     this.failures += 1;
+    this.status(code === CROWDED ? "crowded" : this.trouble);
     setTimeout(() => this.connect(), delay);
   }
 
   // Each ping also brings the four times of the last answered one: the server cannot know when its pong arrived.
   ping() {
+    if (performance.now() - this.heardAt > SILENT_MS) {
+      this.abandon();
+      return;
+    }
     this.send({ type: "ping", t1: clockMs(), ...(this.answered && { last: this.answered }) });
     this.answered = undefined;
     const wait = performance.now() - this.openedAt < FIRST_PINGS_MS ? PING_MS.first : PING_MS.later;
     this.nextPing = setTimeout(() => this.ping(), wait);
+  }
+
+  // Not waiting for the other end to agree to closing, which a dead connection never does.
+  abandon() {
+    const { socket } = this;
+    Object.assign(socket, { onopen: null, onmessage: null, onclose: null });
+    socket.close();
+    this.closed();
   }
 
   get open() {

@@ -263,6 +263,27 @@ def a_break_is_mended(tab: Tab, server: LiveServer) -> None:
     assert text(tab, "#message") == ""
 
 
+def a_dead_connection_is_given_up(tab: Tab, server: LiveServer) -> None:
+    """A phone that slept may hold a connection that nobody answers: it connects anew."""
+    _opened(tab, server)
+    _shown(server, 1)
+    server.is_deaf = True
+    server.wait("phone", "hello", 2)
+    server.is_deaf = False
+    _shown(server, 2)
+
+
+def a_page_that_cannot_connect_says_why(tab: Tab, server: LiveServer) -> None:
+    """The page has loaded, its socket is refused: a certificate that is not trusted yet, or a firewall."""
+    server.unreachable.add("phone")
+    tab.open(f"{server.address}/phone")
+    wait_for(tab, "#start")
+    touch(tab, "#start")
+    until(lambda: "certificate" in text(tab, "#message"), "it says why")
+    server.unreachable.clear()
+    server.wait("phone", "hello")
+
+
 def a_page_that_is_not_signed_in_stops(tab: Tab, server: LiveServer) -> None:
     """It says what to do, and does not try for ever."""
     _opened(tab, server)
@@ -315,6 +336,8 @@ CASES = (
     a_reload_goes_on_without_a_tap,
     a_reload_that_needs_a_tap_asks_for_it,
     a_break_is_mended,
+    a_dead_connection_is_given_up,
+    a_page_that_cannot_connect_says_why,
     a_page_that_is_not_signed_in_stops,
     a_phone_that_slept_says_so,
     left_handers_have_the_button_left,

@@ -37,6 +37,8 @@ class LiveServer:
         self.answer = answer
         self.received: dict[str, list[Message]] = {"operator": [], "phone": [], "questionnaire": []}
         self.refuses: set[str] = set()
+        self.unreachable: set[str] = set()
+        self.is_deaf = False
         self.address = ""
         self._open: dict[str, list[WebSocket]] = {role: [] for role in self.received}
         self._loop = asyncio.new_event_loop()
@@ -70,6 +72,8 @@ class LiveServer:
     async def connection(self, opened: WebSocket) -> None:
         """One page's connection, from its first message to its last."""
         role = opened.path_params["role"]
+        if role in self.unreachable:
+            return await opened.close()
         await opened.accept()
         if role in self.refuses:
             return await opened.close(4403)
@@ -78,6 +82,8 @@ class LiveServer:
             while True:
                 message = json.loads(await opened.receive_text())
                 self.received[role].append(message)
+                if message["type"] == "ping" and self.is_deaf:
+                    continue
                 if message["type"] == "ping":
                     now = time.time_ns() / 1e6
                     await opened.send_text(json.dumps({"type": "pong", "t1": message["t1"], "t2": now, "t3": now}))
