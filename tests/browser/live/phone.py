@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import time
 from itertools import pairwise
 from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.browser.chromium import Tab
 from tests.browser.live.acts import (
@@ -91,6 +95,25 @@ def flipped_signs_are_passed_on(tab: Tab, server: LiveServer) -> None:
     fake_sensors(tab, up=-9.8)
     _opened(tab, server, sensors=False)
     assert round(server.wait("phone", "motion")[0]["a"][1], 1) == -9.8
+
+
+def angles_serve_where_there_is_no_finer_sensor(tab: Tab, server: LiveServer) -> None:
+    """`deviceorientation` becomes the quaternion that SciPy makes of its angles, which turn about z, x', y''."""
+    _opened(tab, server, script="delete globalThis.RelativeOrientationSensor")
+    angles = {"alpha": 30, "beta": -40, "gamma": 50, "absolute": True}
+    tab.evaluate(f"dispatchEvent(new DeviceOrientationEvent('deviceorientation', {json.dumps(angles)}))")
+    until(lambda: any(said["absolute"] for said in server.said("phone", "orientation")), "the orientation comes")
+    turned = next(said for said in server.said("phone", "orientation") if said["absolute"])
+    wanted = Rotation.from_euler("ZXY", [30, -40, 50], degrees=True).as_quat()
+    assert np.allclose(turned["q"], wanted, atol=1e-6)
+
+
+def a_phone_held_still_says_its_orientation(tab: Tab, server: LiveServer) -> None:
+    """Browsers say an orientation only when it changes; what holds is sent again, with a number of its own."""
+    _opened(tab, server)
+    turned = server.wait("phone", "orientation", 8)
+    assert {later["seq"] - sooner["seq"] for sooner, later in pairwise(turned)} == {1}
+    assert all(later["t"] - sooner["t"] > 100 for sooner, later in pairwise(turned[-5:]))
 
 
 def pings_tell_the_clock(tab: Tab, server: LiveServer) -> None:
@@ -323,6 +346,8 @@ def left_handers_have_the_button_left(tab: Tab, server: LiveServer) -> None:
 CASES = (
     readings_go_out_as_the_browser_gives_them,
     flipped_signs_are_passed_on,
+    angles_serve_where_there_is_no_finer_sensor,
+    a_phone_held_still_says_its_orientation,
     pings_tell_the_clock,
     the_newest_estimate_wins,
     a_press_names_what_was_seen,
