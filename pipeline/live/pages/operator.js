@@ -101,7 +101,8 @@ function showLinks() {
   at("links").replaceChildren(...state.links.map(({ role, url, qr }) => {
     const item = element("li", "");
     const code = Object.assign(element("img", ""), { src: qr, alt: texts.link[role], width: 200, height: 200 });
-    item.append(element("p", texts.link[role]), code, element("code", url));
+    const link = Object.assign(element("a", url), { href: url, target: "_blank", rel: "noopener" }); // on this machine too
+    item.append(element("p", texts.link[role]), code, link);
     return item;
   }));
 }
