@@ -12,7 +12,7 @@ from pipeline.report.prose.preregistration_page import Circumstances, page, unan
 from pipeline.statistics import planned_effects
 from pipeline.statistics.planned_effects import PlannedEffect, effect_for
 from pipeline.study.comparison import Comparison
-from pipeline.study.folder import PREREGISTERED, SETTINGS_FILE, TABLE_FIELDS, load_study
+from pipeline.study.folder import PREREGISTERED, SETTINGS_FILE, load_study
 from pipeline.study.preregistration import frozen_text, registered_of
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
@@ -73,9 +73,9 @@ def _write(path: Path, text: str) -> None:
 
 def _existing_data(folder: Path, study: Study) -> Iterator[str]:
     """The tables and logs of the study that exist already; a participants table holds a plan, not data."""
-    for field in TABLE_FIELDS:
-        name = getattr(study, field)
-        if field not in ("participants", "printed") and name is not None and (folder / name).is_file():
+    for field, name in study.files.items():
+        is_plan = field in ("participants", "printed") or field.startswith("pictures.")
+        if not is_plan and (folder / name).is_file():
             yield name
     if study.sessions is not None:
         parent = (folder / study.sessions).parent

@@ -6,6 +6,7 @@ from pipeline.engine.jobs import Jobs
 from pipeline.engine.stage import Outcome, Work
 from pipeline.report.document import html, pdf
 from pipeline.report.document.model import Document
+from pipeline.report.own_pictures import own_pictures
 from pipeline.report.sections import glossary, participants, paste, traces
 from pipeline.report.sections.material import ORIGINS, Material
 from pipeline.report.sections.order import SECTIONS
@@ -48,4 +49,5 @@ def _material(work: Work, jobs: Jobs) -> Material:
         work.out / "figures",
         work.inputs,
         jobs,
+        own_pictures(work),
     )

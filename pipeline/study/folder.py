@@ -18,9 +18,6 @@ PREREGISTERED = "preregistered.yaml"
 FIXED_NAMES = (PREREGISTERED,)  # files that a study may have, and that no key of study.yaml names
 
 
-TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed", "repeats")  # files of a study
-
-
 def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
     """The settings of a study folder. Raises PipelineError, naming the file, the field, the fault and the remedy.
 
@@ -35,13 +32,11 @@ def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
     content = read_yaml(path)
     content.setdefault("title", folder.resolve().name)
     study = parse(Study, content, path)
-    for field in TABLE_FIELDS:
-        name = getattr(study, field)
-        if name is not None:
-            file = inside(folder, name, f"{path}: {field}", must_exist=False)
-            if not file.is_file() and not to_be_made:
-                made = f"; it is made by: steadyhand simulate {folder}" if study.simulation is not None else ""
-                raise PipelineError(f'{path}: {field}: there is no file "{name}" in the study folder{made}')
+    for field, name in study.files.items():
+        file = inside(folder, name, f"{path}: {field}", must_exist=False)
+        if not file.is_file() and not to_be_made:
+            made = f"; it is made by: steadyhand simulate {folder}" if study.simulation is not None else ""
+            raise PipelineError(f'{path}: {field}: there is no file "{name}" in the study folder{made}')
     if study.sessions is not None:
         inside(folder, study.sessions, f"{path}: sessions", must_exist=False)
     return study

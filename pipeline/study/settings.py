@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.study.comparison import Comparison
 from pipeline.study.fields import Axes, Finite, Frozen, Id, Positive, known, unique
+from pipeline.study.pictures import OwnPicture
 from pipeline.study.preregistration_settings import Preregistration
 from pipeline.study.recording import Recording
 from pipeline.study.scoring_settings import Scoring
@@ -105,6 +106,10 @@ class QualityLimits(Frozen):
         return self
 
 
+TABLE_FIELDS = ("participants", "trials", "questionnaires", "measures", "printed", "repeats")
+"""The keys that name a table of the study, or its printed figures."""
+
+
 class Study(Frozen):
     """A study folder's settings. A contrast is first − second in the order of `conditions`."""
 
@@ -142,6 +147,7 @@ class Study(Frozen):
     task: Task | None = None
     simulation: Simulation | None = None
     recording: Recording | None = None
+    pictures: tuple[OwnPicture, ...] = ()
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
@@ -205,6 +211,13 @@ class Study(Frozen):
             ):
                 ways_named = f"{ways[comparison.family]} and {comparison.adjust}"
                 raise ValueError(f'comparisons: family "{comparison.family}" is adjusted by {ways_named}; keep one')
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The files of the study that its keys name, beside the logs: tables and pictures, each by its key."""
+        tables = {key: getattr(self, key) for key in TABLE_FIELDS}
+        pictures = {f"pictures.{place}.file": picture.file for place, picture in enumerate(self.pictures)}
+        return {key: name for key, name in {**tables, **pictures}.items() if name is not None}
 
     @property
     def asked_pairs(self) -> tuple[tuple[str, str], ...]:

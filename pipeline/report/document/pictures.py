@@ -33,9 +33,10 @@ class Picture:
 
 def pictures(figures: Path, names: Sequence[str], budget_bytes: int = BUDGET_BYTES) -> dict[str, Picture]:
     """The figures of these file names in a folder, each for a page; together within the budget if pixels can do it."""
-    found = {name: Picture(_vector_url((figures / name).read_text(encoding="utf-8")), False) for name in names}
+    found = {name: Picture(_url_of(figures / name), False) for name in names}
     total = sum(len(picture.url) for picture in found.values())
-    for name in sorted(found, key=lambda name: -len(found[name].url)):
+    drawn = [name for name in found if name.endswith(".svg")]
+    for name in sorted(drawn, key=lambda name: -len(found[name].url)):
         if total <= budget_bytes:
             break
         pixels = Picture(_pixel_url(figures, name), True)
@@ -43,6 +44,14 @@ def pictures(figures: Path, names: Sequence[str], budget_bytes: int = BUDGET_BYT
             total += len(pixels.url) - len(found[name].url)
             found[name] = pixels
     return found
+
+
+def _url_of(path: Path) -> str:
+    """As it is: a drawing, or a picture of the study's own."""
+    if path.suffix == ".svg":
+        return _vector_url(path.read_text(encoding="utf-8"))
+    kind = "png" if path.suffix == ".png" else "jpeg"
+    return f"data:image/{kind};base64," + base64.b64encode(path.read_bytes()).decode()
 
 
 def _vector_url(svg: str) -> str:

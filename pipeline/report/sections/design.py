@@ -25,6 +25,7 @@ def section(material: Material) -> Section:
     if study.shown:
         displays = [f"{condition} displayed the estimator {name}" for condition, name in study.shown.items()]
         blocks.append(Paragraph((Strong("Display: "), f"{listing(displays)}.")))
+    blocks += material.own_pictures
     blocks += _design_check(material)
     notes: list[Text] = [(ORIGINS[study.data_origin],)]
     if study.notes.strip():

@@ -50,6 +50,7 @@ class Material:
     figures: Path
     inputs: Mapping[str, str]
     jobs: Jobs = field(default_factory=Jobs)
+    own_pictures: tuple[Figure, ...] = ()
 
     @cached_property
     def measures(self) -> pd.DataFrame:
