@@ -41,22 +41,47 @@ def found() -> str:
     raise BrowserError("there is no Chromium here; on Debian and Ubuntu: sudo apt install chromium")
 
 
-class Tab:
-    """One page. What it asks for and complains of is gathered in `events`."""
+class _Pipe:
+    """The browser's commands and what it says, of all pages."""
 
     def __init__(self, write: int, read: int) -> None:
         self._write, self._read, self._buffer, self._count = write, read, b"", 0
-        self.session: str | None = None
+        self.tabs: dict[str | None, Tab] = {}
+
+    def send(self, method: str, parameters: Event, session: str | None) -> int:
+        """Send a command; its number."""
+        self._count += 1
+        message: Event = {"id": self._count, "method": method, "params": parameters}
+        if session is not None:
+            message["sessionId"] = session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        return self._count
+
+    def next(self, deadline: float) -> Event:
+        """What the browser says next. BrowserError where it says nothing until then."""
+        while b"\0" not in self._buffer:
+            ready, _, _ = select.select([self._read], [], [], max(deadline - time.monotonic(), 0))
+            part = os.read(self._read, 1 << 20) if ready else b""
+            if not part:
+                raise BrowserError("the browser stopped, or did not answer in time")
+            self._buffer += part
+        text, _, self._buffer = self._buffer.partition(b"\0")
+        event: Event = json.loads(text)
+        return event
+
+
+class Tab:
+    """One page. What it asks for and complains of is gathered in `events`."""
+
+    def __init__(self, pipe: _Pipe, session: str | None = None) -> None:
+        self._pipe, self._session = pipe, session
         self.events: list[Event] = []
+        pipe.tabs[session] = self
 
     def call(self, method: str, **parameters: Any) -> Any:
         """A command's answer."""
-        self._count += 1
-        message: Event = {"id": self._count, "method": method, "params": parameters}
-        if self.session is not None:
-            message["sessionId"] = self.session
-        os.write(self._write, json.dumps(message).encode() + b"\0")
-        answer = self._until(lambda event: event.get("id") == message["id"])
+        number = self._pipe.send(method, parameters, self._session)
+        answer = self._until(lambda event: event.get("id") == number)
         if "error" in answer:
             raise BrowserError(f"{method}: {answer['error']['message']}")
         return answer["result"]
@@ -74,24 +99,19 @@ class Tab:
             raise BrowserError(answer["exceptionDetails"].get("exception", {}).get("description", "a script failed"))
         return answer["result"].get("value")
 
+    def another(self) -> Tab:
+        """One more page of the same browser, in a window of its own: what is behind others may not be drawn."""
+        target = self.call("Target.createTarget", url="about:blank", newWindow=True)["targetId"]
+        return _attached(self._pipe, self, target)
+
     def _until(self, wanted: Callable[[Event], bool]) -> Event:
         deadline = time.monotonic() + _PATIENCE_S
         while True:
-            event = self._next(deadline)
-            if wanted(event):
+            event = self._pipe.next(deadline)
+            owner = self._pipe.tabs.get(event.get("sessionId"), self)
+            if owner is self and wanted(event):
                 return event
-            self.events.append(event)
-
-    def _next(self, deadline: float) -> Event:
-        while b"\0" not in self._buffer:
-            ready, _, _ = select.select([self._read], [], [], max(deadline - time.monotonic(), 0))
-            part = os.read(self._read, 1 << 20) if ready else b""
-            if not part:
-                raise BrowserError("the browser stopped, or did not answer in time")
-            self._buffer += part
-        text, _, self._buffer = self._buffer.partition(b"\0")
-        event: Event = json.loads(text)
-        return event
+            owner.events.append(event)
 
 
 @contextmanager
@@ -114,7 +134,7 @@ def tab(*flags: str) -> Iterator[Tab]:
         os.close(to_browser)
         os.close(from_browser)
         try:
-            yield _attached(Tab(ours_out, ours_in))
+            yield Tab(_Pipe(ours_out, ours_in)).another()
         finally:
             os.close(ours_out)
             process.terminate()
@@ -122,9 +142,9 @@ def tab(*flags: str) -> Iterator[Tab]:
             os.close(ours_in)
 
 
-def _attached(opened: Tab) -> Tab:
-    target = opened.call("Target.createTarget", url="about:blank")["targetId"]
-    opened.session = opened.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+def _attached(pipe: _Pipe, opener: Tab, target: str) -> Tab:
+    session = opener.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+    opened = Tab(pipe, session)
     for domain in ("Page", "Runtime", "Network", "Log"):
         opened.call(f"{domain}.enable")
     return opened
