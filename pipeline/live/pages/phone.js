@@ -1,6 +1,7 @@
 // The phone's page: it sends its motion, draws the newest estimate at each frame, and says which one was on the screen when
 // the button was pressed. What task it is, what is a trial and what counts is the server's; it knows no condition's name.
 
+import { calibrate, pxPerMm } from "./calibrate.js";
 import { draw, handAt, placed } from "./picture.js";
 import { buttonSize, listenToPresses } from "./press.js";
 import { askPermission, startMotion } from "./sensors.js";
@@ -9,6 +10,7 @@ import { fill, filled, loadTexts, taskName } from "./texts.js";
 
 const STALE_MS = 300; // without news: the picture is not to be trusted
 const MOUSE_EVERY_MS = 1000 / 60;
+const BUTTON_MARGIN_PX = 16;
 const ACTIVE = new Set(["practice", "running"]);
 
 const texts = await loadTexts("phone");
@@ -113,9 +115,14 @@ function problems() {
   return [sensors, phone.wakeLock ? null : "no_wake_lock"].filter(Boolean);
 }
 
-function showProblems() {
-  const found = problems();
-  if (!found.length || phone.problemsSeen || phone.task.mouse) return;
+// What has to be seen to before the picture: what the browser lacks, and the size of a mm where the window has its own.
+function showNext() {
+  const found = phone.problemsSeen || phone.task.mouse ? [] : problems();
+  if (found.length) showProblems(found);
+  else showOnly(phone.task.window === "true_size" && !pxPerMm() ? "calibration" : "stage");
+}
+
+function showProblems(found) {
   const words = found.flatMap((name) => [["dt", name], ["dd", `${name}_remedy`]]);
   at("problem-list").replaceChildren(...words.map(([tag, name]) => element(tag, texts.problem[name])));
   at("go-on").textContent = texts.problem[found[0] === "no_wake_lock" ? "go_on" : "display_only"];
@@ -132,15 +139,16 @@ function element(tag, text) {
 at("start").addEventListener("click", start);
 at("go-on").addEventListener("click", () => {
   phone.problemsSeen = true;
-  showOnly("stage");
+  showNext();
 });
+calibrate({ card: at("card"), slider: at("card-size"), button: at("card-fits") }, showNext);
 at("try-again").addEventListener("click", () => {
   sessionStorage.removeItem("started"); // a page loaded anew asks anew, within a tap
   location.reload();
 });
 
 function showOnly(id) {
-  for (const part of ["begin", "problems", "stage"]) at(part).hidden = part !== id;
+  for (const part of ["begin", "problems", "calibration", "stage"]) at(part).hidden = part !== id;
   if (id === "stage") fit();
 }
 
@@ -158,8 +166,7 @@ function receive(message) {
 
 function takeTask(message) {
   phone.task = message;
-  showProblems();
-  fit();
+  showNext();
 }
 
 function status(name) {
@@ -205,8 +212,9 @@ function fit() {
   if (!phone.task || !width) return;
   Object.assign(picture, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  phone.box = placed(phone.task, width, height, side());
   const size = buttonSize(phone.task.button.mm);
+  const largest = phone.task.window === "true_size" ? (pxPerMm() ?? Infinity) : Infinity;
+  phone.box = placed(phone.task, width, height, { side: side(), room: size + BUTTON_MARGIN_PX, largest });
   Object.assign(button.style, { width: `${size}px`, height: `${size}px` });
   stage.classList.toggle("left", side() === "left");
   const { box } = phone;

@@ -1,18 +1,20 @@
 // What the phone shows: a window onto the canvas, centred on the newest estimate, with the path, the targets and a cross.
 //
 // Lengths are mm of the canvas, y upwards, until `toScreen`. The window keeps its shape and is as large as the screen
-// allows; where the screen is longer than the window, it lies away from the button, so that the button covers nothing.
+// allows, or as it is in truth; where the screen is longer, the window leaves the button its room, so that it covers nothing.
 
 const CHEVRON_EVERY_MM = 60; // arrowheads along the path: at a crossing nobody need guess which way to go
 const CROSS_PX = 9;
 
-// The window on the screen: left, top, width, height in CSS px, and px per mm.
-export function placed(task, width, height, side) {
+// The window on the screen: left, top, width, height in CSS px, and px per mm, which are at most `largest`. The button is on
+// `side` and wants `room` px.
+export function placed(task, width, height, { side, room, largest }) {
   const [width_mm, height_mm] = task.window_mm ?? extent(task);
-  const scale = Math.min(width / width_mm, height / height_mm);
+  const scale = Math.min(width / width_mm, height / height_mm, largest);
   const box = { width: width_mm * scale, height: height_mm * scale, scale };
   const spare = width - box.width;
-  return { ...box, left: side === "right" ? 0 : spare, top: width > height ? (height - box.height) / 2 : 0 };
+  const away = Math.max(0, Math.min(spare / 2, spare - room)); // from the edge that is not the button's
+  return { ...box, left: side === "right" ? away : spare - away, top: width > height ? (height - box.height) / 2 : 0 };
 }
 
 function extent({ canvas_x_mm: [x0, x1], canvas_y_mm: [y0, y1] }) {

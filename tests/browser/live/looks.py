@@ -54,6 +54,14 @@ def _phone_lacks(tab: Tab, server: LiveServer) -> None:
     tab.call("Page.removeScriptToEvaluateOnNewDocument", identifier=added)
 
 
+def _phone_is_measured(tab: Tab, server: LiveServer) -> None:
+    tab.evaluate("sessionStorage.setItem('started', 'yes')")
+    tab.open(f"{server.address}/phone")
+    server.wait("phone", "hello")
+    server.say("phone", **welcome(window="true_size"))
+    wait_for(tab, "#calibration")
+
+
 def _questionnaire(content: dict[str, object] | None) -> Scene:
     def scene(tab: Tab, server: LiveServer) -> None:
         tab.open(f"{server.address}/questionnaire?lang=de")
@@ -88,6 +96,7 @@ SCENES: dict[str, Scene] = {
     "phone, a task": _phone_runs,
     "phone, words": _phone_stands,
     "phone, something is missing": _phone_lacks,
+    "phone, how large": _phone_is_measured,
     "questionnaire, nothing yet": _questionnaire(None),
     "questionnaire, NASA-TLX": _questionnaire(form(mental=0, physical=20)),
     "questionnaire, pairs": _questionnaire(form(True, **dict.fromkeys(TLX, 3))),

@@ -330,6 +330,30 @@ def a_phone_that_slept_says_so(tab: Tab, server: LiveServer) -> None:
     until(lambda: tab.evaluate("locks") == before + 1, "the lock is asked for again")
 
 
+def the_window_has_its_true_size(tab: Tab, server: LiveServer) -> None:
+    """Where the study wants it, a bank card is asked for once, and the window's mm are the screen's."""
+    _opened(tab, server, window="true_size", window_mm=[60, 34])
+    wait_for(tab, "#calibration")
+    value(tab, "#card-size", "it.focus()")
+    key(tab, "Home")
+    key(tab, "ArrowRight", 50)
+    box = value(tab, "#card", "[it.offsetWidth, it.offsetHeight]")
+    assert box == [round(85.6 * 4), round(53.98 * 4)]
+    touch(tab, "#card-fits")
+    _shown(server, 1)
+    inside, outside = (_is_painted(tab, x) for x in (427 - 118, 427 - 122))
+    assert (inside, outside) == (True, False)
+    tab.open(f"{server.address}/phone")
+    server.wait("phone", "hello", 2)
+    _shown(server, 2)
+    assert not is_seen(tab, "#calibration")
+
+
+def _is_painted(tab: Tab, x: int) -> bool:
+    pixel = f"it.getContext('2d').getImageData({x}, {480 // 2 - 50}, 1, 1).data[3]"
+    return bool(value(tab, "#picture", pixel) == 255)
+
+
 def left_handers_have_the_button_left(tab: Tab, server: LiveServer) -> None:
     """And the page remembers it."""
     _opened(tab, server)
@@ -365,5 +389,6 @@ CASES = (
     a_page_that_cannot_connect_says_why,
     a_page_that_is_not_signed_in_stops,
     a_phone_that_slept_says_so,
+    the_window_has_its_true_size,
     left_handers_have_the_button_left,
 )

@@ -17,7 +17,7 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
 
 from tests.conftest import CLONE
 
@@ -47,7 +47,7 @@ class LiveServer:
         """Send to every open page of a role."""
         for one in tuple(self._open[role]):
             # A page may just have gone.
-            with suppress(RuntimeError, WebSocketDisconnect):
+            with suppress(WebSocketDisconnect, WebSocketDisconnected):
                 asyncio.run_coroutine_threadsafe(one.send_text(json.dumps(message)), self._loop).result(5)
 
     def cut(self, role: str, code: int = 1012) -> None:
@@ -89,7 +89,7 @@ class LiveServer:
                     await opened.send_text(json.dumps({"type": "pong", "t1": message["t1"], "t2": now, "t3": now}))
                 else:
                     await asyncio.to_thread(self.answer, self, role, message)
-        except WebSocketDisconnect:
+        except (WebSocketDisconnect, WebSocketDisconnected):
             pass
         finally:
             self._open[role].remove(opened)
