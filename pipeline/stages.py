@@ -14,7 +14,7 @@ STAGES: tuple[Stage, ...] = (
         "ingest",
         "session",
         "pipeline.sessions.ingest:run",
-        settings=("streams", "events", "conditions", "task"),
+        settings=("streams", "events", "log_limits", "conditions", "task"),
         reads_log=True,
         label="reading logs",
     ),

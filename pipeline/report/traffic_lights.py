@@ -117,7 +117,7 @@ def _stream_figures(study: Study, row: Row, usual_hz: float | None) -> Iterator[
         if row["gap_max_s"] is not None:
             yield figure("Longest gap", f"{number(row['gap_max_s'])} s", _above(row["gap_max_s"], limits.gap_s))
         if row["latency_s"] is not None:
-            delay_s = row["latency_s"] + (stream.latency_s if stream.stamp == "arrival" else 0.0)
+            delay_s = row["latency_s"] + (stream.latency_s if stream.stamped_on_arrival else 0.0)
             yield figure("Delay", f"{number(delay_s)} s", _above(abs(delay_s), limits.latency_s))
         if row["jitter_ms"] is not None:
             yield figure(

@@ -14,8 +14,9 @@ from pipeline.errors import SessionError, did_you_mean
 from pipeline.sessions.checks import check_rows
 from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.logs import read_log
-from pipeline.sessions.logs.log import Log, Readings, Wanted
+from pipeline.sessions.logs.log import Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
+from pipeline.sessions.wanted import of_events, of_stream, wanted_by
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.study.streams import Stream
@@ -29,23 +30,13 @@ _DAY_NS = 86_400e9
 _SAME_CLOCK_S = 3600.0
 _TOPICS_MAX = 40  # named in a message
 _LATE_S = 0.5  # what an estimator remembers by default
-_CONTENT = {
-    "acceleration": "acceleration",
-    "position": "position",
-    "velocity": "position",
-    "linear": "position",
-    "reference": "position",
-    "display": "position",
-}
 
 
 def run(work: Work) -> Outcome:
     """One session's positions, imu, events, quality and checks; SessionError with the reason if it cannot be used."""
     study, session = work.study, work.session
-    wanted = [Wanted(stream.topic, _CONTENT[stream.kind]) for stream in study.streams.values()]  # type: ignore[arg-type]
-    if study.events is not None:
-        wanted.append(Wanted(study.events.topic, "events"))
-    log = read_log(session.path, wanted)
+    limits = Limits(study.log_limits.unpacked_mib * 2**20, study.log_limits.messages)
+    log = read_log(session.path, wanted_by(study), limits)
     participant, condition = _participant_and_condition(session, log, study)
     in_part = list(log.faults)
     quality: list[Row] = []
@@ -114,7 +105,7 @@ def _stream(log: Log, name: str, stream: Stream, in_part: list[str]) -> Readings
 
     Raises SessionError where a sensor is missing, empty or unreadable, or its clock was set back.
     """
-    readings = log.topics.get(stream.topic)
+    readings = log.topics.get(of_stream(stream).key)
     fault = None
     if readings is None:
         fault = f'stream "{name}": topic {stream.topic} is not in the log{_nearest(stream.topic, log)}'
@@ -159,12 +150,10 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
         notes.append(f"{int((~in_time).sum())} samples left out: their time is more than a day off")
     late_s = float(np.median(readings.arrival_ns - readings.stamp_ns)) * S_PER_NS
     if stream.kind in _NEEDED and abs(late_s) > _SAME_CLOCK_S:
-        raise SessionError(
-            f"topic {stream.topic}: stamps and arrivals are {abs(late_s):.0f} s apart, so they are not of one clock"
-        )
+        raise SessionError(f"topic {stream.topic}: {_of_two_clocks(readings, late_s)}")
     keep = finite & in_time
     delay_s = (readings.arrival_ns - readings.stamp_ns)[keep] * S_PER_NS
-    delay_s = delay_s + (stream.latency_s if stream.stamp == "arrival" else 0.0)
+    delay_s = delay_s + (stream.latency_s if stream.stamped_on_arrival else 0.0)
     if np.any(delay_s > _LATE_S):
         notes.append(
             f"{int((delay_s > _LATE_S).sum())} samples arrive over {_LATE_S:g} s late, and may come too late to fuse"
@@ -174,6 +163,16 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
         if unknown:
             notes.append(f"{unknown} samples without an orientation in the log")
     return Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep]), notes
+
+
+def _of_two_clocks(readings: Readings, late_s: float) -> str:
+    """What is wrong with stamps far from the arrivals, and what can be written in study.yaml."""
+    if not readings.stamp_ns.any():
+        return "every stamp is zero: the sender does not stamp; write `stamp: log_time` to take the times of arrival"
+    return (
+        f"stamps and arrivals are {abs(late_s):.0f} s apart, so they are not of one clock; if the stamps of all "
+        "streams are of one (a simulation's, say), write `arrival: stamps` in each to leave the times of arrival aside"
+    )
 
 
 def _table(session: str, name: str, stream: Stream, readings: Readings) -> pa.Table:
@@ -202,7 +201,7 @@ def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[p
     nothing = tables.of_rows("events", [])
     if study.events is None:
         return nothing, None, 0
-    readings = log.topics.get(study.events.topic)
+    readings = log.topics.get(of_events(study.events).key)
     if readings is None or (readings.read == 0 and not readings.notes):
         in_part.append(f"events: topic {study.events.topic} holds none")
         return nothing, None, 0

@@ -157,7 +157,7 @@ def _vectors(rows: Columns, stream: Stream, origin_ns: int) -> Samples:
     value = np.column_stack([rows[column] for column in columns])
     if isinstance(stream, ReferenceStream) and len(value):
         value = rotate(np.array(stream.rotation_xyzw), value) + np.array(stream.translation_mm)
-    late = stream.stamp == "arrival" or stream.kind in ("reference", "display")
+    late = stream.stamped_on_arrival or stream.kind in ("reference", "display")
     return samples(*_times(rows, stream.latency_s if late else 0.0), value, origin_ns)
 
 
@@ -174,7 +174,7 @@ def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Sample
     for name, stream in study.sensor_streams.items():
         if isinstance(stream, AccelerationStream):
             rows = tables.of_stream(imu, name)
-            time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamp == "arrival" else 0.0)
+            time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamped_on_arrival else 0.0)
             times = (time_ns - origin_ns) * S_PER_NS, (arrival_ns - origin_ns) * S_PER_NS
             imu_readings = phone(rows, times, _of_space(sensor(study, stream)))
             logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])

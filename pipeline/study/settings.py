@@ -20,7 +20,17 @@ from pipeline.study.table_settings import Columns, Factor, Formats, Practice, Wi
 
 
 class Events(Frozen):
+    """The topic of events. `arrival: stamps` takes the times at which they were sent for those of their arrival."""
+
     topic: str
+    arrival: Literal["log", "stamps"] = "log"
+
+
+class LogLimits(Frozen):
+    """How much a log may hold before it is refused as damaged or malicious."""
+
+    unpacked_mib: Annotated[int, Field(gt=0, le=2**20)] = 64
+    messages: Annotated[int, Field(gt=0, le=10**9)] = 500_000
 
 
 class Display(Frozen):
@@ -123,6 +133,7 @@ class Study(Frozen):
     axes: Axes = ("x", "y", "z")
     streams: Mapping[str, Stream] = {}
     events: Events | None = None
+    log_limits: LogLimits = LogLimits()
     display: Display | None = None
     estimators: Mapping[str, Estimator] = {}
     shown: Mapping[Id, str] = {}

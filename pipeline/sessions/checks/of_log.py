@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
 from pipeline.sessions.checks.turns import turned
 from pipeline.sessions.logs.log import BoolArray, Log, Readings
+from pipeline.sessions.wanted import of_events, of_stream
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.study.simulation import Task
@@ -21,7 +22,8 @@ Placed = PositionStream | ReferenceStream | DisplayStream
 
 def of_log(log: Log, study: Study) -> Recorded:
     """The streams that study.yaml names and the log has."""
-    there = {name: log.topics[one.topic] for name, one in study.streams.items() if one.topic in log.topics}
+    keys = {name: of_stream(stream).key for name, stream in study.streams.items()}
+    there = {name: log.topics[key] for name, key in keys.items() if key in log.topics}
     read = [readings for readings in there.values() if readings.read]
     origin_ns = min((int(readings.arrival_ns.min()) for readings in read), default=0)
     positions, imus = [], []
@@ -33,7 +35,7 @@ def of_log(log: Log, study: Study) -> Recorded:
             imus.append(imu(name, readings, origin_ns, stream))
         elif isinstance(stream, PositionStream | ReferenceStream | DisplayStream):
             positions.append(of_positions(name, readings, origin_ns, stream))
-    happened = log.topics.get(study.events.topic) if study.events is not None else None
+    happened = log.topics.get(of_events(study.events).key) if study.events is not None else None
     task = study.task
     return Recorded(
         tuple(positions),
@@ -62,7 +64,7 @@ def task_targets_mm(task: Task | None) -> FloatArray | None:
 
 def times(readings: Readings, origin_ns: int, stream: Stream | None = None, left_out: int = 0) -> Times:
     """When readings were stamped and arrived, and how late the stamps are according to study.yaml."""
-    late = stream is not None and (stream.stamp == "arrival" or stream.kind in ("reference", "display"))
+    late = stream is not None and (stream.stamped_on_arrival or stream.kind in ("reference", "display"))
     late_s = stream.latency_s if stream is not None and late else 0.0
     return Times(readings.stamp_ns, readings.arrival_ns, origin_ns, late_s, left_out)
 

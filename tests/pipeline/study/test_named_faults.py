@@ -63,7 +63,8 @@ def test_streams_named_like_kinds_keep_their_names(folder: Folder) -> None:
         '"streams.tracker.noise_sd_mm": input should be greater than 0 (found -1)',
         'unknown key "streams.reference.translation"; did you mean "translation_mm"?',
         '"streams.display.topic" is missing',
-        'unknown key "streams.position.noise_sd_mm"; known: topic, stamp, latency_s, kind',
+        'unknown key "streams.position.noise_sd_mm"; known: topic, stamp, latency_s, arrival, '
+        "stamp_unit, child, parent, fields, kind, unit",
     ]
 
 

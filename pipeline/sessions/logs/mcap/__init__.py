@@ -6,10 +6,10 @@ it. `payload` decodes messages: many at once where their shape is known, unusual
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from pipeline.sessions.logs.log import Log, MessageType, Wanted
+from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, MessageType, Wanted
 from pipeline.sessions.logs.mcap.container import MAGIC, walk_log
 from pipeline.sessions.logs.mcap.payload import counted, decode
 from pipeline.sessions.logs.mcap.schemas import content_of
@@ -19,15 +19,22 @@ from pipeline.sessions.logs.mcap.writer import LogWriter, Message, in_order, wri
 __all__ = ["MAGIC", "LogWriter", "Message", "in_order", "read", "write"]
 
 
-def read(path: Path, wanted: Iterable[Wanted]) -> Log:
+def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
     """The wanted topics of a log, decoded. With nothing wanted, the messages of every topic are counted only.
 
     Raises SessionError for a file that is no log, is a decompression bomb, or contradicts itself.
     """
-    content_of = {want.topic: want.content for want in wanted}
-    walk = walk_log(path, content_of or None)
-    if content_of:
-        topics = {topic: decode(walk, topic, content) for topic, content in content_of.items() if topic in walk.topics}
+    wants = tuple(wanted)
+    walk = walk_log(path, frozenset(want.topic for want in wants) or None, limits)
+    return log_of(walk, wants)
+
+
+def log_of(walk: Walk, wants: Sequence[Wanted]) -> Log:
+    """The wanted topics of a log that was walked through; with nothing wanted, all of them, counted only."""
+    if wants:
+        topics = {
+            want.key: decode(walk, want.topic, want.content, want.source) for want in wants if want.topic in walk.topics
+        }
     else:
         topics = {topic: counted(walk, topic) for topic in walk.topics}
     return Log(walk.facts, topics, tuple(walk.faults), _types(walk))

@@ -92,5 +92,5 @@ def laid_out_alike(row: Bytes, content: str, stock: Callable[[bytes], Reading]) 
     view = probe.view(_layout("<" if row[1] else ">", len(row), body, content))[0]
     view["seconds"], view["nanoseconds"], view["numbers"] = -2, 3, 0.5 + np.arange(NUMBERS[content])
     ours = fields(probe, content)
-    expected = (int(ours.seconds[0]), int(ours.nanoseconds[0]), ours.values[0].tolist())
+    expected = Reading(int(ours.seconds[0]), int(ours.nanoseconds[0]), ours.values[0].tolist())
     return bool(ours.fits[0]) and stock(probe.tobytes()) == expected

@@ -6,10 +6,13 @@ It is for checks only: nothing is decoded by it and it never fails. Messages of 
 from __future__ import annotations
 
 import numpy as np
+from mcap.records import Channel
 
 from pipeline.sessions.logs.log import Claims, IntArray
 from pipeline.sessions.logs.mcap.cdr import NUMBERS
+from pipeline.sessions.logs.mcap.fields import Fields
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 from pipeline.sessions.logs.mcap.walk import Walk
 
 _NAME_BYTES, _NAME = 12, 16  # where the length of the frame's name stands, and its first byte
@@ -17,11 +20,15 @@ _ORIENTATION, _RATE_COVARIANCE, _FORCE_COVARIANCE = 0, 16, 28  # of the 37 numbe
 _UNKNOWN = -1.0
 
 
-def claimed(walk: Walk, messages: Messages, which: IntArray, content: str) -> Claims:
+def claimed(walk: Walk, messages: Messages, fields: Fields, which: IntArray, content: str) -> Claims:
     """The claims of some decoded messages, in their order."""
-    encoded = {number for number, channel in walk.channels.items() if channel.message_encoding == "cdr"}
+    if fields.parents:
+        return _by_fields(fields, which, content)
+    encoded = {number for number, channel in walk.channels.items() if _of_fixed_shape(walk, channel)}
     if not len(which) or not set(np.unique(messages.channel[which]).tolist()) <= encoded:
         return Claims()
+    if content == "velocity":
+        content = "position"
     names: dict[bytes, int] = {}
     frame = np.zeros(len(which), np.int64)
     numbers = np.zeros((len(which), NUMBERS[content]))
@@ -46,6 +53,26 @@ def claimed(walk: Walk, messages: Messages, which: IntArray, content: str) -> Cl
         numbers[:, _FORCE_COVARIANCE] == _UNKNOWN,
         numbers[:, _RATE_COVARIANCE] == _UNKNOWN,
     )
+
+
+def _of_fixed_shape(walk: Walk, channel: Channel) -> bool:
+    """Whether the frame's name stands where it does in the two commonest types in CDR."""
+    schema = walk.schemas.get(channel.schema_id)
+    return channel.message_encoding == "cdr" and schema is not None and schema.name in SCHEMAS.values()
+
+
+def _by_fields(fields: Fields, which: IntArray, content: str) -> Claims:
+    """What the general decoder has found; of a message without an angular velocity it is to be disregarded."""
+    names, frame = tuple(fields.parents), fields.parent[which]
+    if content != "acceleration":
+        return Claims(names, frame)
+    values = fields.values[which]
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.sqrt((values[:, 6:10] ** 2).sum(axis=1))
+    unknown = np.logical_or(values[:, 10] == _UNKNOWN, length == 0)
+    nothing = np.zeros(len(which), bool)
+    without_turning = (values[:, 3:6] == 0.0).all(axis=1)
+    return Claims(names, frame, np.where(unknown, np.nan, length), nothing, without_turning)
 
 
 def _frames(rows: np.ndarray[tuple[int, int], np.dtype[np.uint8]], names: dict[bytes, int]) -> IntArray:

@@ -8,26 +8,25 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
 
 from pipeline.errors import SessionError
-from pipeline.sessions.logs.log import Content
+from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits
 from pipeline.sessions.logs.mcap import damage
-from pipeline.sessions.logs.mcap.records import RECORD_HEAD, share_out, take_loose, take_record
+from pipeline.sessions.logs.mcap.file import unpacked
+from pipeline.sessions.logs.mcap.inflate import CHUNK_LIMIT
+from pipeline.sessions.logs.mcap.records import HOW_TO_LIFT, RECORD_HEAD, share_out, take_loose, take_record
 from pipeline.sessions.logs.mcap.resume import next_place
 from pipeline.sessions.logs.mcap.walk import Walk
 
 MAGIC = b"\x89MCAP0\r\n"
 
-# A log may unpack to 64 MiB, or to 64 times its own size if that is more: what goes beyond is a decompression bomb.
-_INFLATED_LIMIT = 64 * 2**20
+# A log may unpack to the study's limit, or to 64 times its own size if that is more: a decompression bomb goes beyond.
 _INFLATION_LIMIT = 64
-# A log may hold half a million messages, or one in 16 bytes if that is more: empty ones would exhaust the memory.
-_MESSAGES_LIMIT = 500_000
+# And it may hold the study's limit of messages, or one in 16 bytes if that is more: empty ones would fill the memory.
 _BYTES_PER_MESSAGE = 16
 _BLOCK = 2**20
 # Others, such as attachments, are skipped.
@@ -46,15 +45,20 @@ _USED = frozenset(
 )
 
 
-def walk_log(path: Path, wanted: Mapping[str, Content] | None) -> Walk:
+def walk_log(path: Path, wanted: frozenset[str] | None, limits: Limits = DEFAULT_LIMITS) -> Walk:
     """Everything of a log: its facts, its channels, and the messages of the wanted topics (of others the number only).
 
     With None, every topic is wanted whose schema says what it holds. SessionError if the file is no MCAP log, would
     unpack to far more bytes than any session has (a decompression bomb), or contradicts itself.
     """
     size = path.stat().st_size
-    walk = Walk(wanted, max(_INFLATED_LIMIT, _INFLATION_LIMIT * size), max(_MESSAGES_LIMIT, size // _BYTES_PER_MESSAGE))
-    with path.open("rb") as file:
+    walk = Walk(
+        wanted,
+        max(limits.unpacked_bytes, _INFLATION_LIMIT * size),
+        max(limits.messages, size // _BYTES_PER_MESSAGE),
+        max(limits.unpacked_bytes, CHUNK_LIMIT),
+    )
+    with unpacked(path, walk) as (file, size):
         _walk_file(walk, file, size)
     _adopt_orphans(walk)
     if walk.unlisted_faults:
@@ -91,7 +95,7 @@ def _walk_file(walk: Walk, file: BinaryIO, size: int) -> None:
             checksum = _skip_record(file, length, checksum)
             continue
         if length > walk.inflated_limit:
-            raise SessionError(f"refused: a record of {length // 2**20} MiB, which no session's log holds")
+            raise SessionError(f"refused: a record of {length // 2**20} MiB; {HOW_TO_LIFT}")
         body = file.read(length)
         if opcode == Opcode.DATA_END:
             _check_data_end(walk, body, before)

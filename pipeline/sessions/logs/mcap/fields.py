@@ -1,9 +1,10 @@
-"""The fields of a message, whatever its encoding: their names in known types, and the arrays for their values."""
+"""What has been decoded of a topic's messages, whatever their encoding, and what a decoder is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +14,8 @@ from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.records import BROKEN
 from pipeline.statistics.arrays import FloatArray
 
-WIDTHS: Mapping[str, int] = {"position": 3, "acceleration": 11}
-"""How many values are used: a position; specific force, angular velocity, orientation xyzw, its covariance's first."""
+WIDTHS: Mapping[str, int] = {"position": 3, "velocity": 3, "acceleration": 11}
+"""How many values are used: a vector; or specific force, angular velocity, orientation xyzw, its covariance's first."""
 
 UNFIT = "the bytes do not fit the schema"
 UNDECODABLE = (*BROKEN, AttributeError, TypeError, LookupError, RuntimeError)
@@ -22,27 +23,33 @@ UNDECODABLE = (*BROKEN, AttributeError, TypeError, LookupError, RuntimeError)
 
 PAYLOAD_LIMIT = 64 * 1024  # bytes; a sensor's message takes some hundred
 
-Path = tuple[str, ...]
 
-# Named as in ROS 2, or as in Foxglove's schemas (Point3InFrame, PoseInFrame).
-STAMPS: Sequence[Path] = (("header", "stamp"), ("timestamp",))
-SECONDS: Sequence[str] = ("sec", "seconds")
-NANOSECONDS: Sequence[str] = ("nanosec", "nsec", "nanos")
-POINTS: Sequence[Path] = (("point",), ("pose", "position"))
-FORCE, RATE, TURN, COVARIANCE = "linear_acceleration", "angular_velocity", "orientation", "orientation_covariance"
+class Reading(NamedTuple):
+    """A stamp's seconds and nanoseconds, the used values, and the names of the frames that a message speaks of."""
 
-Reading = tuple[int, int, list[float]]
-"""A stamp's seconds and nanoseconds, and the used values."""
+    seconds: int
+    nanoseconds: int
+    values: list[float]
+    child: str | None = None
+    parent: str | None = None
 
 
 @dataclass(frozen=True)
 class Fields:
-    """What n messages hold: stamps (n,), the used values (n, w), and which of the messages are decoded (n,)."""
+    """What n messages hold: stamps (n,), the used values (n, w), and which of the messages are decoded (n,).
+
+    `of_other_frame` are those that hold nothing of the wanted frame. `parent` (n,) counts into `parents`, the names of
+    the frames in which values are given, −1 where there is none; `children` are those of the frames that move.
+    """
 
     seconds: IntArray
     nanoseconds: IntArray
     values: FloatArray
     fits: npt.NDArray[np.bool_]
+    of_other_frame: npt.NDArray[np.bool_]
+    parent: IntArray
+    parents: dict[str, int] = field(default_factory=dict)
+    children: dict[str, int] = field(default_factory=dict)
 
     @staticmethod
     def none_of(count: int, content: str) -> Fields:
@@ -52,12 +59,36 @@ class Fields:
             np.zeros(count, np.int64),
             np.zeros((count, WIDTHS[content])),
             np.zeros(count, bool),
+            np.zeros(count, bool),
+            np.full(count, -1, np.int64),
         )
+
+    @staticmethod
+    def of(seconds: IntArray, nanoseconds: IntArray, values: FloatArray, fits: npt.NDArray[np.bool_]) -> Fields:
+        """Messages that speak of no frame."""
+        count = len(seconds)
+        return Fields(seconds, nanoseconds, values, fits, np.zeros(count, bool), np.full(count, -1, np.int64))
 
     def take(self, at: IntArray, of: Fields, which: IntArray) -> None:
         """Copy the messages `which` of `of` to the places `at`, and mark them as decoded."""
         self.seconds[at], self.nanoseconds[at] = of.seconds[which], of.nanoseconds[which]
         self.values[at], self.fits[at] = of.values[which], True
+
+    def take_named(self, at: IntArray, of: Fields, child: str | None, parent: str | None) -> None:
+        """Copy all messages of `of`, which speak of these frames, to the places `at`, and mark them as decoded."""
+        self.take(at, of, np.arange(len(at)))
+        self._name(at, child, parent)
+
+    def take_one(self, index: int, reading: Reading) -> None:
+        """Copy one message."""
+        self.seconds[index], self.nanoseconds[index], self.values[index] = reading[:3]
+        self._name(index, reading.child, reading.parent)
+
+    def _name(self, at: IntArray | int, child: str | None, parent: str | None) -> None:
+        if child is not None:
+            self.children.setdefault(child, len(self.children))
+        if parent is not None:
+            self.parent[at] = self.parents.setdefault(parent, len(self.parents))
 
 
 @dataclass(frozen=True)

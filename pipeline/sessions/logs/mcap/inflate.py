@@ -10,6 +10,7 @@ DAMAGED = (ValueError, zstandard.ZstdError, RuntimeError, EOFError)
 """What inflating a damaged chunk raises."""
 
 CHUNK_LIMIT = 128 * 2**20
+ZSTD_MARK = b"\x28\xb5\x2f\xfd"
 
 
 def inflate(chunk: Chunk) -> bytes:

@@ -18,59 +18,79 @@ import numpy as np
 import orjson
 from mcap.records import Channel, Schema
 
-from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.logs.log import USUAL, IntArray, Source
 from pipeline.sessions.logs.mcap.fields import (
-    COVARIANCE,
-    FORCE,
-    NANOSECONDS,
     PAYLOAD_LIMIT,
-    POINTS,
-    RATE,
-    SECONDS,
-    STAMPS,
-    TURN,
     WIDTHS,
     Decoder,
     Fields,
-    Path,
     Reading,
     check_size,
     check_stamp,
     holds_stamps,
 )
+from pipeline.sessions.logs.mcap.layout import (
+    COVARIANCE,
+    FORCE,
+    NANOSECONDS,
+    RATE,
+    SECONDS,
+    STAMPS,
+    TURN,
+    VECTORS,
+    NamePath,
+)
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.tree import Layouts, reading, with_numbers_for_iso_times
 from pipeline.statistics.arrays import FloatArray
 
 _BLOCK = 256  # messages: few enough that one unusual message does not cost much, and that objects do not pile up
 _UNUSUAL = (ValueError, TypeError, LookupError, OverflowError)
 
 
-def decoder(_: Channel, schema: Schema | None, content: str) -> Decoder:
+def decoder(_: Channel, schema: Schema | None, content: str, source: Source) -> Decoder:
     """The decoder of a channel. Raises ValueError if the schema is not a JSON schema; its name does not matter."""
     if schema is not None and schema.encoding not in ("jsonschema", ""):
         raise ValueError(f'its schema is written as "{schema.encoding}", not jsonschema')
+    usual = source == USUAL and content != "velocity"
+    layouts = Layouts("a JSON object", content, source)
 
     def one(payload: bytes) -> Reading:
         check_size(payload)
         message = json.loads(payload)
+        if not usual or _is_unusual(message, content):
+            for key in ("timestamp", "stamp"):
+                message = with_numbers_for_iso_times(message, key)
+            return reading(message, layouts.of(message), source)
         names = _names(message, content)
         seconds, nanoseconds = (_whole(message, path) for path in names.stamp)
         check_stamp(seconds, nanoseconds)
-        return seconds, nanoseconds, _figures(message, names, content)
+        return Reading(seconds, nanoseconds, _figures(message, names, content))
 
     def many(messages: Messages, which: IntArray, fields: Fields) -> None:
+        if not usual:
+            return
         for begin in range(0, len(which), _BLOCK):
             _decode_block(messages, which[begin : begin + _BLOCK], content, fields)
 
     return Decoder(one, many)
 
 
+def _is_unusual(message: object, content: str) -> bool:
+    """Whether a message has its fields where only `tree` looks for them: in arrays, or a stamp that is a text."""
+    if not isinstance(message, dict):
+        return False
+    in_array = isinstance(message.get("transforms"), list)
+    other_force = content == "acceleration" and FORCE not in message and ("accel" in message or "vector" in message)
+    return in_array or other_force or isinstance(message.get("timestamp", message.get("stamp")), str)
+
+
 @dataclass(frozen=True)
 class _Names:
     """Where a message has its stamp's two fields, its vectors, and its covariance if there is one."""
 
-    stamp: tuple[Path, Path]
-    vectors: Sequence[tuple[Path, str]]
+    stamp: tuple[NamePath, NamePath]
+    vectors: Sequence[tuple[NamePath, str]]
     oriented: bool
     covariance: bool
 
@@ -83,7 +103,7 @@ def _names(message: object, content: str) -> _Names:
     units = [_first_present(message, [(*stamp, name) for name in names])[-1] for names in (SECONDS, NANOSECONDS)]
     stamps = ((*stamp, units[0]), (*stamp, units[1]))
     if content == "position":
-        return _Names(stamps, [(_first_present(message, POINTS), "xyz")], False, False)
+        return _Names(stamps, [(_first_present(message, VECTORS["position"]), "xyz")], False, False)
     oriented = message.get(TURN) is not None
     return _Names(
         stamps,
@@ -93,7 +113,7 @@ def _names(message: object, content: str) -> _Names:
     )
 
 
-def _first_present(message: object, paths: Sequence[Path]) -> Path:
+def _first_present(message: object, paths: Sequence[NamePath]) -> NamePath:
     for path in paths:
         try:
             if _at(message, path) is not None:
@@ -103,7 +123,7 @@ def _first_present(message: object, paths: Sequence[Path]) -> Path:
     raise ValueError(f"it has no {' or '.join('.'.join(path) for path in paths)}")
 
 
-def _at(message: object, path: Path) -> object:
+def _at(message: object, path: NamePath) -> object:
     for depth, name in enumerate(path):
         if not isinstance(message, dict) or name not in message:
             raise ValueError(f"it has no {'.'.join(path[: depth + 1])}")
@@ -111,7 +131,7 @@ def _at(message: object, path: Path) -> object:
     return message
 
 
-def _whole(message: object, path: Path) -> int:
+def _whole(message: object, path: NamePath) -> int:
     value = _at(message, path)
     if type(value) is not int:
         raise ValueError(f"its {'.'.join(path)} is not a whole number")
@@ -154,7 +174,7 @@ def _decode_block(messages: Messages, which: IntArray, content: str, fields: Fie
         return
     if holds_stamps(seconds, nanoseconds).all():
         every = np.arange(len(which))
-        fields.take(which, Fields(seconds, nanoseconds, values, np.ones(len(which), bool)), every)
+        fields.take(which, Fields.of(seconds, nanoseconds, values, np.ones(len(which), bool)), every)
 
 
 def _matrix(parsed: Sequence[Any], names: _Names, content: str) -> FloatArray:
@@ -176,13 +196,13 @@ def _matrix(parsed: Sequence[Any], names: _Names, content: str) -> FloatArray:
     return values
 
 
-def _within(parsed: Sequence[Any], path: Path) -> Sequence[Any]:
+def _within(parsed: Sequence[Any], path: NamePath) -> Sequence[Any]:
     for name in path:
         parsed = list(map(itemgetter(name), parsed))
     return parsed
 
 
-def _column(parsed: Sequence[Any], path: Path, kinds: tuple[type, ...]) -> np.ndarray[Any, Any]:
+def _column(parsed: Sequence[Any], path: NamePath, kinds: tuple[type, ...]) -> np.ndarray[Any, Any]:
     return _array(_within(parsed, path), kinds)
 
 

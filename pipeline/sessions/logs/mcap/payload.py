@@ -14,11 +14,13 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from pipeline.errors import SessionError
-from pipeline.sessions.logs.log import Claims, Content, IntArray, Readings
+from pipeline.sessions.logs.log import USUAL, Claims, Content, IntArray, Readings, Source
 from pipeline.sessions.logs.mcap.claims import claimed
 from pipeline.sessions.logs.mcap.events import EVENTS_LIMIT, event
 from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields
 from pipeline.sessions.logs.mcap.messages import Messages, joined
+from pipeline.sessions.logs.mcap.packed import inflated
+from pipeline.sessions.logs.mcap.pick import OtherFrameError
 from pipeline.sessions.logs.mcap.schemas import SAMPLED
 from pipeline.sessions.logs.mcap.walk import Walk
 from pipeline.statistics.arrays import FloatArray
@@ -27,46 +29,65 @@ _DECODERS: Mapping[str, str] = {
     "cdr": "pipeline.sessions.logs.mcap.ros2",
     "protobuf": "pipeline.sessions.logs.mcap.protobuf",
     "json": "pipeline.sessions.logs.mcap.json_payload",
+    "ros1": "pipeline.sessions.logs.mcap.ros2",
 }
 """The module that reads an encoding, loaded when a log has it."""
 
 _TIME_LIMIT_NS = 2**62
-_PLAUSIBLE = {"position": 1e4, "acceleration": 1e5}  # m; m/s², rad/s: beyond it the bytes are something else
+_PLAUSIBLE = {
+    "position": 1e4,
+    "velocity": 1e4,
+    "acceleration": 1e5,
+}  # m; m/s; m/s², rad/s: beyond it the bytes are something else
 _TYPES_LIMIT = 64  # types of one topic, because following each schema takes time
 _REASON_LIMIT = 300  # characters: names in a log may be long
+_FRAMES_NAMED = 12
 _NOTES = 3  # reasons named one by one; messages with others are counted together
 
 Failures = dict[int, str]
 """Why a message cannot be read, by its index."""
 
 
-def decode(walk: Walk, topic: str, content: Content) -> Readings:
+def decode(walk: Walk, topic: str, content: Content, source: Source = USUAL) -> Readings:
     """A topic's messages, decoded as `content`; those that cannot be are counted as lost, and the notes say why."""
-    messages = joined(walk.topics[topic].parts)
     failures: Failures = {}
+    messages = inflated(joined(walk.topics[topic].parts), failures)
     stamp = np.minimum(messages.publish_time, _TIME_LIMIT_NS).astype(np.int64)
     values = np.zeros((len(messages), 0))
     events: dict[int, Mapping[str, object]] = {}
+    fields = None
     if content == "events":
         events = _events(walk, messages, failures)
     elif content != "anything":
-        stamp, values = _measured(walk, messages, content, failures)
+        fields = _decoded(walk, messages, content, source, failures)
+        stamp, values = _plausible(fields, content, source, failures)
     for index in np.flatnonzero(np.maximum(messages.log_time, messages.publish_time) > _TIME_LIMIT_NS).tolist():
         failures.setdefault(index, "its time is out of all range")
     is_readable = np.ones(len(messages), bool)
     is_readable[list(failures)] = False
+    if fields is not None:
+        is_readable &= ~fields.of_other_frame
     readable = np.flatnonzero(is_readable)
-    claims = claimed(walk, messages, readable, content) if content in SAMPLED else Claims()
     return Readings(
         stamp[readable],
         messages.log_time[readable].astype(np.int64),
         values[readable],
         tuple(events[index] for index in readable.tolist()) if content == "events" else (),
         _lost(walk, topic, len(failures)),
-        _notes(failures),
+        (*_notes(failures), *(_no_such_frame(fields, source) if fields is not None and not len(readable) else ())),
         content in SAMPLED,
-        claims,
+        Claims() if fields is None else claimed(walk, messages, fields, readable, content),
     )
+
+
+def _no_such_frame(fields: Fields, source: Source) -> tuple[str, ...]:
+    """A note where all messages are sound and none is of the wanted frame."""
+    if not fields.of_other_frame.any():
+        return ()
+    wanted = " and ".join(
+        f'{key} "{name}"' for key, name in (("child", source.child), ("parent", source.parent)) if name is not None
+    )
+    return (f"none of its messages is of {wanted}",)
 
 
 def counted(walk: Walk, topic: str) -> Readings:
@@ -102,8 +123,8 @@ def _lost(walk: Walk, topic: str, undecodable: int) -> int | None:
     return collected.in_damaged_chunks + undecodable
 
 
-def _measured(walk: Walk, messages: Messages, content: str, failures: Failures) -> tuple[IntArray, FloatArray]:
-    """Stamps (ns) and values of positions or accelerations."""
+def _decoded(walk: Walk, messages: Messages, content: str, source: Source, failures: Failures) -> Fields:
+    """What the messages hold; those that cannot be decoded are noted in `failures`."""
     fields = Fields.none_of(len(messages), content)
     decoders: dict[tuple[str, int], Decoder | str] = {}
     for channel_id, own in messages.by_channel():
@@ -113,52 +134,62 @@ def _measured(walk: Walk, messages: Messages, content: str, failures: Failures) 
             failures.update(dict.fromkeys(own.tolist(), f"its topic holds more than {_TYPES_LIMIT} types of messages"))
             continue
         if key not in decoders:
-            decoders[key] = _decoder(channel, walk.schemas.get(channel.schema_id), content)
+            decoders[key] = _decoder(channel, walk.schemas.get(channel.schema_id), content, source)
         decoder = decoders[key]
         if isinstance(decoder, str):
             failures.update(dict.fromkeys(own.tolist(), decoder))
             continue
         decoder.many(messages, own, fields)
-        for index in own[~fields.fits[own]].tolist():
+        for index in own[~(fields.fits | fields.of_other_frame)[own]].tolist():
+            if index in failures:
+                continue
             try:
-                fields.seconds[index], fields.nanoseconds[index], fields.values[index] = decoder.one(
-                    messages.payload(index)
-                )
+                fields.take_one(index, decoder.one(messages.payload(index)))
+            except OtherFrameError:
+                fields.of_other_frame[index] = True
             except UNDECODABLE as error:
                 failures[index] = _reason(error)
-    return _plausible(fields, content, failures)
+    if source.child is None and len(fields.children) > 1:
+        names = ", ".join(f'"{name}"' for name in list(fields.children)[:_FRAMES_NAMED])
+        reason = f"its topic holds the frames {names}; say in study.yaml which one is meant by `child:`"
+        failures.update(dict.fromkeys(range(len(messages)), _shortened(reason)))
+    return fields
 
 
-def _decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder | str:
+def _decoder(channel: Channel, schema: Schema | None, content: str, source: Source) -> Decoder | str:
     """The channel's decoder, by its encoding, or why there is none."""
     module = _DECODERS.get(channel.message_encoding)
     if module is None:
         return f'its encoding is "{channel.message_encoding}", not one of {", ".join(_DECODERS)}'
     try:
-        decoder: Decoder = import_module(module).decoder(channel, schema, content)
+        decoder: Decoder = import_module(module).decoder(channel, schema, content, source)
     except UNDECODABLE as error:
         return _reason(error)
     return decoder
 
 
 def _reason(error: Exception) -> str:
-    text = str(error) or type(error).__name__
+    return _shortened(str(error) or type(error).__name__)
+
+
+def _shortened(text: str) -> str:
     return text if len(text) <= _REASON_LIMIT else f"{text[:_REASON_LIMIT]} …"
 
 
-def _plausible(fields: Fields, content: str, failures: Failures) -> tuple[IntArray, FloatArray]:
+def _plausible(fields: Fields, content: str, source: Source, failures: Failures) -> tuple[IntArray, FloatArray]:
     """Stamps and values, where values beyond all range fail; NaN and infinity stay for the checks of the study.
 
     An orientation is NaN where the log says that it is unknown, or its length is not 1.
     """
-    motion = fields.values[:, : 3 if content == "position" else 6]
-    too_far = ((np.abs(motion) > _PLAUSIBLE[content]) & np.isfinite(motion)).any(axis=1)
+    motion = fields.values[:, : 6 if content == "acceleration" else 3]
+    scale = np.repeat([source.scale, source.turning_scale], 3)[: motion.shape[1]]
+    too_far = ((np.abs(motion * scale) > _PLAUSIBLE[content]) & np.isfinite(motion)).any(axis=1)
     no_stamp = (fields.nanoseconds < 0) | (fields.nanoseconds >= 1_000_000_000)
     for unfit, reason in ((no_stamp, UNFIT), (too_far, f"{UNFIT}: a figure is out of all range")):
         for index in np.flatnonzero(unfit).tolist():
             failures.setdefault(index, reason)
     stamp = fields.seconds * 1_000_000_000 + fields.nanoseconds
-    if content == "position":
+    if content != "acceleration":
         return stamp, motion
     turn = fields.values[:, 6:10]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -172,9 +203,13 @@ def _events(walk: Walk, messages: Messages, failures: Failures) -> dict[int, Map
         raise SessionError(f"refused: it holds {len(messages)} events, which no session does")
     events = {}
     for index in range(len(messages)):
+        if index in failures:
+            continue
         try:
             channel = walk.channels[int(messages.channel[index])]
-            events[index] = event(channel, messages.payload(index), _PLAUSIBLE["position"])
+            events[index] = event(
+                channel, walk.schemas.get(channel.schema_id), messages.payload(index), _PLAUSIBLE["position"]
+            )
         except UNDECODABLE as error:
             failures[index] = _reason(error)
     return events

@@ -5,6 +5,7 @@ Fields are found by their names in the log's own descriptor, so a message may be
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -16,28 +17,37 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from pipeline.sessions.logs.log import IntArray
+from pipeline.sessions.logs.log import USUAL, IntArray, Source
 from pipeline.sessions.logs.mcap.fields import (
-    COVARIANCE,
-    FORCE,
-    NANOSECONDS,
     PAYLOAD_LIMIT,
-    POINTS,
-    RATE,
-    SECONDS,
-    STAMPS,
-    TURN,
     UNFIT,
     Decoder,
     Fields,
-    Path,
     Reading,
     check_size,
     check_stamp,
 )
+from pipeline.sessions.logs.mcap.layout import (
+    COVARIANCE,
+    EACH,
+    FORCE,
+    NANOSECONDS,
+    RATE,
+    SECONDS,
+    STAMPS,
+    TURN,
+    VECTORS,
+    Kind,
+    NamePath,
+    Path,
+    find_layout,
+)
 from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.protobuf_template import Declined, Template
+from pipeline.sessions.logs.mcap.tree import leave_to_one, reading
 
+_DEPTH_LIMIT = 8
+_LEAVES_LIMIT = 2000
 _SCHEMA_LIMIT = 256 * 1024  # bytes; Foxglove's take up to ten thousand
 _TEMPLATES = 16  # tried for messages of one length; what fits none of them is left to the stock decoder
 _WHOLE_NUMBERS = frozenset(
@@ -51,23 +61,23 @@ _FIGURES = frozenset({FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT})
 class _Layout:
     """The paths of a stamp's two fields, of the used values, and of the messages that must be present."""
 
-    stamp: tuple[Path, Path]
-    figures: tuple[Path, ...]
-    needed: tuple[Path, ...]
+    stamp: tuple[NamePath, NamePath]
+    figures: tuple[NamePath, ...]
+    needed: tuple[NamePath, ...]
 
     @property
-    def leaves(self) -> tuple[Path, ...]:
+    def leaves(self) -> tuple[NamePath, ...]:
         """Stamp and figures, in the order of `Template.read`."""
         return (*self.stamp, *self.figures)
 
     @property
-    def parents(self) -> tuple[Path, ...]:
+    def parents(self) -> tuple[NamePath, ...]:
         """Every message on the way to a leaf."""
         ways = (leaf[:depth] for leaf in self.leaves for depth in range(len(leaf)))
         return tuple(dict.fromkeys(ways))
 
 
-def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
+def decoder(channel: Channel, schema: Schema | None, content: str, source: Source = USUAL) -> Decoder:
     """The decoder of a channel. Raises ValueError or McapError if the schema lacks needed fields or cannot be read."""
     if schema is None:
         raise ValueError("it has no schema, and protobuf cannot be read without")
@@ -81,6 +91,9 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         descriptor = decode(b"").DESCRIPTOR
     except (DecodeError, TypeError, KeyError) as error:
         raise ValueError(f"its schema cannot be read: {error}") from error
+    leaves = leaves_of(descriptor)
+    if source != USUAL or _is_unusual(leaves, content):
+        return _by_paths(decode, leaves, descriptor.full_name, content, source)
     layout = _layout(descriptor, content)
 
     def one(payload: bytes) -> Reading:
@@ -92,7 +105,7 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         _check_whole(message, layout)
         seconds, nanoseconds = (int(_value(message, path)) for path in layout.stamp)
         check_stamp(seconds, nanoseconds)
-        return seconds, nanoseconds, [float(_value(message, path)) for path in layout.figures]
+        return Reading(seconds, nanoseconds, [float(_value(message, path)) for path in layout.figures])
 
     def many(messages: Messages, which: IntArray, fields: Fields) -> None:
         for length in np.unique(messages.length[which]).tolist():
@@ -119,13 +132,56 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
     return Decoder(one, many)
 
 
+def _is_unusual(leaves: Mapping[Path, Kind], content: str) -> bool:
+    """Whether a type has its fields where only `tree` looks for them: in arrays, or under other names than Imu's."""
+    if content != "acceleration":
+        return content == "velocity" or any(path[:2] == ("transforms", EACH) for path in leaves)
+    return (FORCE, "x") not in leaves and any((*path, "x") in leaves for path in VECTORS[content])
+
+
+def _by_paths(
+    decode: Callable[[bytes], Any], leaves: Mapping[Path, Kind], name: str, content: str, source: Source
+) -> Decoder:
+    """A decoder by the stock package alone, for what templates do not take."""
+    layout = find_layout(leaves, name, content, source)
+
+    def one(payload: bytes) -> Reading:
+        check_size(payload)
+        try:
+            message = decode(payload)
+        except DecodeError as error:
+            raise ValueError(UNFIT) from error
+        return reading(message, layout, source)
+
+    return Decoder(one, leave_to_one)
+
+
+def leaves_of(descriptor: Descriptor) -> dict[Path, Kind]:
+    """The paths of the figures and texts in messages of a type."""
+    found: dict[Path, Kind] = {}
+
+    def descend(inner: Descriptor, path: Path) -> None:
+        for field in inner.fields:
+            own: Path = (*path, field.name, EACH) if field.is_repeated else (*path, field.name)
+            if field.message_type is not None:
+                if len(own) < _DEPTH_LIMIT and len(found) < _LEAVES_LIMIT:
+                    descend(field.message_type, own)
+            elif field.type in _FIGURES | _WHOLE_NUMBERS:
+                found[own] = "number"
+            elif field.type == FieldDescriptor.TYPE_STRING:
+                found[own] = "text"
+
+    descend(descriptor, ())
+    return found
+
+
 def _layout(descriptor: Descriptor, content: str) -> _Layout:
     """The paths of the needed fields. Raises ValueError that names one which is missing or of another type."""
     stamp = _first_present(descriptor, STAMPS)
     seconds = _first_present(descriptor, tuple((*stamp, name) for name in SECONDS))
     nanoseconds = _first_present(descriptor, tuple((*stamp, name) for name in NANOSECONDS))
     if content == "position":
-        point = _first_present(descriptor, POINTS)
+        point = _first_present(descriptor, VECTORS["position"])
         vectors = [(point, "xyz")]
     else:
         vectors = [((FORCE,), "xyz"), ((RATE,), "xyz"), ((TURN,), "xyzw")]
@@ -138,14 +194,14 @@ def _layout(descriptor: Descriptor, content: str) -> _Layout:
     return _Layout((seconds, nanoseconds), tuple(figures), needed)
 
 
-def _first_present(descriptor: Descriptor, paths: Any) -> Path:
+def _first_present(descriptor: Descriptor, paths: Any) -> NamePath:
     for path in paths:
         if _field(descriptor, path) is not None:
             return tuple(path)
     raise ValueError(f"its schema, {descriptor.full_name}, has no {' or '.join('.'.join(path) for path in paths)}")
 
 
-def _field(descriptor: Descriptor | None, path: Path) -> FieldDescriptor | None:
+def _field(descriptor: Descriptor | None, path: NamePath) -> FieldDescriptor | None:
     """The field at the end of the path, through single messages only; None where there is none."""
     field = None
     for name in path:
@@ -158,7 +214,7 @@ def _field(descriptor: Descriptor | None, path: Path) -> FieldDescriptor | None:
     return field
 
 
-def _check_type(descriptor: Descriptor, path: Path, kinds: frozenset[int]) -> None:
+def _check_type(descriptor: Descriptor, path: NamePath, kinds: frozenset[int]) -> None:
     field = _field(descriptor, path)
     if field is None:
         raise ValueError(f"its schema, {descriptor.full_name}, has no {'.'.join(path)}")
@@ -180,7 +236,7 @@ def _check_whole(message: Message, layout: _Layout) -> None:
             raise ValueError(UNFIT)
 
 
-def _value(message: Any, path: Path) -> Any:
+def _value(message: Any, path: NamePath) -> Any:
     """A field's value, the first one of a list; a field that is not sent is zero in protobuf."""
     for name in path:
         message = getattr(message, name)

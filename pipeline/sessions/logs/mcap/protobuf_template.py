@@ -15,7 +15,8 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
 from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.logs.mcap.cdr import Bytes
-from pipeline.sessions.logs.mcap.fields import Fields, Path, Reading, holds_stamps
+from pipeline.sessions.logs.mcap.fields import Fields, Reading, holds_stamps
+from pipeline.sessions.logs.mcap.layout import NamePath
 from pipeline.statistics.arrays import FloatArray
 
 _VARINT, _FIXED64, _LENGTH, _FIXED32 = 0, 1, 2, 5
@@ -65,7 +66,7 @@ class _Structure:
     """Which bits of a message are its shape (n,), and the places of its fields."""
 
     shape: Bytes
-    places: dict[Path, _Place] = field(default_factory=dict)
+    places: dict[NamePath, _Place] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,14 +83,14 @@ class Template:
     unsent: Sequence[float]
 
     @staticmethod
-    def of(row: Bytes, descriptor: Descriptor, leaves: Sequence[Path], one: Callable[[bytes], Reading]) -> Template:
+    def of(row: Bytes, descriptor: Descriptor, leaves: Sequence[NamePath], one: Callable[[bytes], Reading]) -> Template:
         """A template by this message: leaves are a stamp's seconds and nanoseconds, then figures.
 
         Raises Declined if the message holds anything unusual, or `one`, the stock decoder, reads other values; and
         whatever `one` raises for a message that it cannot read.
         """
         data = row.tobytes()
-        seconds, nanoseconds, values = one(data)
+        seconds, nanoseconds, values = one(data)[:3]
         structure = _Structure(np.zeros(len(row), np.uint8))
         _parse_fields(data, 0, len(data), descriptor, (), structure)
         at = np.flatnonzero(structure.shape)
@@ -110,7 +111,7 @@ class Template:
                 value = np.array([0.5 + index], f"<f{place.length}")
                 probe[place.begin : place.begin + place.length] = value.view(np.uint8)
         ours = self.read(probe[np.newaxis])
-        expected = (int(ours.seconds[0]), int(ours.nanoseconds[0]), ours.values[0].tolist())
+        expected = Reading(int(ours.seconds[0]), int(ours.nanoseconds[0]), ours.values[0].tolist())
         if not ours.fits[0] or one(probe.tobytes()) != expected:
             raise Declined
 
@@ -127,7 +128,7 @@ class Template:
                 with np.errstate(invalid="ignore"):  # float32 has NaNs that warn as they are widened
                     values[:, index - 2] = cells.view(f"<f{place.length}")[:, 0]
         fits = ((rows[:, self.at] & self.shape) == self.bits).all(axis=1)
-        return Fields(stamps[0], stamps[1], values, fits & holds_stamps(stamps[0], stamps[1]))
+        return Fields.of(stamps[0], stamps[1], values, fits & holds_stamps(stamps[0], stamps[1]))
 
 
 def _varints(cells: Bytes, kind: int) -> IntArray:
@@ -139,7 +140,9 @@ def _varints(cells: Bytes, kind: int) -> IntArray:
     return whole & 0xFFFFFFFF if kind == FieldDescriptor.TYPE_UINT32 else whole
 
 
-def _parse_fields(data: bytes, begin: int, end: int, descriptor: Descriptor, path: Path, structure: _Structure) -> None:
+def _parse_fields(
+    data: bytes, begin: int, end: int, descriptor: Descriptor, path: NamePath, structure: _Structure
+) -> None:
     """Note the shape and places of the fields from `begin` to `end`. Raises Declined for anything unusual.
 
     Of a field that is sent twice the last counts, as in protobuf.
@@ -155,7 +158,7 @@ def _parse_fields(data: bytes, begin: int, end: int, descriptor: Descriptor, pat
 
 
 def _parse_field(
-    data: bytes, at: int, end: int, known: FieldDescriptor, wire: int, path: Path, structure: _Structure
+    data: bytes, at: int, end: int, known: FieldDescriptor, wire: int, path: NamePath, structure: _Structure
 ) -> int:
     """Note one field's value, which begins at `at`; where it ends."""
     packed = known.is_repeated and wire == _LENGTH and known.type in _FLOATS

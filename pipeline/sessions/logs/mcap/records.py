@@ -21,7 +21,7 @@ from mcap.records import Channel, Chunk, McapRecord, MessageIndex, Metadata, Sch
 from pipeline.errors import SessionError
 from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.logs.mcap import damage
-from pipeline.sessions.logs.mcap.inflate import CHUNK_LIMIT, DAMAGED, check_stated_size, inflate
+from pipeline.sessions.logs.mcap.inflate import DAMAGED, check_stated_size, inflate
 from pipeline.sessions.logs.mcap.messages import joined, messages_at, record_starts
 from pipeline.sessions.logs.mcap.schemas import content_of
 from pipeline.sessions.logs.mcap.walk import Topic, Walk
@@ -33,6 +33,9 @@ BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError, Ove
 
 RECORD_HEAD = struct.Struct("<BQ")
 _BLOCK = 2**20
+HOW_TO_LIFT = (
+    "that is mostly a damaged or malicious file; if it is sound, write `log_limits: {unpacked_mib: N}` in study.yaml"
+)
 _DEFINITION_LIMIT = 2**20  # bytes of a schema or channel
 _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
@@ -83,7 +86,10 @@ def _take_records(walk: Walk, data: bytes) -> bool:
     starts_found, whole = record_starts(data, walk.messages_limit - walk.messages)
     walk.messages += len(starts_found)
     if walk.messages > walk.messages_limit:
-        raise SessionError(f"refused: it holds more than {walk.messages_limit} messages, too many for its size")
+        raise SessionError(
+            f"refused: it holds more than {walk.messages_limit} messages, too many for its size; if it is sound, write "
+            "`log_limits: {messages: N}` in study.yaml"
+        )
     starts = np.array(starts_found, dtype=np.int64)
     kinds = np.frombuffer(data, np.uint8)[starts]
     for start in starts[(kinds == int(Opcode.SCHEMA)) | (kinds == int(Opcode.CHANNEL))].tolist():
@@ -183,10 +189,11 @@ def _allow(walk: Walk, stated: int) -> None:
     walk.inflated += stated
     if walk.inflated > walk.inflated_limit:
         raise SessionError(
-            f"refused: it would inflate to more than {walk.inflated_limit // 2**20} MiB, which no session's log does"
+            f"refused: it would inflate to more than {walk.inflated_limit // 2**20} MiB, far more than its own size; "
+            f"{HOW_TO_LIFT}"
         )
-    if stated > CHUNK_LIMIT:
-        raise SessionError(f"refused: a chunk that inflates to {stated // 2**20} MiB, which no recorder writes")
+    if stated > walk.chunk_limit:
+        raise SessionError(f"refused: a chunk that would inflate to {stated // 2**20} MiB; {HOW_TO_LIFT}")
 
 
 def _note_broken(walk: Walk, opcode: int, error: BaseException) -> None:

@@ -1,43 +1,84 @@
-"""ROS 2 messages in CDR: many at once, or one by one by the stock decoder, which follows the log's definition."""
+"""ROS messages: which decoder a channel takes.
+
+The two commonest types in CDR have one of their own (`cdr`), and the stock decoder, which follows the log's definition,
+for what that declines. All others, and ROS 1, are read by `ros_message`.
+"""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from pipeline.sessions.logs.log import IntArray
-from pipeline.sessions.logs.mcap import cdr
+from pipeline.sessions.logs.log import IntArray, Source
+from pipeline.sessions.logs.mcap import cdr, ros_message, well_known
 from pipeline.sessions.logs.mcap.definition import check_definition
+from pipeline.sessions.logs.mcap.definition_text import parse, short_name
 from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields, Reading, check_stamp
 from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
+from pipeline.sessions.logs.mcap.wire import ROS1, wire_of
 
+_PLAIN_CDR = (0, 1)  # big-endian, little-endian
 _DEFINITIONS_CACHED = 16
 
 
-def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
+def decoder(channel: Channel, schema: Schema | None, content: str, source: Source) -> Decoder:
     """The decoder of a channel. Raises one of `UNDECODABLE` if the schema is of another type or cannot be followed."""
-    needed = SCHEMAS[content]
-    if schema is None or schema.name != needed:
-        holds = "no schema" if schema is None else schema.name
-        raise ValueError(f"it holds {holds}, and a stream of kind {content} needs {needed}")
-    if schema.encoding != "ros2msg":
+    if schema is None:
+        shape = "position" if content == "velocity" else content
+        raise ValueError(f"it holds no schema, and a stream of kind {content} needs {SCHEMAS[shape]}")
+    text = _text_of(schema)
+    if schema.encoding == "ros1msg" or channel.message_encoding == "ros1":
+        return ros_message.decoder(parse(schema.name, text), schema.name, content, source, lambda _: ROS1)
+
+    @cache
+    def general() -> Decoder:
+        return ros_message.decoder(parse(schema.name, text), schema.name, content, source, wire_of)
+
+    shape = "position" if content == "velocity" else content
+    special = source.fields or source.child is not None or source.parent is not None
+    if special or _full_name(schema.name) != SCHEMAS[shape]:
+        return general()
+    return _of_fixed_shape(channel, schema.name, text, shape, general)
+
+
+def _text_of(schema: Schema) -> bytes:
+    """The definition that a log gives; one that never changed where the log gives none, or in another language."""
+    written_as = ("ros2msg", "ros1msg")
+    if short_name(schema.name) in well_known.NAMES and (not schema.data or schema.encoding not in written_as):
+        return well_known.text_of(schema.name, ros1=schema.encoding == "ros1msg")
+    if schema.encoding not in written_as:
         raise ValueError(f'its schema is written as "{schema.encoding}", not ros2msg')
-    decode = _stock(channel.message_encoding, schema.name, schema.data)
+    return schema.data
+
+
+def _full_name(name: str) -> str:
+    """`package/msg/Name`, also of `package/Name`."""
+    return short_name(name).replace("/", "/msg/")
+
+
+def _of_fixed_shape(channel: Channel, name: str, text: bytes, content: str, general: Callable[[], Decoder]) -> Decoder:
+    """The decoder of the two types whose figures stand together at the end: faster than any other.
+
+    What is written in another representation than plain CDR is left to the general decoder.
+    """
+    decode = _stock(channel.message_encoding, name, text)
 
     def one(payload: bytes) -> Reading:
+        if len(payload) > 1 and payload[0] == 0 and payload[1] not in _PLAIN_CDR:
+            return general().one(payload)
         _check_length(payload, cdr.NUMBERS[content])
         message = decode(payload)
         stamp = message.header.stamp
         seconds, nanoseconds = int(stamp.sec), int(stamp.nanosec)
         check_stamp(seconds, nanoseconds)
-        return seconds, nanoseconds, [float(value) for value in _used_values(message, content)]
+        return Reading(seconds, nanoseconds, [float(value) for value in _used_values(message, content)])
 
     def many(messages: Messages, which: IntArray, fields: Fields) -> None:
         for length in set(messages.length[which].tolist()):
@@ -47,7 +88,7 @@ def decoder(channel: Channel, schema: Schema | None, content: str) -> Decoder:
         """Fill in those that fit the layout, if the stock decoder reads a message of it in the same way."""
         rows = messages.rows(which)
         fast = cdr.fields(rows, content)
-        for flag in (0, 1):
+        for flag in _PLAIN_CDR:
             fits = np.flatnonzero(fast.fits & (rows[:, 1:2] == flag).any(axis=1))
             if not len(fits):
                 continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from mcap.records import Channel, Schema
@@ -38,9 +37,10 @@ class Walk:
     lost; of a damaged chunk the message indexes behind it say so.
     """
 
-    wanted: Mapping[str, Content] | None
+    wanted: frozenset[str] | None
     inflated_limit: int
     messages_limit: int
+    chunk_limit: int
     messages: int = 0
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)

@@ -11,9 +11,9 @@ import pytest
 
 from pipeline.sessions.checks import Finding, checked
 from pipeline.sessions.checks.of_log import of_log
-from pipeline.sessions.ingest import _CONTENT
 from pipeline.sessions.logs import read_log
-from pipeline.sessions.logs.log import Log, Readings, Wanted
+from pipeline.sessions.logs.log import Log, Readings
+from pipeline.sessions.wanted import of_stream
 from pipeline.study.folder import find_sessions, load_study
 from pipeline.study.settings import Study
 from tests.benchmarks.checks import drawn
@@ -42,7 +42,7 @@ def recordings(study_name: str) -> list[tuple[str, Log, Study]]:
     """The sessions of a study of real recordings."""
     root = real(study_name)
     study = load_study(root)
-    wanted = [Wanted(stream.topic, _CONTENT[stream.kind]) for stream in study.streams.values()]  # type: ignore[arg-type]
+    wanted = [of_stream(stream) for stream in study.streams.values()]
     return [(one.id, read_log(one.path, wanted), study) for one in find_sessions(root, study).sessions]
 
 
