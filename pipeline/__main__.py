@@ -35,7 +35,7 @@ ExecutorName = Annotated[
         "--executor",
         metavar="WHERE",
         help="Where to compute: process (processes of this machine), inline (this process), dask (a Dask cluster of"
-        " this machine), dask://host:port (a Dask scheduler). The results are the same.",
+        " this machine), dask://host:port or tls://host:port (a Dask scheduler). The results are the same.",
     ),
 ]
 

@@ -13,6 +13,7 @@ from typing import Any
 import dask
 from distributed import Client, LocalCluster, WorkerPlugin
 from distributed.scheduler import KilledWorker
+from distributed.security import Security
 
 from pipeline.engine import threads
 from pipeline.engine.code_digest import code_digest
@@ -117,6 +118,9 @@ def _different_code(difference: str) -> PipelineError:
 def on_dask(address: str | None, count: int, say: Callable[[str], None], connect_s: float = 10.0) -> Iterator[Executor]:
     """The executor for the scheduler at an address; without one, for a cluster of `count` processes of this machine.
 
+    An address is `tcp://host:port`, or `tls://host:port` for one with certificates, which Dask's own configuration
+    names. The cluster of this machine has certificates for as long as it runs, which never leave its processes.
+
     Raises PipelineError where no scheduler answers within `connect_s` seconds.
     """
     for name in filter(re.compile(r"distributed\b").match, [*logging.root.manager.loggerDict]):
@@ -130,6 +134,8 @@ def on_dask(address: str | None, count: int, say: Callable[[str], None], connect
             cluster = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
+                protocol="tls://",
+                security=Security.temporary(),  # else any user of this machine could run code in the workers
                 dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
                 preload=_IGNORE_CTRL_C,
@@ -138,11 +144,14 @@ def on_dask(address: str | None, count: int, say: Callable[[str], None], connect
             client = Client(cluster)
         else:
             try:
-                client = Client(f"tcp://{address}", timeout=connect_s)
-            except (OSError, ValueError) as error:
+                client = Client(address, timeout=connect_s)
+            except (OSError, ValueError, TypeError) as error:  # TypeError: TLS without certificates
+                name, with_certificates = address.replace("tcp://", "dask://"), ""
+                if address.startswith("tls://"):
+                    with_certificates = ", with the certificates of distributed.comm.tls in Dask's configuration"
                 raise PipelineError(
-                    f"--executor dask://{address}: no Dask scheduler answers there ({error}); start one with:"
-                    " dask scheduler"
+                    f"--executor {name}: no Dask scheduler answers there ({error}); start one with: dask"
+                    f" scheduler{with_certificates}"
                 ) from None
         open_until_done.enter_context(client)
         client.register_plugin(OneThread())

@@ -12,6 +12,7 @@ from pipeline.engine.processes import InThisProcess, Processes
 from pipeline.errors import PipelineError, did_you_mean
 
 PROCESS, INLINE, DASK = "process", "inline", "dask"
+_SCHEDULERS = (f"{DASK}://", "tls://")  # one as it comes, and one with certificates
 
 
 def _print(text: str) -> None:
@@ -32,14 +33,15 @@ def executor_of(jobs: int | None, name: str = PROCESS, say: Callable[[str], None
     elif name == PROCESS:
         with Processes(count) as processes:
             yield processes
-    elif name == DASK or (name.startswith(f"{DASK}://") and name != f"{DASK}://"):
+    elif name == DASK or (name.startswith(_SCHEDULERS) and name not in _SCHEDULERS):
         _require_dask(name)
         from pipeline.engine.dask_cluster import on_dask
 
-        with on_dask(name.partition("://")[2] or None, count, say) as cluster:
+        address = None if name == DASK else name.replace(f"{DASK}://", "tcp://")
+        with on_dask(address, count, say) as cluster:
             yield cluster
     else:
-        known = (PROCESS, INLINE, DASK, f"{DASK}://host:port")
+        known = (PROCESS, INLINE, DASK, *(f"{scheduler}host:port" for scheduler in _SCHEDULERS))
         raise PipelineError(f'--executor: there is no "{name}"{did_you_mean(name, known)}')
 
 

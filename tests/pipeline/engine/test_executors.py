@@ -185,6 +185,18 @@ def dask(count: int) -> Iterator[Executor]:
         yield executor
 
 
+def assert_answers_nobody_else(executor: Executor) -> None:
+    """Other users of this machine reach the scheduler's port, and could run code in the workers."""
+    from distributed import Client
+    from distributed.security import Security
+
+    address = executor._client.scheduler.address  # type: ignore[attr-defined]
+    assert address.startswith("tls://127.0.0.1:")
+    for claimed, security in ((address.replace("tls", "tcp"), None), (address, Security.temporary())):
+        with pytest.raises(OSError, match=r"TLS|closed|timed out|Timed out"):
+            Client(claimed, timeout=2, security=security)
+
+
 def test_dask_workers_give_the_same_entries_also_where_one_is_killed(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -196,6 +208,7 @@ def test_dask_workers_give_the_same_entries_also_where_one_is_killed(
         there = bring_up_to_date(study, fusing_with("once"), resources)
         assert executor.submit(os.getenv, "NUMBA_NUM_THREADS").result() == "1"
         assert executor.submit(os.getpid).result() != os.getpid()
+        assert_answers_nobody_else(executor)
         with pytest.raises(ZeroDivisionError):
             executor.submit(divmod, 1, 0).result()
         with pytest.raises(PipelineError, match="a worker cannot see"):
@@ -221,8 +234,11 @@ def test_a_scheduler_that_does_not_answer_is_said() -> None:
     pytest.importorskip("distributed")
     from pipeline.engine.dask_cluster import on_dask
 
-    answers = on_dask("127.0.0.1:1", 1, print, connect_s=0.5)
-    with pytest.raises(PipelineError, match="no Dask scheduler answers there"), answers:
+    answers = on_dask("tcp://127.0.0.1:1", 1, print, connect_s=0.5)
+    with pytest.raises(PipelineError, match=r"dask://127.0.0.1:1: no Dask scheduler answers there"), answers:
+        pass
+    answers = on_dask("tls://127.0.0.1:1", 1, print, connect_s=0.5)
+    with pytest.raises(PipelineError, match=r"with the certificates of distributed.comm.tls"), answers:
         pass
 
 
