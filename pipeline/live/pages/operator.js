@@ -9,6 +9,7 @@ import { fill, filled, loadTexts, taskName } from "./texts.js";
 import { drawTraces } from "./traces.js";
 
 const NEEDS_REASON = new Set(["abort", "redo", "skip", "drop"]);
+const GOES_WITHOUT = "questionnaire"; // the phase in which `next` leaves answers missing, which nobody should do by a slip
 
 const texts = await loadTexts("operator");
 const at = (id) => document.getElementById(id);
@@ -95,10 +96,11 @@ function showProblems() {
 
 function showLinks() {
   at("pages").textContent = filled(texts.pages, { phones: state.phones, questionnaires: state.questionnaires_open });
-  const wanted = JSON.stringify(state.links);
+  const links = state.links ?? [];
+  const wanted = JSON.stringify(links);
   if (at("links").dataset.shown === wanted) return; // the codes are not fetched anew with each state
   at("links").dataset.shown = wanted;
-  at("links").replaceChildren(...state.links.map(({ role, url, qr }) => {
+  at("links").replaceChildren(...links.map(({ role, url, qr }) => {
     const item = element("li", "");
     const code = Object.assign(element("img", ""), { src: qr, alt: texts.link[role], width: 200, height: 200 });
     const link = Object.assign(element("a", url), { href: url, target: "_blank", rel: "noopener" }); // on this machine too
@@ -139,7 +141,8 @@ document.addEventListener("click", (event) => {
 async function wish(what) {
   if ([...asked.values()].some((one) => one.what === what)) return; // a double click
   const red = what === "start" && state.checks.some(({ light }) => light === "red");
-  if (red || NEEDS_REASON.has(what)) await askWithReason(what, "");
+  const without = what === "next" && state.phase === GOES_WITHOUT;
+  if (red || without || NEEDS_REASON.has(what)) await askWithReason(what, "");
   else ask(what, "");
 }
 

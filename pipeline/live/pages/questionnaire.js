@@ -61,7 +61,7 @@ function isOnThePage({ questionnaire, task, items, pairs }) {
 function wordsOf({ questionnaire, title, items }) {
   const own = texts.forms[questionnaire];
   const ofItem = (item) => own?.items[item.id] ?? { title: null, text: item.text, low: item.low, high: item.high };
-  return { title: own?.title ?? title ?? texts.title, items: Object.fromEntries(items.map((item) => [item.id, ofItem(item)])) };
+  return { title: (own?.title ?? title) || texts.title, items: Object.fromEntries(items.map((item) => [item.id, ofItem(item)])) };
 }
 
 const pages = () => [form.items, form.pairs].filter((part) => part.length);

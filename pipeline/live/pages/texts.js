@@ -4,7 +4,12 @@ const NAME = /^[a-z]{2,3}$/;
 
 async function fetched(language) {
   const answer = await fetch(`/pages/texts/${language}.json`);
-  return answer.ok ? answer.json() : null;
+  return answer.ok ? JSON.parse(await answer.text(), bare) : null;
+}
+
+// Ids of a study are looked up in these texts, and one may be called "constructor".
+function bare(_, value) {
+  return value && typeof value === "object" ? Object.assign(Object.create(null), value) : value;
 }
 
 // { common, <page> } of the first language that there is, and the document marked with it.

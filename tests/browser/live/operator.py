@@ -93,6 +93,21 @@ def a_red_check_wants_a_reason(tab: Tab, server: LiveServer) -> None:
     assert len(server.said("operator", "do")) == 1
 
 
+def a_questionnaire_is_not_left_by_a_slip(tab: Tab, server: LiveServer) -> None:
+    """Going on without its answers wants a reason too; a stream may bear any name."""
+    going = {"do": "next", "label": "Go on without the questionnaire of P01, Task 1", "others": ["note"]}
+    _opened(tab, server, state(phase="questionnaire", next=going))
+    named = lights()
+    named["lights"]["constructor"] = {"light": "green", "text": "30 Hz"}
+    server.say("operator", **named)
+    until(lambda: "constructor" in text(tab, "#light-list"), "the light is shown")
+    _click(tab, "#big")
+    wait_for(tab, "#reason")
+    write(tab, "No time.")
+    key(tab, "Enter")
+    assert _asked(server, 1) == ("next", "No time.")
+
+
 def a_note_with_a_key(tab: Tab, server: LiveServer) -> None:
     """N, the note, Enter; and that it was taken is said."""
     _opened(tab, server, state())
@@ -171,6 +186,7 @@ CASES = (
     the_state_is_shown,
     one_big_button_begins,
     a_red_check_wants_a_reason,
+    a_questionnaire_is_not_left_by_a_slip,
     a_note_with_a_key,
     a_second_page_only_looks_on,
     lights_differ_in_more_than_colour,
