@@ -69,6 +69,15 @@ def key(tab: Tab, name: str, times: int = 1) -> None:
         tab.call("Input.dispatchKeyEvent", type="keyUp", **common)
 
 
+def tab_to(tab: Tab, name: str) -> None:
+    """The Tab key, until the element with this id has the focus."""
+    for _ in range(80):
+        if focused(tab) == name:
+            return
+        key(tab, "Tab")
+    raise AssertionError(f"{name} is not reached by the Tab key")
+
+
 def write(tab: Tab, words: str) -> None:
     """Text is typed where the focus is."""
     tab.call("Input.insertText", text=words)

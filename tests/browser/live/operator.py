@@ -6,7 +6,7 @@ import json
 import time
 
 from tests.browser.chromium import Tab
-from tests.browser.live.acts import focused, is_seen, key, mouse, place, sized, text, value, wait_for, write
+from tests.browser.live.acts import focused, is_seen, key, mouse, place, sized, tab_to, text, value, wait_for, write
 from tests.browser.live.samples import HOSTILE, Message, lights, ready, state
 from tests.browser.live.server import KEY, LiveServer, until
 
@@ -27,14 +27,6 @@ def _click(tab: Tab, selector: str) -> None:
     point = place(tab, selector)
     for kind in ("mousePressed", "mouseReleased"):
         mouse(tab, kind, point["x"], point["y"])
-
-
-def _tab_to(tab: Tab, name: str) -> None:
-    for _ in range(60):
-        if focused(tab) == name:
-            return
-        key(tab, "Tab")
-    raise AssertionError(f"{name} is not reached by the Tab key")
 
 
 def _asked(server: LiveServer, count: int) -> tuple[str, str]:
@@ -76,7 +68,7 @@ def one_big_button_begins(tab: Tab, server: LiveServer) -> None:
 def a_red_check_wants_a_reason(tab: Tab, server: LiveServer) -> None:
     """By keys alone: the question comes up, an empty reason is not taken, a typed one goes out, Escape asks nothing."""
     _opened(tab, server, ready("red"))
-    _tab_to(tab, "big")
+    tab_to(tab, "big")
     key(tab, "Enter")
     wait_for(tab, "#reason")
     assert focused(tab) == "reason-text"

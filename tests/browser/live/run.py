@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from tests.browser.chromium import BrowserError, Tab, tab
-from tests.browser.live import operator, phone, questionnaire
+from tests.browser.live import operator, phone, played, questionnaire
 from tests.browser.live.acts import fake_sensors
 from tests.browser.live.looks import SCENES
 from tests.browser.live.looks import faults as looks_faults
@@ -17,6 +17,7 @@ CASES: dict[str, Sequence[Case]] = {
     "phone": phone.CASES,
     "questionnaire": questionnaire.CASES,
     "operator": operator.CASES,
+    "played": played.CASES,
 }
 
 

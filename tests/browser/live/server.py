@@ -25,7 +25,6 @@ PAGES = CLONE / "pipeline" / "live" / "pages"
 KEY = "k7QmExample"
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 _HEADERS = {"Content-Security-Policy": "default-src 'self'", "Cache-Control": "no-store"}
-_PATIENCE_S = 15.0
 Message = dict[str, Any]
 Answerer = Callable[["LiveServer", str, Message], None]
 
@@ -115,9 +114,9 @@ class LiveServer:
 _SQUARE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M1 1h3v3h-3zM5 5h3v3h-3z"/></svg>'
 
 
-def until(holds: Callable[[], bool], what: str) -> None:
+def until(holds: Callable[[], bool], what: str, patience_s: float = 15.0) -> None:
     """Wait for something; AssertionError, naming it, where it does not come."""
-    deadline = time.monotonic() + _PATIENCE_S
+    deadline = time.monotonic() + patience_s
     while not holds():
         assert time.monotonic() < deadline, f"did not happen: {what}"
         time.sleep(0.02)
