@@ -51,7 +51,8 @@ class Reading:
     """A sensor's reading in SI and the tracker's frame.
 
     `values` are a position (3,) in m, or specific force (3,) in m/s², angular velocity (3,) in rad/s and orientation
-    xyzw (4,), NaN where unknown. `stamp_ns` is None where the sender states no time, `seq` where it does not count.
+    xyzw (4,), NaN where unknown. `stamp_ns` is when it was measured, where that is known; else `sent_ms` may be what
+    the sender's own clock said. `seq` is None where the sender does not count.
     """
 
     stream: str
@@ -59,6 +60,7 @@ class Reading:
     arrival_ns: int
     values: Values
     seq: int | None = None
+    sent_ms: float | None = None
 
 
 @dataclass(frozen=True)

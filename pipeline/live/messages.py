@@ -327,7 +327,7 @@ def parse_datagram(datagram: bytes) -> tuple[Datagram, ...]:
     """A sender's readings. Raises MessageError where the datagram holds anything else."""
     content = _loaded(datagram, DATAGRAM_BYTES)
     listed = content if isinstance(content, list) else [content]
-    if len(listed) > _DATAGRAMS or not all(isinstance(one, dict) for one in listed):
+    if not 1 <= len(listed) <= _DATAGRAMS or not all(isinstance(one, dict) for one in listed):
         raise MessageError("a datagram is an object, or a short array of them")
     return tuple(_datagram(_Fields(one)) for one in listed)
 

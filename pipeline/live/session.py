@@ -18,12 +18,13 @@ reading that came before, by its number or as an exact copy, is dropped. Dropped
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
 from fusion_core import Estimator
+from pipeline.live.changes import changed
 from pipeline.live.events import NOTHING, Action, Actions, Close, Reading, Show, Tell, Tick, Values, Write
 from pipeline.live.outgoing import PhaseOfTask, Say, Selected, Shown
 from pipeline.live.streams import LiveStream, sample_of
@@ -82,6 +83,7 @@ class Heard:
 
     newest_ns: int = 0
     arrival_ns: int = 0
+    last: Values = ()
     recent: tuple[tuple[int, Values], ...] = ()
     highest: int = -1
     numbers: int = 0
@@ -205,32 +207,33 @@ def step(state: Session, event: Event) -> Stepped:
 def _read(state: Session, reading: Reading) -> Stepped:
     stream, heard = state.attempt.streams[reading.stream], state.heard[reading.stream]
     if reading.seq is not None and _came_before(heard, reading.seq):
-        return _with_heard(state, reading.stream, replace(heard, dropped=heard.dropped + 1)), NOTHING
+        return _with_heard(state, reading.stream, changed(heard, dropped=heard.dropped + 1)), NOTHING
     arrival = max(reading.arrival_ns, state.clock_ns + 1)
     unstamped = stream.stamps_arrival or reading.stamp_ns is None
     stamp = arrival if unstamped or reading.stamp_ns is None else min(reading.stamp_ns, arrival)
     copy = not unstamped and (stamp, reading.values) in heard.recent
     if copy or stamp < heard.newest_ns - _OLDEST_NS:
-        return _with_heard(state, reading.stream, replace(heard, dropped=heard.dropped + 1)), NOTHING
+        return _with_heard(state, reading.stream, changed(heard, dropped=heard.dropped + 1)), NOTHING
     used = stream.name in state.attempt.estimator.sensors
     origin = arrival if state.origin_ns is None else state.origin_ns
     sample = sample_of(stream, stamp, arrival, reading.values, origin) if used else None
     if used and sample is None:  # logged, a replay would carry its orientation on and use it
-        heard = replace(_numbered(heard, reading.seq), arrival_ns=arrival, dropped=heard.dropped + 1)
+        heard = changed(_numbered(heard, reading.seq), arrival_ns=arrival, dropped=heard.dropped + 1)
         return _with_heard(state, reading.stream, heard), NOTHING
     heard = _numbered(heard, reading.seq)
-    heard = replace(
+    heard = changed(
         heard,
         newest_ns=max(heard.newest_ns, stamp),
         arrival_ns=arrival,
+        last=reading.values,
         recent=() if unstamped else _recent(heard.recent, stamp, reading.values),
         taken=heard.taken + 1,
     )
-    state = replace(_with_heard(state, reading.stream, heard), clock_ns=arrival, origin_ns=origin)
+    state = changed(_with_heard(state, reading.stream, heard), clock_ns=arrival, origin_ns=origin)
     write = Write(Message(stream.topic, stream.content, stamp, arrival, np.array(reading.values)))
     if sample is not None:
         estimated = state.attempt.estimator.update(state.estimated, stream.name, sample)
-        state = replace(state, estimated=estimated)
+        state = changed(state, estimated=estimated)
     if not stream.is_sensor:
         return state, (write,)
     state, shown = _show(state, arrival)
@@ -251,11 +254,11 @@ def _numbered(heard: Heard, seq: int | None) -> Heard:
         return heard
     ahead = seq - heard.highest
     if heard.highest < 0 or seq == 0 or ahead <= -_NUMBERS:
-        return replace(heard, highest=seq, numbers=1)
+        return changed(heard, highest=seq, numbers=1)
     if ahead < 0:
-        return replace(heard, numbers=heard.numbers | 1 << -ahead, lost=max(heard.lost - 1, 0))
+        return changed(heard, numbers=heard.numbers | 1 << -ahead, lost=max(heard.lost - 1, 0))
     numbers = (heard.numbers << ahead | 1) & (1 << _NUMBERS) - 1 if ahead < _NUMBERS else 1
-    return replace(heard, highest=seq, numbers=numbers, lost=heard.lost + min(ahead - 1, _NUMBERS))
+    return changed(heard, highest=seq, numbers=numbers, lost=heard.lost + min(ahead - 1, _NUMBERS))
 
 
 def _recent(recent: tuple[tuple[int, Values], ...], stamp: int, values: Values) -> tuple[tuple[int, Values], ...]:
@@ -265,7 +268,7 @@ def _recent(recent: tuple[tuple[int, Values], ...], stamp: int, values: Values) 
 
 
 def _with_heard(state: Session, name: str, heard: Heard) -> Session:
-    return replace(state, heard={**state.heard, name: heard})
+    return changed(state, heard={**state.heard, name: heard})
 
 
 # --- what is shown
@@ -276,13 +279,13 @@ def _show(state: Session, at_ns: int) -> Stepped:
     if state.phone is None or state.origin_ns is None:
         return state, NOTHING
     if len(state.under_way) >= _UNDER_WAY:
-        return replace(state, waiting=True), NOTHING
+        return changed(state, waiting=True), NOTHING
     instant = max(at_ns, state.clock_ns + 1)
     mean, _ = state.attempt.estimator.predict(state.estimated, (instant - state.origin_ns) * S_PER_NS)
     if not np.isfinite(mean).all():
         return state, NOTHING
     estimate = Estimate(state.n + 1, instant, tuple(mean.tolist()))
-    state = replace(
+    state = changed(
         state,
         n=estimate.n,
         clock_ns=instant,
@@ -301,7 +304,7 @@ def _drew(state: Session, event: PhoneDrew) -> Stepped:
     estimate = _sent(state, event.n)
     if estimate is None or event.n <= state.drawn:
         return state, NOTHING
-    state = replace(state, drawn=event.n, under_way=tuple(n for n in state.under_way if n > event.n))
+    state = changed(state, drawn=event.n, under_way=tuple(n for n in state.under_way if n > event.n))
     drawn_ns = min(max(event.drawn_ns, estimate.instant_ns), max(event.at_ns, estimate.instant_ns))
     written = (
         Write(
@@ -332,8 +335,8 @@ def _pressed(state: Session, event: PhonePressed) -> Stepped:
     estimate = _sent(state, event.n)
     repeated = event.pressed_ns <= state.last_press_ns + state.attempt.confirm_ns
     if estimate is None or repeated or state.phase not in ("practice", "running"):
-        return replace(state, ignored_presses=state.ignored_presses + 1), NOTHING
-    state = replace(state, last_press_ns=event.pressed_ns)
+        return changed(state, ignored_presses=state.ignored_presses + 1), NOTHING
+    state = changed(state, last_press_ns=event.pressed_ns)
     if state.phase == "practice":
         return _practised(state, event.at_ns)
     at = min(max(event.pressed_ns, state.trial_ns + 1), max(event.at_ns, state.trial_ns + 1))
@@ -341,7 +344,7 @@ def _pressed(state: Session, event: PhonePressed) -> Stepped:
     where = {axis: place[axis] for axis in "xyz" if axis in state.attempt.axes}
     actions: list[Action] = [_event(state, at, type="selection", trial=state.trial, **where)]
     actions += _to_phone(state, Selected(state.trial))
-    state = replace(state, target=state.target + 1, trial_ns=at + _NEXT_NS)
+    state = changed(state, target=state.target + 1, trial_ns=at + _NEXT_NS)
     if state.target == len(state.attempt.targets_mm):
         state, ended = _end(state, at + _NEXT_NS, "finished")
         return state, (*actions, *ended)
@@ -350,21 +353,21 @@ def _pressed(state: Session, event: PhonePressed) -> Stepped:
 
 
 def _practised(state: Session, at_ns: int) -> Stepped:
-    state = replace(state, target=state.target + 1)
+    state = changed(state, target=state.target + 1)
     if state.target < state.attempt.practice:
         return state, _tell_phase(state)
-    return _count_down(replace(state, target=0), at_ns)
+    return _count_down(changed(state, target=0), at_ns)
 
 
 def _count_down(state: Session, at_ns: int) -> Stepped:
     left = -(-state.attempt.countdown_ns // _NS_PER_S)
-    state = replace(state, phase="countdown", since_ns=at_ns, seconds_left=left)
+    state = changed(state, phase="countdown", since_ns=at_ns, seconds_left=left)
     return state, _tell_phase(state)
 
 
 def _start(state: Session, at_ns: int) -> Stepped:
     at = max(at_ns, state.clock_ns + 1)
-    state = replace(state, phase="running", since_ns=at, clock_ns=at, begun_ns=at, trial_ns=at, target=0)
+    state = changed(state, phase="running", since_ns=at, clock_ns=at, begun_ns=at, trial_ns=at, target=0)
     begun = (_event(state, at, type="session_start"), _trial_start(state))
     return state, (*begun, *_tell_phase(state))
 
@@ -374,7 +377,7 @@ def _end(state: Session, at_ns: int, reason: str, *, set_aside: bool = False) ->
     if state.begun_ns:
         actions.append(_event(state, max(at_ns, state.trial_ns), type="session_end"))
     _, noted = _note(state, at_ns, "end", reason)
-    state = replace(state, phase="ended", ended_by=reason)
+    state = changed(state, phase="ended", ended_by=reason)
     phase = _to_phone(state, PhaseOfTask("waiting" if set_aside else "done"))
     return state, (*actions, *noted, *phase, Close(set_aside))
 
@@ -401,7 +404,7 @@ def _tick(state: Session, at_ns: int) -> Stepped:
         if left_ns <= 0:
             state, actions = _start(state, at_ns)
         elif -(-left_ns // _NS_PER_S) < state.seconds_left:
-            state = replace(state, seconds_left=-(-left_ns // _NS_PER_S))
+            state = changed(state, seconds_left=-(-left_ns // _NS_PER_S))
             actions = _tell_phase(state)
     elif state.phase == "running" and at_ns - state.begun_ns > state.attempt.abort_after_ns:
         return _end(state, at_ns, "out of time")
@@ -421,7 +424,7 @@ def _listen(state: Session, at_ns: int) -> Stepped:
         silent, gone = since > _SILENT_NS, since > _LOST_NS
         if (silent, gone) == (heard.silent, heard.gone):
             continue
-        state = _with_heard(state, name, replace(heard, silent=silent, gone=gone))
+        state = _with_heard(state, name, changed(heard, silent=silent, gone=gone))
         kind = "sensor_lost" if gone else "sensor_silent" if silent else "sensor_back"
         actions += _note(state, at_ns, kind, f"{name}, trial {state.trial}")[1]
         if silent != heard.silent:
@@ -432,9 +435,9 @@ def _listen(state: Session, at_ns: int) -> Stepped:
 def _phone_is(state: Session, event: PhoneIs) -> Stepped:
     if event.client is None:
         gone = event.at_ns if state.phone_gone_ns is None else state.phone_gone_ns
-        state = replace(state, phone=None, phone_gone_ns=gone, under_way=())
+        state = changed(state, phone=None, phone_gone_ns=gone, under_way=())
         return _note(state, event.at_ns, "phone_away", "")
-    state = replace(state, phone=event.client, phone_gone_ns=None, under_way=())
+    state = changed(state, phone=event.client, phone_gone_ns=None, under_way=())
     state, noted = _note(state, event.at_ns, "phone_back", "")
     return state, (*noted, *_tell_phase(state))
 

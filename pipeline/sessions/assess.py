@@ -43,7 +43,7 @@ def run(work: Work) -> Outcome:
     tables.write("accuracy", tables.of_rows("accuracy", known), work.out)
     checked = fusion_check_rows(study, session.id, loaded, reference, tracks)
     tables.write("checks", tables.of_rows("checks", checked), work.out)
-    tables.write("replay_agreement", tables.of_rows("replay_agreement", _agreement(work, loaded)), work.out)
+    tables.write("replay_agreement", tables.of_rows("replay_agreement", agreement(work, loaded)), work.out)
     phones = [{"session": session.id, "stream": name, **described(found)} for name, found in loaded.phones.items()]
     tables.write("phones", tables.of_rows("phones", phones), work.out)
     measured, residuals = _noise(study, session.id, loaded)
@@ -154,7 +154,7 @@ def selection_rows(work: Work, events: Sequence[Row]) -> Iterator[Row]:
             }
 
 
-def _agreement(work: Work, loaded: Recording) -> list[Row]:
+def agreement(work: Work, loaded: Recording) -> list[Row]:
     """How far the logged display is from the replay of the estimator that the condition displays."""
     shown = work.study.shown.get(work.session.condition or "")
     if shown is None or loaded.display is None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.live.events import Reading
 from pipeline.simulation import loop_steps
-from pipeline.simulation.hand_steps import DONE, PHASE
+from pipeline.simulation.hand_steps import DONE, PHASE, PLANS
 from pipeline.simulation.loop_steps import STEP_NS, TAP_S
 from pipeline.simulation.sensing import gyroscope
 from pipeline.simulation.session import Setting, felt, prepare
@@ -58,6 +58,11 @@ class Participant:
     def taps(self) -> FloatArray:
         """When and where each target was selected (targets, 5), as in `pipeline.simulation.loop_steps`."""
         return self.ready.session.taps
+
+    @property
+    def plans(self) -> int:
+        """How often a movement was planned anew."""
+        return int(self.ready.hand.progress[PLANS])
 
     def sees(self, position_mm: tuple[float, float]) -> None:
         """The display has changed."""

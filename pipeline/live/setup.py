@@ -1,0 +1,126 @@
+"""A study as its run needs it: checked once, estimators built and warmed up, and each attempt's settings made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fusion_core import Estimator, Sample
+from pipeline.engine.cache import digest_of
+from pipeline.live.outgoing import Welcome
+from pipeline.live.plan import Plan
+from pipeline.live.session import Attempt
+from pipeline.live.streams import LiveStream, live_streams, required
+from pipeline.sessions.estimators import build_estimator
+from pipeline.simulation.layout import targets
+from pipeline.study.recording import Recording
+from pipeline.study.settings import Study
+from pipeline.study.simulation import Task
+
+_NS_PER_S = 1e9
+_WARM_UP_STEPS = 50
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What does not change while a study is run.
+
+    `simulated` says so where readings are, `mouse` that a pointer is the hand.
+    """
+
+    study: Study
+    recording: Recording
+    task: Task
+    streams: Mapping[str, LiveStream]
+    estimators: Mapping[str, Estimator]
+    targets_mm: tuple[tuple[float, float], ...]
+    topics: Mapping[str, str]
+    digest: str
+    version: str
+    mouse: bool = False
+    simulated: str = ""
+
+    def estimator(self, condition: str) -> Estimator:
+        """The estimator that a condition shows."""
+        return self.estimators[self.study.shown[condition]]
+
+    def attempt(self, participant: str, condition: str) -> Attempt:
+        """The settings of an attempt."""
+        recording = self.recording
+        return Attempt(
+            participant,
+            condition,
+            self.estimator(condition),
+            self.streams,
+            self.study.axes,
+            self.targets_mm,
+            self.topics["display"],
+            self.topics["events"],
+            min(recording.practice.targets, len(self.targets_mm)),
+            round(recording.countdown_s * _NS_PER_S),
+            round(recording.abort_after_s * _NS_PER_S),
+            round(recording.selection.confirm_ms * 1e6),
+        )
+
+    def welcome(self, task_number: int) -> Welcome:
+        """The task for the phone, which never learns the condition."""
+        task, selection = self.task, self.recording.selection
+        return Welcome(
+            task=f"Task {task_number}",
+            of=len(self.study.conditions),
+            px_per_mm=self.study.display.px_per_mm if self.study.display else 1.0,
+            window_mm=task.window_mm,
+            canvas_x_mm=task.canvas_x_mm,
+            canvas_y_mm=task.canvas_y_mm,
+            path_mm=task.path_mm,
+            targets_mm=self.targets_mm,
+            target_diameter_mm=task.target_diameter_mm,
+            button={"side": selection.button, "mm": selection.mm},
+            confirm_ms=selection.confirm_ms,
+            window=self.recording.phone.window,
+            mouse=self.mouse,
+        )
+
+    def empty_plan(self) -> Plan:
+        """A plan with nobody in it."""
+        questionnaires = {one.id: tuple(item.id for item in one.items) for one in self.recording.questionnaires}
+        return Plan(self.study.conditions, questionnaires)
+
+
+def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = "") -> Setup:
+    """The study, checked. Raises PipelineError for what a live study needs and study.yaml lacks."""
+    from importlib.metadata import version
+
+    where = str(folder / "study.yaml")
+    topics = required(study, where)
+    assert study.recording is not None and study.task is not None  # noqa: S101 - checked
+    shown = {study.shown[condition] for condition in study.conditions}
+    return Setup(
+        study,
+        study.recording,
+        study.task,
+        live_streams(study, where),
+        {name: build_estimator(study, name) for name in shown},
+        tuple((float(x), float(y)) for x, y in targets(study.task)),
+        topics,
+        digest_of(study.model_dump_json(exclude={"comparisons", "exclusions", "notes"})),
+        version("steadyhand"),
+        mouse,
+        simulated,
+    )
+
+
+def warm_up(setup: Setup) -> None:
+    """Step every estimator, so that none waits for the compiler when it counts (10 s when nothing is cached)."""
+    for estimator in setup.estimators.values():
+        state = estimator.start()
+        for step in range(_WARM_UP_STEPS):
+            for name, sensor in estimator.sensors.items():
+                time, rotation = step / 30, np.eye(3)[: sensor.dimension]
+                force = np.array([0.0, 9806.65, 0.0])
+                reading = Sample(time, time + 0.01, np.zeros(sensor.dimension), rotation, force)
+                state = estimator.update(state, name, reading)
+            estimator.predict(state, step / 30 + 0.02)
