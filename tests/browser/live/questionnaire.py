@@ -212,6 +212,9 @@ def in_german(tab: Tab, server: LiveServer) -> None:
     assert tab.evaluate("document.documentElement.lang") == "de"
     assert text(tab, "#task") == "Aufgabe 1"
     assert text(tab, "h2") == "Geistige Anforderung"
+    tab.open(f"{server.address}/questionnaire?lang=xx")
+    until(lambda: text(tab, "#title") == "Questionnaire", "English, where there is no such language")
+    assert tab.evaluate("document.documentElement.lang") == "en"
 
 
 CASES = (
