@@ -63,7 +63,7 @@ def _errors_words(accuracy: pd.DataFrame, contradicted: str = "") -> Words:
 def errors(accuracy: pd.DataFrame, contradicted: str = "") -> Figure:
     """RMSE and lag of every estimator: one mark per session, and the mean over sessions with its 95 % t interval."""
     names, standard = list(dict.fromkeys(accuracy["estimator"])), reference_phrase(accuracy["reference"])
-    figure, axes = panels(1, 2, 1.1 + 0.36 * len(names), sharey=True)
+    figure, axes = panels(1, 2, 0.9 + 0.26 * len(names), sharey=True)
     many = len(accuracy) > MARKS_MAX
     for index, estimator in enumerate(names):
         rows = accuracy[accuracy["estimator"] == estimator]
@@ -115,7 +115,7 @@ def _lag_and_error_words(accuracy: pd.DataFrame, contradicted: str = "") -> Word
 @styled
 def lag_and_error(accuracy: pd.DataFrame, contradicted: str = "") -> Figure:
     """Lag against RMSE, one mark per estimator: means over sessions with 95 % t intervals; small marks are sessions."""
-    figure, (axes,) = panels(height=3.4)
+    figure, (axes,) = panels(height=2.9)
     standard = reference_phrase(accuracy["reference"])
     for index, (estimator, rows) in enumerate(accuracy.groupby("estimator", sort=False)):
         known = rows[rows["lag_s"].notna() & rows["rmse_mm"].notna()]

@@ -60,7 +60,7 @@ def streams(excerpts: pd.DataFrame) -> Figure:
     """
     felt = _of_kind(excerpts, "acceleration")
     rows = 1 if felt is None else 2
-    figure, axes = panels(rows, 1, 1.2 + 1.7 * rows, sharex=True)
+    figure, axes = panels(rows, 1, 0.9 + 1.25 * rows, sharex=True)
     reference, frames = _of_kind(excerpts, "reference"), _of_kind(excerpts, "tracker")
     if reference is not None:
         axes[0].plot(*reference, color=BLACK, label="reference")

@@ -41,7 +41,7 @@ def lead(lead_curves: pd.DataFrame, lag_s: Mapping[str, float]) -> Figure:
 
     `lead_curves` has the columns of that table, of one session; `lag_s` the estimators' lags in it, for the caption.
     """
-    figure, (axes,) = panels(height=2.9)
+    figure, (axes,) = panels(height=2.4)
     for index, (estimator, rows) in enumerate(lead_curves.groupby("estimator", sort=False)):
         shift, correlation = rows["lead_s"].to_numpy(np.float64), rows["correlation_mm2"].to_numpy(np.float64)
         highest = np.max(np.abs(correlation), initial=0.0)

@@ -41,7 +41,7 @@ def overlay(excerpts: pd.DataFrame, positions_only: str, fused: str) -> Figure:
     """
     reference = _values(excerpts[excerpts["kind"] == "reference"])
     rows = 2 if len(reference[0]) else 1
-    figure, axes = panels(rows, 1, 1.3 + 1.9 * rows, sharex=True)
+    figure, axes = panels(rows, 1, 0.8 + 1.15 * rows, sharex=True)
     frames = _values(excerpts[excerpts["kind"] == "tracker"])
     axes[0].scatter(*frames, s=7, color=GREY, zorder=3, label="tracker, as it arrives")
     if rows == 2:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -61,17 +61,21 @@ _LATEX = str.maketrans(
 
 @dataclass(frozen=True)
 class Reference:
-    """An entry of a bibliography: its kind and key, its fields as BibTeX has them, and what it was used for."""
+    """An entry of a bibliography: its kind and key, its fields as BibTeX has them, and what it was used for.
+
+    `package` is the name and version of the package whose entry it is, if it is one's.
+    """
 
     kind: str
     key: str
     fields: Mapping[str, str]
     used_for: str = ""
+    package: str = ""
 
     @property
-    def is_package(self) -> bool:
-        """Is it a program without a publication?"""
-        return self.key.startswith(_PACKAGE)
+    def of_package(self) -> str:
+        """`numpy 2.3.5 (harris2020)`, or without a key where the package has no publication."""
+        return self.package + ("" if self.key.startswith(_PACKAGE) else f" ({self.key})")
 
     @property
     def bibtex(self) -> str:
@@ -194,8 +198,10 @@ def _package(name: str, version: str, listed: Mapping[str, object]) -> Reference
     """A package with its version: by its paper, or as a program where it has none or the paper is `listed` already."""
     key = _OF_PACKAGE.get(name)
     if key is not None and key not in listed:
-        return _with(entries()[key], name, note=f"{name}, version {version}")
-    return Reference("software", f"{_PACKAGE}{name}", {"title": name, "version": version}, "software")
+        published = _with(entries()[key], name, note=f"{name}, version {version}")
+        return replace(published, package=f"{name} {version}")
+    fields = {"title": name, "version": version}
+    return Reference("software", f"{_PACKAGE}{name}", fields, "software", f"{name} {version}")
 
 
 def escaped(text: str) -> str:

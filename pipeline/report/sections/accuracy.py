@@ -202,7 +202,8 @@ def _session_figures(material: Material) -> list[Block]:
         blocks.append(material.drawn("estimates", figures.estimates, excerpts, contradicted(material)))
         blocks += _overlaid(material, excerpts)
     if len(curves):
-        blocks.append(material.drawn("lead", figures.lead, curves, _lags_in(material, str(curves["session"].iloc[0]))))
+        drawn = material.drawn("lead", figures.lead, curves, _lags_in(material, str(curves["session"].iloc[0])))
+        blocks.append(Folded("How far each estimator is ahead of the tracker, by the paper's method", (drawn,)))
     return blocks
 
 

@@ -97,14 +97,12 @@ def _results(material: Material) -> Iterator[Text]:
 
 def _references(material: Material) -> Table:
     listed = references(material)
-    works = [reference for reference in listed if not reference.is_package]
-    packages = [
-        f"{reference.fields['title']} {reference.fields['version']}" for reference in listed if reference.is_package
-    ]
+    works = [reference for reference in listed if not reference.package]
+    packages = [reference.of_package for reference in listed if reference.package]
     return Table(
         "table-references",
         f"What was used and should be cited; {BIBLIOGRAPHY} beside this report holds the same entries for BibTeX.",
         columns(("Publication", "Used for", "Key"), 3),
         tuple((reference.text, reference.used_for, reference.key) for reference in works),
-        f"Packages without a publication of their own: {listing(packages)}." if packages else "",
+        f"Packages, with the keys of their publications: {listing(packages)}." if packages else "",
     )
