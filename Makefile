@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate explore power plan test compiled mutants test-browser test-pdf lint docs bench lock clean
+.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf lint docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -26,6 +26,9 @@ replay: .venv/installed ## variants of the estimators, ranked: STUDY=… ARGS="-
 
 simulate: .venv/installed ## write the logs of a simulated STUDY anew
 	@$(steadyhand) simulate "$(STUDY)" $(ARGS)
+
+record: .venv/installed ## run STUDY live: ARGS="--demo" needs nothing but this computer
+	@$(steadyhand) record "$(STUDY)" $(ARGS)
 
 explore: STUDY = studies/peephole
 explore: .venv/installed ## a better tracker or a better filter? a simulated STUDY under many trackers

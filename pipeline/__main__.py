@@ -242,6 +242,32 @@ def explore(
 
 
 @app.command()
+def record(
+    study: Annotated[Path, typer.Argument(metavar="STUDY", help="A study folder whose study.yaml says recording:.")],
+    demo: Annotated[
+        bool,
+        typer.Option("--demo", help="Simulated senders, and the mouse is the phone; into a folder of its own."),
+    ] = False,
+    bots: Annotated[
+        bool, typer.Option("--bots", help="With --demo: simulated participants play the study, faster than it takes.")
+    ] = False,
+    participants: Annotated[int, typer.Option(min=1, max=999, help="How many the bots are.")] = 2,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="With --demo: the folder. Default: demo/ and the study's name.")
+    ] = None,
+    host: Annotated[str, typer.Option(help="The address to serve pages on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="The port to serve pages on.")] = 8443,
+    goes_on: Annotated[
+        bool, typer.Option("--continue", help="Go on though study.yaml has changed since the first session.")
+    ] = False,
+) -> None:
+    """Run a study live: pages for operator, phone and questionnaire, a steady display, and logs that replay."""
+    from pipeline.commands import record as command
+
+    command.record(study, command.Options(host, port, demo, goes_on), out, participants if bots else None)
+
+
+@app.command()
 def inspect(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="A log, or several.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows of the table `quality`.")] = False,

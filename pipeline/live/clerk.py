@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from pipeline.live.events import Action, Close, Closed, Disk, Event, Open, Resolve, Save, Saved, Tables, Write
+from pipeline.live.events import Action, Agreed, Close, Closed, Disk, Event, Open, Resolve, Save, Saved, Tables, Write
 from pipeline.live.journal import Journal
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
@@ -36,12 +36,13 @@ def agreement(study: Study, folder: Path, log: Path, participant: str, condition
     return float(rows[0]["max_mm"]), int(rows[0]["n"])
 
 
-class Clerk:
-    """Does file actions on a journal. `check` is how a log that has just been closed is held against what was shown."""
+Check = Callable[[Study, Path, Path, str, str], tuple[float, int] | None]
 
-    def __init__(
-        self, journal: Journal, check: Callable[[Study, Path, Path, str, str], tuple[float, int] | None] = agreement
-    ) -> None:
+
+class Clerk:
+    """Does file actions on a journal. `check` holds a log that has just been closed against what was shown."""
+
+    def __init__(self, journal: Journal, check: Check | None = agreement) -> None:
         self.journal, self._check = journal, check
         self._open = "", ""
 
@@ -118,9 +119,11 @@ class Clerk:
             return [self.disk(now_ns(), fault), Closed("", now_ns())]
         if path is None:
             return [Closed("", now_ns())]
-        journal = self.journal
-        agreed = None if action.set_aside else self._check(journal.study, journal.folder, path, *self._open)
-        return [Closed(self._name(path), now_ns(), *(agreed or ()))]
+        closed = Closed(self._name(path), now_ns())
+        if action.set_aside or self._check is None:
+            return [closed]
+        agreed = self._check(self.journal.study, self.journal.folder, path, *self._open)
+        return [closed] if agreed is None else [closed, Agreed(closed.file, *agreed, now_ns())]
 
     def _name(self, path: Path) -> str:
         return path.relative_to(self.journal.folder.resolve()).as_posix()

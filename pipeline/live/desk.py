@@ -78,7 +78,7 @@ def summary(run: StudyRun) -> object:
     attempt = run.attempt
     within = None if attempt is None else (attempt.phase, attempt.target, attempt.seconds_left)
     fault = None if run.disk is None else run.disk.fault
-    return (run.plan, run.phase, within, run.phones, run.phone, run.operators, run.forms, run.closed, fault)
+    return (run.plan, run.phase, within, run.phones, run.phone, run.operators, run.forms, run.closed, run.agreed, fault)
 
 
 def state(run: StudyRun, client: int) -> Whole:
@@ -96,6 +96,7 @@ def state(run: StudyRun, client: int) -> Whole:
         "log": _log(run),
         "disk_free_bytes": None if run.disk is None else run.disk.free_bytes,
         "agreement": _agreement(run),
+        "links": [{"role": role, "url": url, "qr": f"/qr/{role}.svg"} for role, url in run.setup.links],
         "phones": len(run.phones),
         "questionnaires_open": len(run.forms),
         "problems": _problems(run),
@@ -169,11 +170,11 @@ def _log(run: StudyRun) -> dict[str, object] | None:
 
 
 def _agreement(run: StudyRun) -> dict[str, object] | None:
-    closed = run.closed
-    if closed is None or closed.agreement_mm is None:
+    agreed = run.agreed
+    if agreed is None:
         return None
     blind = run.setup.recording.blind == "both"
-    return {"mm": closed.agreement_mm, "n": closed.shown, "file": "the last log" if blind else closed.file}
+    return {"mm": agreed.mm, "n": agreed.shown, "file": "the last log" if blind else agreed.file}
 
 
 def _problems(run: StudyRun) -> list[str]:

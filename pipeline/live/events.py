@@ -91,15 +91,23 @@ class Saved:
 
 @dataclass(frozen=True)
 class Closed:
-    """A log is under its final name. `agreement_mm` is how far what was shown is from the replay of the log."""
+    """A log is under its final name, `file`, or among those set aside; empty where there is none."""
 
     file: str
     at_ns: int
-    agreement_mm: float | None = None
-    shown: int = 0
 
 
-Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed
+@dataclass(frozen=True)
+class Agreed:
+    """What was shown, `shown` estimates, is at most `mm` from the replay of a log."""
+
+    file: str
+    mm: float
+    shown: int
+    at_ns: int
+
+
+Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed
 
 
 @dataclass(frozen=True)

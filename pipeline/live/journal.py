@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pipeline.errors import PipelineError, SessionError
-from pipeline.live.plan import FoundLog, Record
+from pipeline.live import plan
+from pipeline.live.plan import FoundLog, Plan, Record
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Wanted
 from pipeline.sessions.logs.mcap import LogWriter, Message
@@ -174,7 +175,8 @@ class Journal:
         events = log.topics[self.study.events.topic].events if self.study.events.topic in log.topics else ()
         trials = sum(event["type"] == "selection" for event in events)
         arrivals = [int(one.arrival_ns[place]) for one in log.topics.values() if one.read for place in (0, -1)]
-        return FoundLog(participant, condition, whole, trials, (max(arrivals) - min(arrivals)) / 1e9 if arrivals else 0)
+        seconds = (max(arrivals) - min(arrivals)) / 1e9 if arrivals else 0.0
+        return FoundLog(participant, condition, whole, trials, seconds, log.facts.get("study_digest", ""))
 
     # --- answers and tables
 
@@ -244,6 +246,22 @@ class Journal:
             os.fsync(file.fileno())
         beside.replace(path)
         _sync_folder(path.parent)
+
+
+def known_plan(empty: Plan, journal: Journal, digest: str, goes_on: bool) -> Plan:
+    """Where the study stands. Raises PipelineError if study.yaml has changed since a session was recorded."""
+    logs = journal.found_logs()
+    changed = [log for log in logs if log.digest not in ("", digest)]
+    if changed and not goes_on:
+        first = changed[0]
+        raise PipelineError(
+            f"{journal.folder / 'study.yaml'}: has changed since {first.participant} in {first.condition} was recorded;"
+            " change it back, or add --continue to record the others with what it says now"
+        )
+    known = plan.planned(empty, journal.planned_orders())
+    for record in journal.records():
+        known = plan.after(known, record)
+    return plan.with_logs(known, logs)
 
 
 def _merged(

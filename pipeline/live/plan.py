@@ -63,13 +63,14 @@ class Plan:
 
 @dataclass(frozen=True)
 class FoundLog:
-    """A log in the folder: whole under its name, or cut."""
+    """A log in the folder: whole under its name, or cut; `digest` is that of the study it was recorded by."""
 
     participant: str
     condition: str
     whole: bool
     trials: int
     seconds: float
+    digest: str = ""
 
 
 def planned(plan: Plan, orders: Iterable[tuple[str, Sequence[str]]]) -> Plan:

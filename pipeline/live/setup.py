@@ -22,13 +22,15 @@ from pipeline.study.simulation import Task
 
 _NS_PER_S = 1e9
 _WARM_UP_STEPS = 50
+_RECORDED_BY = {"conditions", "axes", "streams", "events", "display", "estimators", "shown", "task", "recording"}
 
 
 @dataclass(frozen=True)
 class Setup:
     """What does not change while a study is run.
 
-    `simulated` says so where readings are, `mouse` that a pointer is the hand.
+    `simulated` says so where readings are, `mouse` that a pointer is the hand. `links` are the addresses, by role, that
+    phones and questionnaires join at.
     """
 
     study: Study
@@ -42,6 +44,7 @@ class Setup:
     version: str
     mouse: bool = False
     simulated: str = ""
+    links: tuple[tuple[str, str], ...] = ()
 
     def estimator(self, condition: str) -> Estimator:
         """The estimator that a condition shows."""
@@ -106,7 +109,7 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
         {name: build_estimator(study, name) for name in shown},
         tuple((float(x), float(y)) for x, y in targets(study.task)),
         topics,
-        digest_of(study.model_dump_json(exclude={"comparisons", "exclusions", "notes"})),
+        digest_of(study.model_dump_json(include=_RECORDED_BY)),
         version("steadyhand"),
         mouse,
         simulated,

@@ -15,6 +15,7 @@ import numpy as np
 from fusion_core import Sample
 from fusion_core.phone.orientation import rotation
 from pipeline.errors import PipelineError
+from pipeline.live.units import units
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.study.streams import AccelerationStream, PositionStream, ReferenceStream
@@ -52,6 +53,11 @@ def live_streams(study: Study, where: str) -> dict[str, LiveStream]:
                 raise PipelineError(
                     f"{where}: streams.{name}: a live study does not correct for the phone's mounting; leave out"
                     " mounting_xyzw, lever_arm_mm and calibrate_s, or show fusion_adaptive, which finds it"
+                )
+            of_body = study.recording.senders[name].axes
+            if not np.isfinite(units(study.recording.senders[name]).back_xyzw).all():
+                raise PipelineError(
+                    f"{where}: recording: senders.{name}: axes {list(of_body)} mirror the phone, which no turn does"
                 )
             axes = tuple(_ALL_AXES.index(axis) for axis in study.axes)
             gravity = np.array(stream.gravity_mm_s2)

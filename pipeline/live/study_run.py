@@ -18,6 +18,7 @@ from pipeline.live.events import (
     NOTHING,
     Action,
     Actions,
+    Agreed,
     Close,
     Closed,
     Disk,
@@ -77,6 +78,7 @@ class StudyRun:
     asked: Mapping[str, tuple[int, str]] = field(default_factory=dict)
     tokens: int = 0
     closed: Closed | None = None
+    agreed: Agreed | None = None
     traces: tuple[tuple[int, float | None, float | None], ...] = ()
     lights_ns: int = 0
     drawn: tuple[int, ...] = ()
@@ -515,4 +517,5 @@ _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Disk: _disk,
     Saved: _saved,
     Closed: _closed,
+    Agreed: lambda run, event: (changed(run, agreed=event), NOTHING),
 }

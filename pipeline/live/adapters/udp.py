@@ -1,0 +1,97 @@
+"""Readings by UDP, JSON: one datagram is one reading or a few. What is too much, unknown or damaged is counted only."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from secrets import compare_digest
+from typing import Any
+
+from pipeline.live.events import Reading
+from pipeline.live.limits import Flow, admit
+from pipeline.live.messages import DATAGRAM_BYTES, Datagram, MessageError, parse_datagram
+from pipeline.live.setup import Setup
+from pipeline.live.units import Units, in_si, units
+
+_PER_SECOND = 1000.0  # datagrams of one source
+_SOURCES = 64
+_MS_PER_S = 1000.0
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A stream that comes in here: what its readings hold, their units, and the address they must come from."""
+
+    content: str
+    units: Units
+    source: str
+
+
+def expected(setup: Setup, port: int) -> dict[str, Expected]:
+    """The streams of a port, by name."""
+    found = {}
+    for name, sender in setup.recording.senders.items():
+        if sender.udp_json is not None and sender.udp_json.port == port:
+            found[name] = Expected(setup.streams[name].content, units(sender), sender.udp_json.source)
+    return found
+
+
+class Receiver(asyncio.DatagramProtocol):
+    """One port. `refused` counts what was dropped, by reason."""
+
+    def __init__(
+        self,
+        streams: Mapping[str, Expected],
+        key: str,
+        happens: Callable[[Reading], None],
+        now_ns: Callable[[], int],
+    ) -> None:
+        self._streams, self._key, self._happens, self._now_ns = streams, key, happens, now_ns
+        self._flows: dict[str, Flow] = {}
+        self.refused: Counter[str] = Counter()
+
+    def datagram_received(self, data: bytes, address: tuple[str | Any, int]) -> None:
+        """One datagram."""
+        now, source = self._now_ns(), str(address[0])
+        if source not in self._flows and len(self._flows) >= _SOURCES:
+            self.refused["too many sources"] += 1
+            return
+        flow = self._flows.get(source, Flow(_PER_SECOND, now))
+        self._flows[source], admitted = admit(flow, _PER_SECOND, now)
+        if not admitted:
+            self.refused["too many datagrams"] += 1
+            return
+        if len(data) > DATAGRAM_BYTES:
+            self.refused["too long"] += 1
+            return
+        try:
+            readings = parse_datagram(data)
+        except MessageError:
+            self.refused["not understood"] += 1
+            return
+        for reading in readings:
+            self._take(reading, source, now)
+
+    def _take(self, datagram: Datagram, source: str, now: int) -> None:
+        if not compare_digest(datagram.key.encode(), self._key.encode()):
+            self.refused["wrong key"] += 1
+            return
+        stream = self._streams.get(datagram.stream)
+        if stream is None or stream.source not in ("any", source):
+            self.refused["no such stream"] += 1
+            return
+        values = in_si(stream.units, stream.content, datagram)
+        if values is None:
+            self.refused["not of the stream's kind"] += 1
+            return
+        sent = None if datagram.t is None else datagram.t * _MS_PER_S
+        self._happens(Reading(datagram.stream, None, now, values, datagram.seq, sent))
+
+
+async def listen(host: str, port: int, receiver: Receiver) -> asyncio.DatagramTransport:
+    """Open a port. OSError where it is taken."""
+    running = asyncio.get_running_loop()
+    transport, _ = await running.create_datagram_endpoint(lambda: receiver, local_addr=(host, port))
+    return transport

@@ -1,0 +1,64 @@
+"""A page's WebSocket: frames in, within all limits; messages out, never faster than they are read."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from contextlib import suppress
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from pipeline.live.events import Role
+from pipeline.live.limits import Flow, admit
+from pipeline.live.loop import Loop, Outbox
+from pipeline.live.messages import MessageError, parse
+from pipeline.live.outgoing import to_json
+
+_PER_SECOND = 300.0
+MOST_SOCKETS = 16
+FORBIDDEN, TOO_MUCH, CROWDED = 4403, 4408, 4429
+refused: Counter[str] = Counter()
+"""What pages sent that was not taken, by reason."""
+
+
+async def serve(socket: WebSocket, role: Role, loop: Loop) -> None:
+    """Serve a page that may connect, until it goes."""
+    await socket.accept()
+    if len(loop.pages) >= MOST_SOCKETS:
+        await socket.close(CROWDED)
+        return
+    client, outbox = loop.join(role)
+    sending = asyncio.create_task(_send(socket, outbox))
+    receiving = asyncio.create_task(_receive(socket, role, client, loop))
+    try:
+        await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in (sending, receiving):
+            task.cancel()
+        await asyncio.gather(sending, receiving, return_exceptions=True)
+        loop.leave(role, client)
+        with suppress(RuntimeError, WebSocketDisconnect):  # it has gone already
+            await socket.close(TOO_MUCH)
+
+
+async def _send(socket: WebSocket, outbox: Outbox) -> None:
+    while not outbox.full:
+        message = await outbox.get()
+        await socket.send_text(to_json(message).decode())
+
+
+async def _receive(socket: WebSocket, role: Role, client: int, loop: Loop) -> None:
+    flow = Flow(_PER_SECOND, loop.now_ns())
+    while not flow.is_flood:
+        try:
+            frame = await socket.receive_text()
+        except (WebSocketDisconnect, KeyError):  # KeyError: a frame of bytes
+            return
+        flow, admitted = admit(flow, _PER_SECOND, loop.now_ns())
+        if not admitted:
+            refused["too many"] += 1
+            continue
+        try:
+            loop.hear(role, client, parse(role, frame))
+        except MessageError:
+            refused["not understood"] += 1

@@ -1,0 +1,194 @@
+"""Runs a study: one clock, events into the core, its actions carried out. The only owner of the state.
+
+Everything happens in one thread, so there is nothing to lock. Files are written in a thread of their own, a batch at a
+time and in order; what came of it is an event like any other. Every 0.5 s what was written is put on the disk.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+
+from pipeline.live import study_run
+from pipeline.live.adapters.mouse import MouseHand
+from pipeline.live.clerk import Clerk, FileAction, agreement
+from pipeline.live.events import (
+    Action,
+    Actions,
+    Agreed,
+    Closed,
+    Event,
+    Joined,
+    Left,
+    Open,
+    Role,
+    Said,
+    Show,
+    Tell,
+    Tick,
+    Write,
+)
+from pipeline.live.messages import Incoming, Mouse
+from pipeline.live.outgoing import Outgoing, Whole
+from pipeline.live.plan import Plan
+from pipeline.live.setup import Setup
+
+_TICK_S = 0.005
+_FLUSH_NS = 500_000_000
+_FILES_S = 0.1
+_MOST_WAITING = 256  # messages of one page: one that does not read is closed
+
+
+class Clock:
+    """Recorder time: the wall clock at start, and what the monotonic clock has counted since."""
+
+    def __init__(self) -> None:
+        self._epoch_ns = time.time_ns() - time.monotonic_ns()
+
+    def __call__(self) -> int:
+        """Now, in ns."""
+        return self._epoch_ns + time.monotonic_ns()
+
+
+class Outbox:
+    """What waits to be sent to one page. Of states and lights only the newest waits."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Outgoing] = deque()
+        self._news = asyncio.Event()
+        self.full = False
+
+    def put(self, message: Outgoing) -> None:
+        """One more message."""
+        if isinstance(message, Whole):
+            kept = (one for one in self._waiting if not (isinstance(one, Whole) and one.type == message.type))
+            self._waiting = deque(kept)
+        self.full = self.full or len(self._waiting) >= _MOST_WAITING
+        if not self.full:
+            self._waiting.append(message)
+        self._news.set()
+
+    async def get(self) -> Outgoing:
+        """The next message, when there is one."""
+        while not self._waiting:
+            self._news.clear()
+            await self._news.wait()
+        return self._waiting.popleft()
+
+
+class Loop:
+    """A study that is run. `happens` takes events from adapters; `pages` are the outboxes by client."""
+
+    def __init__(self, setup: Setup, folder: Path, clerk: Clerk, known: Plan, clock: Callable[[], int]) -> None:
+        self.run = study_run.begin(setup, known)
+        self.now_ns, self.pages = clock, dict[int, Outbox]()
+        self._folder, self._clerk = folder, clerk
+        self._files: list[Action] = []
+        self._urgent = asyncio.Event()
+        self._clients = count(1)
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="journal")
+        self._checks = set[asyncio.Task[None]]()
+        self._opened = "", ""
+        start = setup.task.path_mm[0] if setup.task.path_mm else setup.targets_mm[0]
+        self._mouse = MouseHand(setup.study, dict(setup.streams), start, clock()) if setup.mouse else None
+
+    # --- what adapters call
+
+    def join(self, role: Role) -> tuple[int, Outbox]:
+        """A page has connected."""
+        client = next(self._clients)
+        self.pages[client] = Outbox()
+        self.happens(Joined(role, client, self.now_ns()))
+        return client, self.pages[client]
+
+    def leave(self, role: Role, client: int) -> None:
+        """Its connection is gone."""
+        self.pages.pop(client, None)
+        self.happens(Left(role, client, self.now_ns()))
+
+    def hear(self, role: Role, client: int, message: Incoming) -> None:
+        """A page has sent a message."""
+        if isinstance(message, Mouse):
+            if self._mouse is not None and client == self.run.phone:
+                self._mouse.points_at(message.x, message.y)
+            return
+        self.happens(Said(role, client, message, self.now_ns()))
+
+    def happens(self, event: Event) -> None:
+        """Anything that happens; what follows from it is done before this returns, files excepted."""
+        self.run, actions = study_run.step(self.run, event)
+        self._carry_out(actions)
+
+    def _carry_out(self, actions: Actions) -> None:
+        for action in actions:
+            if isinstance(action, Tell | Show):
+                page = self.pages.get(action.client)
+                if page is not None:
+                    page.put(action.message)
+            elif isinstance(action, FileAction):
+                if isinstance(action, Open):
+                    self._opened = action.participant, action.condition
+                self._files.append(action)
+                if not isinstance(action, Write):
+                    self._urgent.set()
+
+    # --- what goes on by itself
+
+    async def go(self) -> None:
+        """Run until cancelled; what was logged until then is on the disk, cut."""
+        ticking = asyncio.create_task(self._tick())
+        filing = asyncio.create_task(self._file())
+        try:
+            await asyncio.gather(ticking, filing)
+        finally:
+            for task in (ticking, filing, *self._checks):
+                task.cancel()
+            await asyncio.gather(ticking, filing, return_exceptions=True)
+            await asyncio.get_running_loop().run_in_executor(self._thread, self._last)
+            self._thread.shutdown()
+
+    def _last(self) -> None:
+        self._clerk.perform(self._files, self.now_ns)
+        with suppress(OSError):
+            self._clerk.journal.flush()
+        self._clerk.journal.abandon()
+
+    async def _tick(self) -> None:
+        while True:
+            await asyncio.sleep(_TICK_S)
+            now = self.now_ns()
+            if self._mouse is not None:
+                for reading in self._mouse.readings(now):
+                    self.happens(reading)
+            self.happens(Tick(now))
+
+    async def _file(self) -> None:
+        running, flushed = asyncio.get_running_loop(), 0
+        while True:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._urgent.wait(), _FILES_S)
+            self._urgent.clear()
+            batch, self._files = self._files, []
+            events = await running.run_in_executor(self._thread, self._clerk.perform, batch, self.now_ns)
+            if self.now_ns() - flushed >= _FLUSH_NS:
+                flushed = self.now_ns()
+                events.append(await running.run_in_executor(self._thread, self._clerk.flush, self.now_ns))
+            for event in events:
+                self.happens(event)
+                if isinstance(event, Closed) and event.file and "set-aside" not in event.file:
+                    task = asyncio.create_task(self._check(event.file, *self._opened))
+                    self._checks.add(task)
+                    task.add_done_callback(self._checks.discard)
+
+    async def _check(self, file: str, participant: str, condition: str) -> None:
+        """Hold what was shown against the replay of the log, while the questionnaire is filled in."""
+        study, path = self.run.setup.study, self._folder.resolve() / file
+        agreed = await asyncio.to_thread(agreement, study, self._folder, path, participant, condition)
+        if agreed is not None:
+            self.happens(Agreed(file, *agreed, self.now_ns()))
