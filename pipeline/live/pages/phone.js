@@ -2,21 +2,21 @@
 // the button was pressed. What task it is, what is a trial and what counts is the server's; it knows no condition's name.
 
 import { calibrate, pxPerMm } from "./calibrate.js";
-import { draw, handAt, placed } from "./picture.js";
-import { buttonSize, listenToPresses } from "./press.js";
+import { handAt } from "./picture.js";
+import { listenToPresses } from "./press.js";
+import { problems, showProblems } from "./problems.js";
 import { askPermission, startMotion } from "./sensors.js";
 import { clockMs, Link } from "./socket.js";
 import { fill, filled, loadTexts, taskName } from "./texts.js";
+import { View } from "./view.js";
 
 const STALE_MS = 300; // without news: the picture is not to be trusted
 const MOUSE_EVERY_MS = 1000 / 60;
-const BUTTON_MARGIN_PX = 16;
 const ACTIVE = new Set(["practice", "running"]);
 
 const texts = await loadTexts("phone");
 const at = (id) => document.getElementById(id);
 const [picture, button, stage] = ["picture", "select", "stage"].map(at);
-const context = picture.getContext("2d");
 
 const phone = {
   link: null,
@@ -30,8 +30,6 @@ const phone = {
   connection: "connecting",
   said: "",
   stale: false,
-  box: null,
-  look: null,
   problemsSeen: false,
 };
 
@@ -108,35 +106,17 @@ function sendBattery() {
   if (phone.battery) phone.link.send({ type: "battery", level: phone.battery.level });
 }
 
-// ── What is wrong with this browser, and the way out
+// ── What has to be seen to before the picture: what the browser lacks, and how large a mm is where the window has its own
 
-function problems() {
-  const sensors = isSecureContext ? { denied: "denied", unavailable: "unavailable" }[phone.permission] : "insecure";
-  return [sensors, phone.wakeLock ? null : "no_wake_lock"].filter(Boolean);
-}
-
-// What has to be seen to before the picture: what the browser lacks, and the size of a mm where the window has its own.
 function showNext() {
-  const found = phone.problemsSeen || phone.task.mouse ? [] : problems();
-  if (found.length) showProblems(found);
-  else showOnly(phone.task.window === "true_size" && !pxPerMm() ? "calibration" : "stage");
+  const found = phone.problemsSeen || phone.task.mouse ? [] : problems(phone);
+  if (found.length) {
+    showProblems(at("problem-list"), at("go-on"), found, texts);
+    showOnly("problems");
+  } else showOnly(phone.task.window === "true_size" && !pxPerMm() ? "calibration" : "stage");
 }
 
-function showProblems(found) {
-  const words = found.flatMap((name) => [["dt", name], ["dd", `${name}_remedy`]]);
-  at("problem-list").replaceChildren(...words.map(([tag, name]) => element(tag, texts.problem[name])));
-  at("go-on").textContent = texts.problem[found[0] === "no_wake_lock" ? "go_on" : "display_only"];
-  showOnly("problems");
-  at("problems-title").scrollIntoView();
-}
-
-function element(tag, text) {
-  const made = document.createElement(tag);
-  made.textContent = text;
-  return made;
-}
-
-at("start").addEventListener("click", start);
+at("start").addEventListener("click", start, { once: true }); // a second tap would connect twice
 at("go-on").addEventListener("click", () => {
   phone.problemsSeen = true;
   showNext();
@@ -172,7 +152,7 @@ function takeTask(message) {
 function status(name) {
   phone.connection = name;
   if (name === "open") sendBattery();
-  else phone.estimate = null; // what was on the screen before a break is no news after it
+  else Object.assign(phone, { estimate: null, said: "" }); // what was known before a break is no news after it
   show();
 }
 
@@ -196,10 +176,8 @@ let frame = 0;
 function requestDrawing() {
   frame ||= requestAnimationFrame(() => {
     frame = 0;
-    if (!phone.task || !phone.estimate || stage.hidden) return;
-    context.clearRect(0, 0, picture.width, picture.height);
-    draw(context, phone.task, phone.box, phone.estimate, phone.state.target, phone.look);
-    if (phone.drawnN === phone.estimate.n) return;
+    const painted = phone.task && phone.estimate && view.paint(phone.task, phone.estimate, phone.state.target);
+    if (!painted || phone.drawnN === phone.estimate.n) return;
     const isFirst = phone.drawnN === null;
     phone.drawnN = phone.estimate.n;
     if (isFirst) show();
@@ -208,17 +186,7 @@ function requestDrawing() {
 }
 
 function fit() {
-  const [width, height, ratio] = [stage.clientWidth, stage.clientHeight, devicePixelRatio];
-  if (!phone.task || !width) return;
-  Object.assign(picture, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const size = buttonSize(phone.task.button.mm);
-  const largest = phone.task.window === "true_size" ? (pxPerMm() ?? Infinity) : Infinity;
-  phone.box = placed(phone.task, width, height, { side: side(), room: size + BUTTON_MARGIN_PX, largest });
-  Object.assign(button.style, { width: `${size}px`, height: `${size}px` });
-  stage.classList.toggle("left", side() === "left");
-  const { box } = phone;
-  Object.assign(at("message").style, { left: `${box.left + box.width / 2}px`, top: `${box.top + box.height / 2}px` });
+  if (phone.task) view.fit(phone.task, side());
   requestDrawing();
 }
 
@@ -226,17 +194,6 @@ function side() {
   const stated = phone.task.button.side;
   return leftHanded.checked ? { left: "right", right: "left" }[stated] : stated;
 }
-
-function readLook() {
-  const style = getComputedStyle(document.documentElement);
-  const names = ["ink", "soft", "paper", "beyond", "path", "target"];
-  phone.look = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
-  requestDrawing();
-}
-
-new ResizeObserver(fit).observe(stage);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readLook);
-readLook();
 
 // ── Words and the button's state
 
@@ -294,6 +251,7 @@ function sendMouse() {
   moved = null;
 }
 
+const view = new View({ stage, picture, button, message: at("message") }, fit);
 fill(document, texts);
 if (sessionStorage.getItem("started")) startAgain();
 else showOnly("begin");

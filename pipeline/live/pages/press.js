@@ -38,7 +38,7 @@ export function listenToPresses(button, { confirmMs, begin, select }) {
   });
   for (const name of ["pointerup", "pointercancel"]) addEventListener(name, up);
   addEventListener("keydown", (event) => {
-    const isElsewhere = event.target.closest("button, input") && event.target !== button;
+    const isElsewhere = event.target.closest?.("button, input") && event.target !== button;
     if (!isKey(event) || button.disabled || isElsewhere) return;
     event.preventDefault(); // no second press by the click that a button makes of a key
     if (!event.repeat) down(event);

@@ -61,6 +61,7 @@ def _opened(tab: Tab, server: LiveServer, *, sensors: bool = True, script: str =
     wait_for(tab, "#start")
     touch(tab, "#start")
     server.wait("phone", "hello")
+    until(lambda: "Target 1" in text(tab, "#badge"), "the task is known")
 
 
 def _shown(server: LiveServer, n: int, x: float = -550.0) -> Message:
