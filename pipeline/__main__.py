@@ -278,6 +278,40 @@ def inspect(
     command.inspect(files, as_json)
 
 
+@app.command("new")
+def new_study(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A folder with logs, tables, or both.")],
+    template: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="An empty study with example tables: peephole, tlx, fitts or between."),
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="The study's title. Default: the folder's name.")] = None,
+    conditions: Annotated[
+        str | None, typer.Option(metavar="NAME,…", help="The conditions, the baseline first.")
+    ] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="HEADER=COLUMN", help="What a header of your tables means; may be repeated."),
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="Of positions in a table of trials: mm, cm, m or px.")
+    ] = None,
+    px_per_mm: Annotated[float | None, typer.Option(min=0.001, help="Pixels in a millimetre of the display.")] = None,
+    gravity: Annotated[
+        str | None,
+        typer.Option(metavar="AXIS", help="Along which of the tracker's axes gravity points, such as -y."),
+    ] = None,
+) -> None:
+    """Look at what a folder holds and write a study.yaml for it, with a comment on every line.
+
+    What cannot be told is asked on a terminal; elsewhere the options say it, or the likeliest is taken and named.
+    Nothing is ever overwritten.
+    """
+    from pipeline.commands import new as command
+
+    command.run(folder, template, command.stated_by(title, conditions, columns or [], unit, px_per_mm, gravity))
+
+
 app.command()(planning.power)
 app.command()(planning.plan)
 

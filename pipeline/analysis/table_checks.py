@@ -15,6 +15,7 @@ import pandas as pd
 from pipeline.analysis.answer_ranges import remedy, shifted_range
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.guessing.codes import missing_codes
 from pipeline.study.measures import measure
 from pipeline.study.scoring_rules import RULES, ScoringRule, is_weight
 from pipeline.study.scoring_settings import ScoringEntry
@@ -35,8 +36,6 @@ _LONG_S, _LONG_TRIAL_S = 10_000.0, 200.0  # median of a session's time, and of a
 _OF_A_TRIAL = ("trial", "movement", "reaction", "response", "selection")
 _IN_MS = ("start_ms", "selection_ms")
 _SINCE_1970 = {1e9: "seconds", 1e12: "milliseconds", 1e15: "microseconds", 1e18: "nanoseconds"}
-_CODES = (-9.0, -99.0, -999.0, -9999.0, 99.0, 999.0, 9999.0)
-_FAR = 3.0  # times the largest of the others: a code, not a slow participant
 _OTHERS_MIN = 3
 _TLX = (0.0, 100.0)  # however it was asked
 _CENTRED = (-3.0, 3.0)  # answers of the UEQ that are coded around zero, and its scores
@@ -111,7 +110,7 @@ def unit_of_time(name: str, source: str, value: FloatArray, times: tuple[str, st
 
 def missing_code(name: str, source: str, value: FloatArray, participants: pd.Series) -> Iterator[Finding]:
     """−99, 999 and their like, where all other values of the measure are far from them."""
-    codes = [code for code in _CODES if _stands_out(value, code)]
+    codes = missing_codes(value)
     check = of(MISSING_CODE, name)
     if not codes:
         yield Finding(check, "green", "none", "none")
@@ -128,16 +127,6 @@ def missing_code(name: str, source: str, value: FloatArray, participants: pd.Ser
         " in study.yaml, or leave the cell empty"
     )
     yield Finding(check, "amber", f"{named} in {int(rows.sum())} rows", "none", message)
-
-
-def _stands_out(value: FloatArray, code: float) -> bool:
-    """Is the code among the values, and nothing else like it?"""
-    rest = value[~np.isin(value, _CODES)]
-    if not np.any(value == code) or len(rest) < _OTHERS_MIN:
-        return False
-    if code < 0:
-        return bool(rest.min() >= 0 or (code <= -99.0 and rest.min() > code / _FAR))
-    return bool(rest.max() * _FAR < code and rest.min() >= 0)
 
 
 def _by_questionnaire(values: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:

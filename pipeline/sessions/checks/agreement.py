@@ -12,6 +12,7 @@ from pipeline.sessions.checks.motion import Compared, Interval
 from pipeline.sessions.checks.recorded import Imu, Positions, Recorded
 
 LAG, SIZE, AXES, SPEED = "lag", "size of the movement", "frame of the movement", "speed"
+LAG_UNKNOWN = "cannot be told from this movement"
 
 _EXPLAINED_MIN = 0.15  # of the movement; recordings without a fault reach 0.66 to 0.99
 LAG_AMBER_S, LAG_RED_S = 0.03, 0.075  # recordings without a fault are within 0.01
@@ -59,7 +60,7 @@ def lag(recorded: Recorded) -> Iterator[Finding]:
     motion, stated_s = recorded.motion, expected_lag_s(tracker, imu)
     expected = f"{in_ms(stated_s)} by study.yaml"
     if motion is None or not see_one_movement(motion) or motion.lag_s.width > _LAG_WIDE_S or motion.lag_beyond:
-        yield Finding(LAG, "green", "cannot be told from this movement", expected)
+        yield Finding(LAG, "green", LAG_UNKNOWN, expected)
         return
     found = lag_text(motion.lag_s)
     off_s = motion.lag_s.value - stated_s

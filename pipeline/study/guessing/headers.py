@@ -34,7 +34,7 @@ _WORDS: Mapping[str, str] = {
         ensayo ensayos intento prueba numeroensayo
         """,
     "session": "session sessionid sessionno sessionnr sitzung termin seance sesion",
-    "period": "period periode reihenfolge position order ordernumber ordre orden periodo",
+    "period": "period periode reihenfolge order ordernumber ordre orden periodo",
     "sequence": "sequence sequenz abfolge secuencia",
     "questionnaire": "questionnaire instrument survey fragebogen cuestionario encuesta",
     "scale": "scale subscale item question skala subskala frage echelle escala pregunta itemname",
@@ -80,6 +80,7 @@ _TIMES = {
 }
 _UNIT_WORDS = {word: unit for units in (_LENGTHS, _TIMES) for unit, words in units.items() for word in words.split()}
 _UNIT = re.compile(r"(?:[\s_.\-]*[\(\[]\s*(\w+)\s*[\)\]]|[\s_.\-]+(?:in[\s_]+)?(\w+))\s*$")
+LENGTHS: Sequence[str] = tuple(_LENGTHS)
 UNITS: Mapping[str, Sequence[str]] = {
     **{f"{place}_{axis}": tuple(_LENGTHS) for place in _PLACES for axis in "xyz"},
     "target_width": tuple(_LENGTHS),

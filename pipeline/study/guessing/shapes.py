@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+from pipeline.study.guessing.codes import number_of
 from pipeline.study.guessing.headers import meaning
 from pipeline.study.scoring_rules import RULES, is_weight, weighed_item
 
-_NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
-_NO_VALUE = ("", "NA", "N/A", "NaN", "nan", "-", "n/a", "k. A.", "k.A.")
+NO_VALUE = ("", "NA", "N/A", "NaN", "nan", "-", "n/a", "k. A.", "k.A.")
 _OF_PEOPLE = ("age", "sex", "participant", "condition", "session", "trial", "period", "sequence", "practice")
 _SHARE_OF_NUMBERS = 0.8
+_MEASURE_WORD = re.compile(
+    "time|zeit|temps|tiempo|rt|mt|duration|dauer|error|fehler|erreur|score|rating|count|anzahl|number|accuracy|speed|"
+    "throughput|value|wert|tlx|sus|mse|rmse|hits|clicks",
+    re.IGNORECASE,
+)
 _ITEMS_MIN = 4
 
 Entry = dict[str, object]
@@ -24,10 +30,30 @@ def numeric_columns(header: Sequence[str], cells: Sequence[Sequence[str]], decim
 
 
 def _are_numbers(cells: Sequence[str], decimal: str) -> bool:
-    given = [cell for cell in cells if cell not in _NO_VALUE]
-    other = "," if decimal == "." else "."
-    numbers = sum(_NUMBER.fullmatch(cell) is not None and other not in cell for cell in given)
+    given = [cell for cell in cells if cell not in NO_VALUE]
+    numbers = sum(number_of(cell, decimal) is not None for cell in given)
     return bool(given) and numbers >= _SHARE_OF_NUMBERS * len(given)
+
+
+_TLX_WORDS = {
+    "mental": "mental|geistig|cognit",
+    "physical": "phys|körper|koerper|korper|físic|fisic",
+    "temporal": "tempor|zeit",
+    "performance": "perform|leistung|rendim|réussite|reussite",
+    "effort": "effort|anstreng|aufwand|esfuerz",
+    "frustration": "frustr",
+}
+
+
+def tlx_names(names: Sequence[str]) -> dict[str, str]:
+    """Headers of the six scales of a NASA-TLX in other words, each with its name; empty if not all are there."""
+    found: dict[str, str] = {}
+    for scale, words in _TLX_WORDS.items():
+        fits = [name for name in names if re.search(words, name, re.IGNORECASE) and not is_weight(name)]
+        if len(fits) != 1:
+            return {}
+        found[fits[0]] = scale
+    return found if len(found) == len(_TLX_WORDS) else {}
 
 
 def questionnaire_of(names: Sequence[str]) -> tuple[str, list[str]] | None:
@@ -72,27 +98,54 @@ def _by_condition(table: str, values: Sequence[str], conditions: Sequence[str]) 
     if all(condition in values for condition in conditions):
         what: Entry = {"measure": "time_s"} if table == "measures" else {"questionnaire": "sus", "scale": "score"}
         return {"condition": list(conditions), **what}
-    what_word = "measure" if table == "measures" else "scale"
+    crossed = crossed_headers(values, conditions)
+    return None if crossed is None else crossed.entry
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """Columns of which each is a condition and something else, the conditions, and the entry of `wide` for them."""
+
+    headers: tuple[str, ...]
+    conditions: tuple[str, ...]
+    entry: Entry
+
+
+def crossed_headers(values: Sequence[str], conditions: Sequence[str]) -> Crossed | None:
+    """Columns such as time_kinect, time_fusion: each word before a mark with each one after it. None where none are.
+
+    The conditions are those that are known, or else what stands on the side that does not look like measures.
+    """
     for mark in ("_", " ", "-", ".", ":", "/"):
-        for pattern in (f"{{condition}}{mark}{{{what_word}}}", f"{{{what_word}}}{mark}{{condition}}"):
-            if _fits(pattern, values, conditions):
-                return {"columns": pattern, **({} if table == "measures" else {"questionnaire": "nasa_tlx"})}
+        for cut in (str.rpartition, str.partition):
+            pairs = {name: (cut(name, mark)[0], cut(name, mark)[2]) for name in values if mark in name}
+            found = _crossed(pairs, mark, conditions)
+            if found is not None:
+                return found
     return None
 
 
-def _fits(pattern: str, values: Sequence[str], conditions: Sequence[str]) -> bool:
-    """Does every condition stand in a column of the pattern, with the same words beside each?"""
-    named = "|".join(re.escape(condition) for condition in conditions)
-    expression = "".join(
-        f"(?P<condition>{named})"
-        if piece == "{condition}"
-        else "(?P<what>.+)"
-        if piece.startswith("{")
-        else re.escape(piece)
-        for piece in re.split(r"(\{\w+\})", pattern)
-    )
-    found = [match for match in (re.fullmatch(expression, value) for value in values) if match]
-    words = {
-        condition: {match["what"] for match in found if match["condition"] == condition} for condition in conditions
-    }
-    return bool(found) and all(one and one == words[conditions[0]] for one in words.values())
+def _crossed(pairs: Mapping[str, tuple[str, str]], mark: str, conditions: Sequence[str]) -> Crossed | None:
+    sides = tuple(tuple(dict.fromkeys(pair[side] for pair in pairs.values())) for side in (0, 1))
+    if len(pairs) < 2 or len(pairs) != len(sides[0]) * len(sides[1]) or not all((*sides[0], *sides[1])):
+        return None
+    if conditions:
+        side = next((side for side in (1, 0) if set(sides[side]) == set(conditions)), None)
+    else:
+        side = _side_of_conditions(sides)
+    if side is None:
+        return None
+    others = sides[1 - side]
+    what = "{measure}" if len(others) > 1 else others[0]
+    pattern = f"{what}{mark}{{condition}}" if side else f"{{condition}}{mark}{what}"
+    entry: Entry = {"columns": pattern, **({} if len(others) > 1 else {"measure": others[0]})}
+    return Crossed(tuple(pairs), sides[side], entry)
+
+
+def _side_of_conditions(sides: tuple[tuple[str, ...], ...]) -> int | None:
+    """Which side of the headers names the conditions: the one with several words and no word of a measure."""
+    measured = [any(_MEASURE_WORD.search(word) for word in side) for side in sides]
+    several = [len(side) > 1 for side in sides]
+    numbered = [all(word.isdigit() for word in side) for side in sides]
+    fits = [several[side] and not measured[side] and not numbered[side] for side in (0, 1)]
+    return 1 if fits == [False, True] else 0 if fits == [True, False] else None

@@ -1,0 +1,286 @@
+"""`steadyhand new`: what it writes passes `report` at once, every line has a comment, and nothing is overwritten."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import openpyxl  # type: ignore[import-untyped]
+import pytest
+import yaml
+
+from pipeline.commands.new import proposed
+from pipeline.commands.new.found import Stated
+from pipeline.commands.new.questions import Questions
+from pipeline.commands.new.templates import NAMES
+from pipeline.errors import PipelineError
+from pipeline.study.folder import load_study
+from tests.conftest import real, write_session
+from tests.pipeline.helpers import Ran, Steadyhand, exit_code, run
+
+CASES = Path(__file__).resolve().parents[2] / "data" / "cases_in"
+New = Callable[..., Ran]
+
+
+@pytest.fixture
+def new(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> New:
+    """`steadyhand new`, where there is no terminal."""
+    return lambda *words: run(capsys, monkeypatch, "new", *words)
+
+
+def written(folder: Path, name: str, text: str, encoding: str = "utf-8") -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(text, encoding=encoding)
+    return folder
+
+
+def settings(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = yaml.safe_load((folder / "study.yaml").read_text(encoding="utf-8"))
+    return content
+
+
+def assert_commented(folder: Path) -> None:
+    for line in (folder / "study.yaml").read_text(encoding="utf-8").splitlines():
+        assert "# " in line, line
+
+
+@pytest.mark.parametrize(
+    ("case", "n"),
+    [
+        ("between", 24),
+        ("cp1252", 8),
+        ("german_spreadsheet", 8),
+        ("milliseconds", 8),
+        ("minus99", 9),
+        ("mixed_design", 10),
+        ("practice", 8),
+        ("tlx_wide_weights", 12),
+        ("wide", 10),
+    ],
+)
+def test_what_people_bring_goes_from_new_to_results(
+    tmp_path: Path, new: New, steadyhand: Steadyhand, case: str, n: int
+) -> None:
+    study = tmp_path / case
+    shutil.copytree(CASES / case, study, ignore=shutil.ignore_patterns("study.yaml"))
+    made = new(study)
+    assert made.code == 0
+    assert f"Next: steadyhand report {study}" in made.out
+    assert_commented(study)
+    assert steadyhand("compare", study).code == 0
+    rows = steadyhand.results()["comparisons"]
+    assert max(row["n"] for row in rows) == n
+    assert {row["status"] for row in rows} == {"ok"}
+
+
+@pytest.mark.parametrize("template", NAMES)
+@pytest.mark.usefixtures("blank_figures")
+def test_a_template_passes_report_at_once(tmp_path: Path, new: New, steadyhand: Steadyhand, template: str) -> None:
+    study = tmp_path / "study"
+    assert new(study, "--template", template).code == 0
+    assert_commented(study)
+    assert steadyhand("report", study, "--format", "html,json").code == 0
+    assert {row["status"] for row in steadyhand.results()["comparisons"]} == {"ok"}
+    assert load_study(study).data_origin == "simulated"
+
+
+def test_nothing_is_ever_overwritten(tmp_path: Path, new: New) -> None:
+    study = written(tmp_path / "study", "study.yaml", "mine")
+    for words in ((), ("--template", "tlx")):
+        ran = new(study, *words)
+        assert ran.code == 2
+        assert "study.yaml: already exists, and is never overwritten" in ran.err
+    other = written(tmp_path / "other", "questionnaires.csv", "mine")
+    ran = new(other, "--template", "tlx")
+    assert ran.code == 2
+    assert "questionnaires.csv: already exists" in ran.err
+    assert not (other / "study.yaml").exists()
+    assert (other / "questionnaires.csv").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_folder_without_anything_names_the_templates(tmp_path: Path, new: New) -> None:
+    ran = new(written(tmp_path / "study", "notes.txt", "nothing here\n"))
+    assert ran.code == 2
+    assert "holds no logs (.mcap) and no tables that a study can use" in ran.err
+    assert "--template peephole (or tlx, fitts, between)" in ran.err
+    assert new(tmp_path / "study", "--template", "fits").err.count('did you mean "fitts"?') == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "language"),
+    [
+        ("Subject,Technique,Trial,Goal X (mm),Goal Y (mm),Click X (mm),Click Y (mm),Start (ms),End (ms)", "English"),
+        ("Versuchsperson,Bedingung,Durchgang,ZielX_mm,ZielY_mm,AuswahlX_mm,AuswahlY_mm,Beginn_ms,Ende_ms", "German"),
+        ("Sujet,Système,Essai,Cible X [mm],Cible Y [mm],Clic X [mm],Clic Y [mm],Début [ms],Fin [ms]", "French"),
+        ("Sujeto,Condición,Ensayo,Objetivo X mm,Objetivo Y mm,Toque X mm,Toque Y mm,Inicio ms,Fin ms", "Spanish"),
+    ],
+)
+def test_headers_are_understood_in_four_languages(
+    tmp_path: Path, new: New, steadyhand: Steadyhand, header: str, language: str
+) -> None:
+    words = header.replace("Toque X mm", "Toque X (mm)").replace("Toque Y mm", "Toque Y (mm)")
+    rows = "".join(
+        f"{person},{condition},{trial},0,0,3,{4 + person},{1000 * trial},{1000 * trial + 500}\n"
+        for person in (1, 2, 3)
+        for condition in "ab"
+        for trial in (1, 2)
+    )
+    study = written(tmp_path / language, "data.csv", f"{words}\n{rows}")
+    assert new(study).code == 0
+    columns = list(settings(study)["columns"]["trials"].values())
+    assert columns[:3] == ["participant", "condition", "trial"] if language != "English" else "participant" in columns
+    assert columns[-2:] == ["start_ms", "selection_ms"]
+    assert steadyhand("compare", study).code == 0
+    times = {r["mean"] for r in steadyhand.results()["descriptives"] if r["measure"] == "trial_time_s"}
+    assert times == {0.5}
+
+
+def test_a_workbook_with_a_title_and_german_scales_of_the_tlx(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    sheet.append(["Fragebogen Herbst"])
+    sheet.append(["VP", "Bedingung", "Geistige", "Körperliche", "Zeitliche", "Leistung", "Anstrengung", "Frustration"])
+    for person in (1, 2, 3):
+        for condition, more in (("alt", 4), ("neu", 0)):
+            sheet.append([f"VP{person}", condition, *(more + person + scale for scale in range(6))])
+    study = tmp_path / "study"
+    study.mkdir()
+    book.save(study / "tlx.xlsx")
+    assert new(study).code == 0
+    made = settings(study)
+    assert made["format"] == {"header_row": 2}
+    assert made["scoring"] == {"nasa_tlx": {"rule": "raw_tlx", "range": [0, 20]}}
+    assert steadyhand("compare", study).code == 0
+    means = {
+        r["condition"]: r["mean"] for r in steadyhand.results()["descriptives"] if r["measure"] == "nasa_tlx/raw_tlx"
+    }
+    assert means == pytest.approx({"alt": (4 + 2 + 2.5) * 5, "neu": (2 + 2.5) * 5})
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "expected"),
+    [
+        (
+            "id,time_a,time_b,age\nP1,3,4,20\nP2,5,6,30\n",
+            ("--column", "id=participant"),
+            {"columns": "time_{condition}"},
+        ),
+        ("subject,a,b\nP1,3,4\nP2,5,6\n", ("--conditions", "b,a"), {"condition": ["b", "a"]}),
+    ],
+)
+def test_a_row_a_participant_with_a_column_a_condition(
+    tmp_path: Path, new: New, steadyhand: Steadyhand, text: str, words: tuple[str, ...], expected: dict[str, Any]
+) -> None:
+    study = written(tmp_path / "study", "data.csv", text)
+    assert new(study, *words).code == 0
+    entry = settings(study)["wide"]["measures"]
+    assert {key: sorted(entry[key]) for key in expected} == {key: sorted(value) for key, value in expected.items()}
+    assert steadyhand("compare", study).code == 0
+    assert steadyhand.results()["comparisons"][0]["n"] == 2
+
+
+def test_logs_give_streams_with_rates_noise_and_gravity(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
+    study = tmp_path / "study"
+    for person in ("P01", "P02"):
+        for condition in ("kinect", "fusion"):
+            write_session(study / "logs" / f"{person}_{condition}.mcap")
+    made = new(study, "--conditions", "kinect,fusion")
+    assert made.code == 0
+    assert "which would read 4 sessions and run raw, positions, fusion and adaptive on each" in made.out
+    assert_commented(study)
+    found = settings(study)
+    assert found["conditions"] == ["kinect", "fusion"]
+    assert found["sessions"] == "logs/{participant}_{condition}.mcap"
+    assert found["events"] == {"topic": "/events"}
+    assert found["streams"]["tracker"]["topic"] == "/tracker/position"
+    assert found["streams"]["imu"]["gravity_mm_s2"] == [0.0, -9806.65, 0.0]
+    text = (study / "study.yaml").read_text(encoding="utf-8")
+    assert "the tracker, 30 Hz; if it stamps on delivery, say stamp: arrival and latency_s" in text  # too short to see
+    ran = steadyhand("compare", study)
+    assert ran.code == 0
+    assert {row["measure"] for row in steadyhand.results()["comparisons"]} == {
+        "selection_mse_mm2",
+        "trial_time_s",
+        "completion_time_s",
+    }
+
+
+def test_real_logs_give_the_trackers_latency(tmp_path: Path, new: New) -> None:
+    """Three recordings of phones in hand, whose tracker was simulated with 8 mm of noise, 0.1 s late."""
+    study = tmp_path / "study"
+    shutil.copytree(real("phone-in-hand"), study, ignore=shutil.ignore_patterns("study.yaml"))
+    assert new(study).code == 0
+    tracker = settings(study)["streams"]["tracker"]
+    assert (tracker["stamp"], tracker["latency_s"]) == ("arrival", pytest.approx(0.1, abs=0.01))
+    assert tracker["noise_sd_mm"] == pytest.approx(8, rel=0.1)
+
+
+def test_names_that_are_not_built_alike_are_asked_to_be(tmp_path: Path, new: New) -> None:
+    write_session(tmp_path / "study" / "one.mcap")
+    write_session(tmp_path / "study" / "a_b_c_d_e.mcap")
+    ran = new(tmp_path / "study")
+    assert ran.code == 2
+    assert "name the logs P01_kinect.mcap" in ran.err
+
+
+def test_on_a_terminal_only_what_cannot_be_told_is_asked(tmp_path: Path) -> None:
+    """The unit of positions and the baseline; everything else is in the file."""
+    study = tmp_path / "study"
+    shutil.copytree(CASES / "german_spreadsheet", study, ignore=shutil.ignore_patterns("study.yaml"))
+    answers = iter(["inches", "cm", "Fusion"])
+    questions = Questions(lambda _prompt: next(answers))
+    text, _, study_made = proposed(study, Stated(), questions)
+    assert questions.asked == ["In which unit are the positions in trials.csv?", "Which condition is the baseline?"]
+    assert questions.taken == []
+    assert study_made.conditions == ("Fusion", "Kinect")
+    assert "Ziel X: target_x_cm" in text
+
+
+def test_without_a_terminal_what_was_taken_is_said_with_its_option(tmp_path: Path, new: New) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(CASES / "german_spreadsheet", study, ignore=shutil.ignore_patterns("study.yaml"))
+    out = new(study).out
+    assert "Taken for granted: In which unit are the positions in trials.csv? mm (--unit to say otherwise)" in out
+    assert "Taken for granted: Which condition is the baseline? Kinect (--conditions to say otherwise)" in out
+
+
+def test_files_that_are_not_used_are_named(tmp_path: Path, new: New) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(CASES / "wide", study, ignore=shutil.ignore_patterns("study.yaml"))
+    written(study, "zzz.csv", "participant,condition,time\n1,kinect,3\n1,fusion,4\n")
+    written(study, "notes.csv", "day,weather\n1,rain\n")
+    out = new(study).out
+    assert "Not used: zzz.csv: measures.csv is read as the measures, and a study has one table" in out
+    assert "Not used: notes.csv: no column is known to name the participants; it has day, weather" in out
+
+
+def test_conditions_that_look_alike_are_refused(tmp_path: Path) -> None:
+    study = written(tmp_path / "study", "m.csv", "participant,condition,time\n1,Kinect,3\n1,kinect,4\n2,fusion,4\n")
+    with pytest.raises(PipelineError, match='the conditions "Kinect" and "kinect" look alike'):
+        proposed(study, Stated(), Questions(None))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--column", "Code"), "should be a header and the column it means, such as --column Code=participant"),
+        (("--unit", "inch"), '--unit: there is no "inch"'),
+        (("--conditions", "kinect"), '--conditions: the data have "fusion" too'),
+    ],
+)
+def test_options_that_cannot_be_understood_are_named(
+    tmp_path: Path, new: New, words: tuple[str, ...], message: str
+) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(CASES / "wide", study, ignore=shutil.ignore_patterns("study.yaml"))
+    ran = new(study, *words)
+    assert ran.code == 2
+    assert message in ran.err
+    assert not (study / "study.yaml").exists()
+
+
+def test_the_help_of_new_names_its_options(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert exit_code(monkeypatch, "new", "--help") == 0
+    assert "--template" in capsys.readouterr().out
