@@ -29,8 +29,8 @@ def inspect(files: Sequence[Path], as_json: bool) -> None:
     rows: list[dict[str, object]] = []
     code = 0
     for path in files:
-        if not path.is_file():
-            raise PipelineError(f"{path}: there is no such file")
+        if not path.exists():
+            raise PipelineError(f"{path}: there is no such file or folder")
         try:
             log = read_log(path, [])
         except SessionError as error:

@@ -37,7 +37,7 @@ def simulate(studies: Sequence[Path], jobs: int | None = None, *, if_needed: boo
 
 def _reach(folder: Path, study: Study, if_needed: bool) -> None:
     """Write the paper's Experiment 1, whose logs are small and come with the study."""
-    from pipeline.study.folder import find_sessions
+    from pipeline.study.session_files import find_sessions
 
     if if_needed and find_sessions(folder, study).sessions:
         return

@@ -75,7 +75,7 @@ def _inputs(stage: Stage, result: Result, sessions: Sequence[Session]) -> dict[s
     paths = [Path(name).as_posix() for name in names if name is not None]
     paths += [name for name in stage.fixed_files if name in result.inputs]
     if stage.reads_log:
-        paths.append(sessions[0].path.relative_to(result.folder).as_posix())
+        paths += [file.relative_to(result.folder).as_posix() for file in sessions[0].files]
     return {path: result.inputs[path] for path in paths}
 
 

@@ -78,8 +78,9 @@ def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], res
     changed = [session for session in sessions if entries[session.id].outcome["set_aside"] == CHANGED]
     if changed:
         for session in changed:
-            with suppress(OSError):  # one that has gone meanwhile is set aside as one that changed
-                result.inputs[session.path.relative_to(result.folder).as_posix()] = file_digest(session.path)
+            for file in session.files:
+                with suppress(OSError):  # one that has gone meanwhile is set aside as one that changed
+                    result.inputs[file.relative_to(result.folder).as_posix()] = file_digest(file)
         entries |= _entries_of_sessions(stage, result, changed, resources)
     return entries
 

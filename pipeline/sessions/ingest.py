@@ -13,7 +13,7 @@ from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import SessionError, did_you_mean
 from pipeline.sessions.checks import check_rows
 from pipeline.sessions.checks.of_log import of_log
-from pipeline.sessions.logs import read_log
+from pipeline.sessions.logs import read_logs
 from pipeline.sessions.logs.log import Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
 from pipeline.sessions.wanted import of_events, of_stream, wanted_by
@@ -36,7 +36,7 @@ def run(work: Work) -> Outcome:
     """One session's positions, imu, events, quality and checks; SessionError with the reason if it cannot be used."""
     study, session = work.study, work.session
     limits = Limits(study.log_limits.unpacked_mib * 2**20, study.log_limits.messages)
-    log = read_log(session.path, wanted_by(study), limits)
+    log = read_logs(session.files, wanted_by(study), limits)
     participant, condition = _participant_and_condition(session, log, study)
     in_part = list(log.faults)
     quality: list[Row] = []

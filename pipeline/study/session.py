@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import did_you_mean
-from pipeline.study.fields import unique
 
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 PLACEHOLDERS = ("participant", "condition", "session")
+
+ANY = "*"
+"""In the last part of a pattern: any text, so that several files may be one session."""
 
 
 def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
@@ -21,9 +23,10 @@ def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
     for name in names:
         if name not in PLACEHOLDERS:
             raise ValueError(f'sessions: placeholder "{{{name}}}" is not known{did_you_mean(name, PLACEHOLDERS)}')
-    unique("sessions: placeholder", tuple(names))
     if not names:
         raise ValueError("sessions: needs a placeholder, such as data/{participant}_{condition}.mcap")
+    if ANY in Path(pattern).parent.as_posix():
+        raise ValueError('sessions: "*" may stand only in the name of the file, behind the last "/"')
     for condition in conditions:
         if "condition" in names and ("_" in condition or "/" in condition):
             raise ValueError(
@@ -34,12 +37,21 @@ def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
 
 @dataclass(frozen=True)
 class Session:
-    """One participant in one condition, which is one log. `participant` and `condition` are None if not yet known."""
+    """One participant in one condition, which is one log. `participant` and `condition` are None if not yet known.
+
+    `path` is its file, or the folder of its `parts` where there are several.
+    """
 
     id: str
     participant: str | None
     condition: str | None
     path: Path
+    parts: tuple[Path, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file of its log."""
+        return self.parts or (self.path,)
 
     @property
     def ids(self) -> dict[str, str | None]:

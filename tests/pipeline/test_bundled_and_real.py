@@ -15,7 +15,8 @@ from fusion_core.accuracy import interpolate, rmse
 from pipeline.engine.stage import Work
 from pipeline.sessions import ingest, recording
 from pipeline.sessions.estimators import build_estimator
-from pipeline.study.folder import find_sessions, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.session_files import find_sessions
 from pipeline.tables import table as tables
 from tests.conftest import CLONE, real
 from tests.pipeline.helpers import Steadyhand

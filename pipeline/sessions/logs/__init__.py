@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -10,25 +10,70 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import SessionError
+from pipeline.sessions.logs.joined import joined
 from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, Readings, Source, Wanted
+from pipeline.sessions.logs.rosbag2 import METADATA, missing_messages, missing_parts
 
-READERS = {".mcap": "pipeline.sessions.logs.mcap"}
+READERS = {
+    ".mcap": "pipeline.sessions.logs.mcap",
+    ".db3": "pipeline.sessions.logs.rosbag2_sqlite",
+    ".bag": "pipeline.sessions.logs.rosbag1",
+}
 """The module that reads a file, by its suffix."""
 
 _PACKED = (".zstd", ".zst")
 
 
 def read_log(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
-    """A log, read by the module for its suffix, in the units and times that the study states.
+    """A log, read by the module for its suffix, in the units and times that the study states; or a folder of its parts.
 
     Raises SessionError if there is no reader for it, or it cannot be used.
     """
-    suffix = (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
-    module = READERS.get(suffix)
+    if path.is_dir():
+        return read_logs([file for file in sorted(path.iterdir()) if file.is_file()], wanted, limits)
+    return read_logs([path], wanted, limits)
+
+
+def read_logs(files: Sequence[Path], wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
+    """The log whose parts are in these files. What is not a log among several files is left alone."""
+    wants = tuple(wanted)
+    if len(files) == 1:
+        return _in_units(_read_one(files[0], wants, limits), wants)
+    logs = [file for file in files if _suffix(file) in READERS]
+    if not logs:
+        names = ", ".join(file.name for file in files[:5])
+        raise SessionError(f"no reader for any of its files ({names}); known: {', '.join(READERS)}")
+    log = joined([(file, _read_part(file, wants, limits, logs)) for file in logs])
+    metadata = next((file for file in files if file.name == METADATA), None)
+    if metadata is not None:
+        faults = missing_parts(metadata, files) or missing_messages(metadata, log)
+        log = replace(log, faults=(*log.faults, *faults))
+    return _in_units(log, wants)
+
+
+def _read_part(file: Path, wants: Sequence[Wanted], limits: Limits, files: Sequence[Path]) -> Log:
+    """One of several parts. One that cannot be read costs itself alone, unless it is the only one."""
+    try:
+        return _read_one(file, wants, limits)
+    except SessionError as error:
+        if len(files) == 1:
+            raise SessionError(f"{file.name}: {error}") from None
+        return Log({}, {}, (str(error),))
+
+
+def _read_one(path: Path, wants: Sequence[Wanted], limits: Limits) -> Log:
+    module = READERS.get(_suffix(path))
     if module is None:
         raise SessionError(f"no reader for files ending in {path.suffix!r}; known: {', '.join(READERS)}")
-    wants = tuple(wanted)
     log: Log = import_module(module).read(path, wants, limits)
+    return log
+
+
+def _suffix(path: Path) -> str:
+    return (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
+
+
+def _in_units(log: Log, wants: Sequence[Wanted]) -> Log:
     stated = {want.key: as_stated(log.topics[want.key], want.source) for want in wants if want.key in log.topics}
     return replace(log, topics={**log.topics, **stated})
 

@@ -76,13 +76,13 @@ def test_a_log_that_no_study_can_use_ends_with_1_and_says_why(
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
-        schema = writer.register_schema("nav_msgs/msg/Odometry", "ros2msg", b"float64 x\n")
-        channel = writer.register_channel("/odometry", "cdr", schema)
+        schema = writer.register_schema("nav_msgs/msg/OccupancyGrid", "ros2msg", b"float64 x\n")
+        channel = writer.register_channel("/map", "cdr", schema)
         writer.add_message(channel, 10**9, b"\0\1\0\0" + bytes(8), 10**9)
         writer.finish()  # type: ignore[no-untyped-call]
     ran = run(capsys, monkeypatch, "inspect", path)
     assert ran.code == 1
-    assert "nav_msgs/msg/Odometry (cdr); not usable, because its type is none of those that are read" in ran.out
+    assert "nav_msgs/msg/OccupancyGrid (cdr); not usable, because its type is none of those that are read" in ran.out
     assert "no topic is usable as position, acceleration or events" in ran.err
 
 

@@ -15,7 +15,8 @@ from pipeline.engine.stage import Work
 from pipeline.sessions import ingest, recording
 from pipeline.sessions.estimators import build_estimator
 from pipeline.sessions.logs.mcap import Message
-from pipeline.study.folder import find_sessions, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.session_files import find_sessions
 from pipeline.tables.columns import S_PER_NS
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand

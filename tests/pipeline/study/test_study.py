@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import PipelineError
-from pipeline.study.folder import find_sessions, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.session_files import find_sessions
 from tests.conftest import STREAMS
 from tests.pipeline.helpers import Steadyhand
 
@@ -131,12 +132,72 @@ def test_sessions_are_found_by_pattern_and_ids_compared_after_nfc(folder: Folder
 
 
 def test_two_equal_ids_are_an_error(folder: Folder) -> None:
-    root = folder("conditions: [a]\nsessions: '{condition}/{participant}.mcap'\n" + STREAMS)
-    for name in ("a", "b"):
-        (root / name).mkdir()
-        (root / name / "P1.mcap").touch()
-    with pytest.raises(PipelineError, match='are both session "P1"'):
+    """The same name in two ways to write "é" in Unicode."""
+    root = folder("conditions: [a]\nsessions: '{participant}_{condition}.mcap'\n" + STREAMS)
+    for form in ("NFC", "NFD"):
+        (root / f"{unicodedata.normalize(form, 'Zoé')}_a.mcap").touch()
+    with pytest.raises(PipelineError, match='are both session "Zoé_a"'):
         find_sessions(root, load_study(root))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "files", "expected"),
+    [
+        ("{condition}/{participant}.mcap", ["a/P1.mcap", "a/P2.mcap"], {"a_P1": ["P1.mcap"], "a_P2": ["P2.mcap"]}),
+        (
+            "data/{participant}_{condition}",
+            ["data/P1_a/metadata.yaml", "data/P1_a/P1_a_0.mcap", "data/P1_a/.hidden"],
+            {"P1_a": ["P1_a_0.mcap", "metadata.yaml"]},
+        ),
+        (
+            "{participant}/{participant}_{condition}_*.mcap",
+            ["P1/P1_a_0.mcap", "P1/P1_a_1.mcap", "P1/P2_a_0.mcap"],
+            {"P1_a": ["P1_a_0.mcap", "P1_a_1.mcap"]},
+        ),
+        (
+            "{participant}_{condition}/*.mcap",
+            ["P1_a/b.mcap", "P1_a/c.mcap", "P2_a/b.mcap", "P2_a/notes.txt"],
+            {"P1_a": ["b.mcap", "c.mcap"], "P2_a": ["b.mcap"]},
+        ),
+        (
+            "{participant}_{condition}/Accelerometer.csv",
+            ["P1_a/Accelerometer.csv", "P1_a/tracker.csv", "P1_a/notes.txt"],
+            {"P1_a": ["Accelerometer.csv", "tracker.csv"]},
+        ),
+        ("{participant}_{condition}.mcap.zstd", ["P1_a.mcap.zstd"], {"P1_a": ["P1_a.mcap.zstd"]}),
+    ],
+)
+def test_sessions_of_several_files(
+    folder: Folder, pattern: str, files: list[str], expected: dict[str, list[str]]
+) -> None:
+    root = folder(f"conditions: [a]\nsessions: '{pattern}'\n" + STREAMS)
+    for name in files:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).touch()
+    sessions = find_sessions(root, load_study(root)).sessions
+    assert {session.id: [file.name for file in session.files] for session in sessions} == expected
+    assert all((session.participant or "").startswith("P") and session.condition == "a" for session in sessions)
+
+
+def test_folders_that_cannot_be_sessions_are_named(folder: Folder) -> None:
+    root = folder("conditions: [a]\nsessions: 'data/{participant}_{condition}'\n" + STREAMS)
+    for name in ("P1_a", "P2-a", "P3_a"):
+        (root / "data" / name).mkdir(parents=True)
+    (root / "data" / "P2-a" / "x.mcap").touch()
+    (root / "data" / "P1_a" / "x.mcap").touch()
+    (root / "data" / "P4_a").touch()
+    found = find_sessions(root, load_study(root))
+    assert [session.id for session in found.sessions] == ["P1_a"]
+    assert found.unused == [("data/P2-a", "its name does not fit the pattern of study.yaml")]
+    assert [(session.id, reason.split(",")[0]) for session, reason in found.set_aside] == [
+        ("data/P3_a", "the folder holds no file"),
+        ("data/P4_a", "it is a file"),
+    ]
+
+
+def test_a_star_stands_in_the_name_of_the_file_only(folder: Folder, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", folder("conditions: [a]\nsessions: '*/{participant}_{condition}.mcap'\n" + STREAMS))
+    assert '"*" may stand only in the name of the file' in ran.err
 
 
 def test_a_minimal_study_needs_no_title(folder: Folder) -> None:

@@ -14,7 +14,8 @@ from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log, Readings
 from pipeline.sessions.wanted import of_stream
-from pipeline.study.folder import find_sessions, load_study
+from pipeline.study.folder import load_study
+from pipeline.study.session_files import find_sessions
 from pipeline.study.settings import Study
 from tests.benchmarks.checks import drawn
 from tests.conftest import real
