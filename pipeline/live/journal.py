@@ -24,7 +24,8 @@ from pipeline.live.plan import FoundLog, Plan, Record
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Wanted
 from pipeline.sessions.logs.mcap import LogWriter, Message
-from pipeline.study.folder import find_sessions, inside
+from pipeline.study.folder import inside
+from pipeline.study.session_files import find_sessions
 from pipeline.study.settings import Study
 
 PART = ".part"

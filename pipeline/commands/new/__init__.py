@@ -15,8 +15,9 @@ from pipeline.commands.new.questions import Questions, of_terminal
 from pipeline.commands.new.templates import write_template
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study import csv_tables
-from pipeline.study.folder import SETTINGS_FILE, find_sessions
+from pipeline.study.folder import SETTINGS_FILE
 from pipeline.study.guessing.headers import EVERY, LENGTHS, plain
+from pipeline.study.session_files import find_sessions
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
 from pipeline.study.table_file import table_file
