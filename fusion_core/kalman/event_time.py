@@ -140,6 +140,13 @@ class EventTime:
         )
         return moments
 
+    def newest_constants(self, state: Recent) -> tuple[FloatArray, FloatArray] | None:
+        """Mean (constants,) and covariance (constants, constants) of the constants; None before the first position."""
+        if state.history is None:
+            return None
+        begins = len(self.model.states) * self.dimension
+        return state.history.mean[-1, begins:], state.history.covariance[-1, begins:, begins:]
+
     def replay(self, samples: Mapping[str, Samples], times: FloatArray, lag_s: float = 0.0) -> Track:
         """The same steps in one compiled loop; with `lag_s` above 0, of the position `lag_s` before each time."""
         if lag_s > 0.0:

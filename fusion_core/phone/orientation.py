@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fusion_core.kalman.event_time import EventTime
 from fusion_core.kalman.fusion import FusionKalman
 from fusion_core.samples import FloatArray, Samples
 from fusion_core.sensors import Sensor
@@ -98,12 +99,8 @@ def heading(
     coupling[:, 0, 3], coupling[:, 1, 3] = -east, -north
     coupling[:, 0, 4], coupling[:, 1, 4] = north, -east
     vertical = acceleration.value * np.array([0.0, 0.0, 1.0])
-    sensors = {"tracker": tracker_sensor, "imu": acceleration_sensor}
     readings = {"tracker": tracker, "imu": Samples(acceleration.time, acceleration.arrival, vertical)}
-    steps = FusionKalman(sensors).event_time.with_constants(
-        np.array([_LEVEL_BIAS_SD_MM_S2] * 3 + [1.0] * 2),
-        np.array([_LEVEL_BIAS_WALK_MM_S2] * 3 + [_HEADING_WALK_PER_SQRT_S] * 2),
-    )
+    steps = heading_filter(tracker_sensor, acceleration_sensor)
     couplings = {"tracker": np.zeros((len(tracker), 3, 5)), "imu": coupling}
     mean, covariance = steps.constants(readings, couplings, acceleration.arrival)
     cosine, sine = mean[:, 3], mean[:, 4]
@@ -112,6 +109,14 @@ def heading(
     across = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
     variance = np.einsum("ni,nij,nj->n", across, covariance[:, 3:, 3:], across)
     return angle, np.sqrt(variance) / length
+
+
+def heading_filter(tracker_sensor: Sensor, acceleration_sensor: Sensor) -> EventTime:
+    """The fusion filter of `tracker` and `imu` whose constants are three biases, and cosine and sine of the heading."""
+    return FusionKalman({"tracker": tracker_sensor, "imu": acceleration_sensor}).event_time.with_constants(
+        np.array([_LEVEL_BIAS_SD_MM_S2] * 3 + [1.0] * 2),
+        np.array([_LEVEL_BIAS_WALK_MM_S2] * 3 + [_HEADING_WALK_PER_SQRT_S] * 2),
+    )
 
 
 def turn_about_vertical(quaternion_xyzw: FloatArray, angle_rad: FloatArray) -> FloatArray:

@@ -437,7 +437,8 @@ def _phone_is(state: Session, event: PhoneIs) -> Stepped:
         gone = event.at_ns if state.phone_gone_ns is None else state.phone_gone_ns
         state = changed(state, phone=None, phone_gone_ns=gone, under_way=())
         return _note(state, event.at_ns, "phone_away", "")
-    state = changed(state, phone=event.client, phone_gone_ns=None, under_way=())
+    heard = {name: changed(one, highest=-1) for name, one in state.heard.items()}  # a page counts from 0 again
+    state = changed(state, phone=event.client, phone_gone_ns=None, under_way=(), heard=heard)
     state, noted = _note(state, event.at_ns, "phone_back", "")
     return state, (*noted, *_tell_phase(state))
 

@@ -8,17 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion_core import Estimator, Sample
+from fusion_core import Estimator, Sample, Sensor
 from pipeline.engine.cache import digest_of
+from pipeline.live.orientation import Aligner
 from pipeline.live.outgoing import Welcome
 from pipeline.live.plan import Plan
 from pipeline.live.session import Attempt
 from pipeline.live.streams import LiveStream, live_streams, required
-from pipeline.sessions.estimators import build_estimator
+from pipeline.sessions.estimators import build_estimator, sensor
 from pipeline.simulation.layout import targets
 from pipeline.study.recording import Recording
 from pipeline.study.settings import Study
 from pipeline.study.simulation import Task
+from pipeline.study.streams import AccelerationStream
 
 _NS_PER_S = 1e9
 _WARM_UP_STEPS = 50
@@ -30,7 +32,8 @@ class Setup:
     """What does not change while a study is run.
 
     `simulated` says so where readings are, `mouse` that a pointer is the hand. `links` are the addresses, by role, that
-    phones and questionnaires join at.
+    phones and questionnaires join at. `motion_stream` is the stream of the phone's own motion, if it is used, and
+    `aligner` what finds its orientation.
     """
 
     study: Study
@@ -45,6 +48,8 @@ class Setup:
     mouse: bool = False
     simulated: str = ""
     links: tuple[tuple[str, str], ...] = ()
+    aligner: Aligner | None = None
+    motion_stream: str | None = None
 
     def estimator(self, condition: str) -> Estimator:
         """The estimator that a condition shows."""
@@ -100,6 +105,7 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
     where = str(folder / "study.yaml")
     topics = required(study, where)
     assert study.recording is not None and study.task is not None  # noqa: S101 - checked
+    motion = next((name for name, one in study.recording.senders.items() if one.phone is not None), None)
     shown = {study.shown[condition] for condition in study.conditions}
     return Setup(
         study,
@@ -113,7 +119,21 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
         version("steadyhand"),
         mouse,
         simulated,
+        aligner=None if motion is None else _aligner(study, motion),
+        motion_stream=motion,
     )
+
+
+def _aligner(study: Study, name: str) -> Aligner | None:
+    """What finds the orientation of the phone whose stream that is; None without a tracker."""
+    stream = study.streams[name]
+    if study.tracker is None or not isinstance(stream, AccelerationStream):
+        return None
+    tracker, phone = (
+        Sensor(one.operator, one.noise_sd, one.latency_s, 3, one.rate_hz)
+        for one in (sensor(study, study.sensor_streams[of]) for of in (study.tracker, name))
+    )
+    return Aligner(tracker, phone, stream.gravity_mm_s2)
 
 
 def warm_up(setup: Setup) -> None:
@@ -121,9 +141,12 @@ def warm_up(setup: Setup) -> None:
     for estimator in setup.estimators.values():
         state = estimator.start()
         for step in range(_WARM_UP_STEPS):
-            for name, sensor in estimator.sensors.items():
-                time, rotation = step / 30, np.eye(3)[: sensor.dimension]
+            for name, of_stream in estimator.sensors.items():
+                time, rotation = step / 30, np.eye(3)[: of_stream.dimension]
                 force = np.array([0.0, 9806.65, 0.0])
-                reading = Sample(time, time + 0.01, np.zeros(sensor.dimension), rotation, force)
+                reading = Sample(time, time + 0.01, np.zeros(of_stream.dimension), rotation, force)
                 state = estimator.update(state, name, reading)
             estimator.predict(state, step / 30 + 0.02)
+    if setup.aligner is not None:
+        heading = setup.aligner.filter.position(setup.aligner.filter.start(), 0.0, 0.01, np.zeros(3))
+        setup.aligner.filter.angle(setup.aligner.filter.acceleration(heading, 0.02, 0.02, np.zeros(3)))

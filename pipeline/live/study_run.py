@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pipeline.live import clock, desk, health, plan, session
+from pipeline.live import clock, desk, health, orientation, plan, session
 from pipeline.live.changes import changed
 from pipeline.live.clock import Clock, OneWay
 from pipeline.live.events import (
@@ -37,7 +37,8 @@ from pipeline.live.events import (
     Write,
 )
 from pipeline.live.health import Health
-from pipeline.live.messages import Answer, Do, Drawn, Hello, Ping, Select, Submit
+from pipeline.live.messages import Answer, Do, Drawn, Hello, Motion, Orientation, Ping, Select, Submit
+from pipeline.live.orientation import PhoneMotion
 from pipeline.live.outgoing import AnswerSaved, Done, Form, FormState, PhaseOfTask, Pong, Refused
 from pipeline.live.plan import Person, Plan, Record
 from pipeline.live.session import Session
@@ -45,7 +46,7 @@ from pipeline.live.setup import Setup
 from pipeline.sessions.logs.mcap import Message
 
 LEAST_FREE_BYTES = 200_000_000
-CLOCK = "/recorder/clock"
+CLOCK, RAW = "/recorder/clock", "/phone/raw"
 _LIGHTS_NS = 200_000_000
 _TRACE_NS = 100_000_000
 _TRACES = 60
@@ -72,6 +73,7 @@ class StudyRun:
     forms: tuple[int, ...] = ()
     hello: Hello | None = None
     clock: Clock = field(default_factory=Clock)
+    motion: PhoneMotion = field(default_factory=PhoneMotion)
     one_way: Mapping[str, OneWay] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)
     disk: Disk | None = None
@@ -115,7 +117,7 @@ def _settled(run: StudyRun) -> StudyRun:
 def step(run: StudyRun, event: Event) -> Stepped:
     """The state after an event, and the actions that follow from it."""
     after, actions = _STEPS[type(event)](run, event)
-    if isinstance(event, Reading):
+    if isinstance(event, Reading) or (isinstance(event, Said) and isinstance(event.message, Motion | Orientation)):
         return after, actions
     seen = desk.summary(after)
     if seen == after.seen:
@@ -138,6 +140,12 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
         run, reading = changed(run, one_way={**run.one_way, name: known}), changed(reading, stamp_ns=stamp)
     state = health.heard(run.health[name], reading.arrival_ns, reading.stamp_ns)
     run = changed(run, health={**run.health, name: state})
+    if name == run.setup.study.tracker and run.setup.aligner is not None and run.motion.heading is not None:
+        stamp = reading.arrival_ns if reading.stamp_ns is None else reading.stamp_ns
+        stream = run.setup.streams[name]
+        measured = (reading.arrival_ns if stream.stamps_arrival else stamp) - stream.late_ns
+        seen = orientation.seen(run.setup.aligner, run.motion, measured, reading.arrival_ns, reading.values)
+        run = changed(run, motion=seen)
     return _to_attempt(run, reading) if run.attempt is not None else (run, NOTHING)
 
 
@@ -224,7 +232,7 @@ def _joined(run: StudyRun, event: Joined) -> Stepped:
 
 def _activate(run: StudyRun, client: int | None, at_ns: int) -> Stepped:
     """Make a phone the active one, or none. Its clock is learned anew: it may be another phone."""
-    run = changed(run, phone=client, clock=Clock(), hello=None)
+    run = changed(run, phone=client, clock=Clock(), motion=PhoneMotion(), hello=None)
     run, actions = _to_attempt(run, session.PhoneIs(client, at_ns))
     if client is None:
         return run, actions
@@ -302,6 +310,31 @@ def _drew(run: StudyRun, event: Said, drawn: Drawn) -> Stepped:
 def _pressed(run: StudyRun, event: Said, select: Select) -> Stepped:
     at = phone_ns(run, select.t, event.at_ns)
     return _to_attempt(run, session.PhonePressed(select.n, at, event.at_ns))
+
+
+def _oriented(run: StudyRun, event: Said, message: Orientation) -> Stepped:
+    if run.setup.aligner is None:
+        return run, NOTHING
+    stamp = phone_ns(run, message.t, event.at_ns)
+    return changed(run, motion=orientation.oriented(run.motion, message, stamp)), NOTHING
+
+
+def _moved(run: StudyRun, event: Said, message: Motion) -> Stepped:
+    """A phone's reading, raw and as it is used."""
+    setup, at = run.setup, event.at_ns
+    if setup.aligner is None or setup.motion_stream is None:
+        return run, NOTHING
+    stamp = phone_ns(run, message.t, at)
+    motion, values = orientation.moved(setup.aligner, run.motion, message, stamp, at)
+    run, actions = changed(run, motion=motion), list[Action]()
+    if run.attempt is not None and run.attempt.phase != "ended":
+        q = None if motion.browser is None else motion.browser[1]
+        raw = {"t": message.t, "a": message.a, "r": message.r, "q": q, "i": message.interval, "seq": message.seq}
+        actions.append(Write(Message(RAW, "anything", stamp, at, event=raw)))
+    if values is None:
+        return run, tuple(actions)
+    run, read = _reading(run, Reading(setup.motion_stream, stamp, at, values, message.seq))
+    return run, (*actions, *read)
 
 
 def _greeted(run: StudyRun, event: Said, hello: Hello) -> Stepped:
@@ -501,6 +534,8 @@ _DEEDS: Mapping[str, Callable[[StudyRun, str, int], Stepped]] = {
 }
 _ANSWERS: Mapping[type, Callable[[StudyRun, Said, Any], Stepped]] = {
     Ping: _pinged,
+    Motion: _moved,
+    Orientation: _oriented,
     Drawn: _drew,
     Select: _pressed,
     Hello: _greeted,

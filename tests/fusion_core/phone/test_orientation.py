@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fusion_core import Samples, Sensor
 from fusion_core.phone.calibration import Body, calibrate, with_mounting
+from fusion_core.phone.heading import HeadingFilter
 from fusion_core.phone.orientation import (
     carry_forward,
     heading,
@@ -137,3 +138,25 @@ def test_nothing_is_learned_before_the_first_position() -> None:
     random, time = np.random.default_rng(11), np.arange(0, 1, 1 / 90)
     body = Body(time, time, np.tile(-GRAVITY, (len(time), 1)), np.tile(np.eye(3), (len(time), 1, 1)), GRAVITY)
     assert calibrate(tracker(1, random), TRACKER, body, IMU, until_s=0.05) is None
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.1])
+def test_the_heading_reading_by_reading_is_that_of_the_whole_recording(late_s: float) -> None:
+    time = np.arange(0.0, 6.0, 0.01)
+    moved = Rotation.from_rotvec([0, 0, 0.7]).inv().apply(hand(time)[1])
+    frames, felt = tracker(6.0, np.random.default_rng(2)), Samples(time, time + 0.004, moved)
+    frames = Samples(frames.time, frames.time + late_s, frames.value)
+    of_tracker, of_phone = Sensor("position", 8.0, late_s), Sensor("acceleration", 100.0)
+    angle, sd = heading(frames, of_tracker, felt, of_phone)
+    steps = HeadingFilter(of_tracker, of_phone)
+    state, upcoming = steps.start(), 0
+    for row in range(len(felt)):
+        while upcoming < len(frames) and frames.arrival[upcoming] <= felt.arrival[row]:
+            at, there = float(frames.time[upcoming]), float(frames.arrival[upcoming])
+            state = steps.position(state, at, there, frames.value[upcoming])
+            upcoming += 1
+        state = steps.acceleration(state, float(felt.time[row]), float(felt.arrival[row]), felt.value[row])
+        now = steps.angle(state)
+        if np.isfinite(sd[row]):
+            assert now == pytest.approx((angle[row], sd[row]), rel=1e-9, abs=1e-9)
+    assert now[0] == pytest.approx(0.7, abs=0.1)

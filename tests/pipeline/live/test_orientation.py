@@ -1,0 +1,154 @@
+"""A phone's orientation as a running study finds it: whatever signs and axes the browser has, from the data alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pipeline.live import orientation, study_run
+from pipeline.live.clerk import agreement
+from pipeline.live.events import Joined, Reading, Said, Show, Tick, Write
+from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Ping
+from pipeline.live.orientation import Aligner, PhoneMotion
+from pipeline.sessions.logs.mcap import Message, write
+from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.sessions.test_phone import GRAVITY, IMU, TRACKER, swaying, turns
+
+EPOCH_NS = 1_764_350_000_000_000_000
+ALIGNER = Aligner(TRACKER, IMU, (0.0, -9806.65, 0.0))
+LEVEL = Rotation.from_rotvec([np.pi / 2, 0, 0])  # from the tracker's frame, y up, to one whose z points up
+
+
+def ns(seconds: float) -> int:
+    return EPOCH_NS + round(seconds * 1e9)
+
+
+def place_m(time: float) -> tuple[float, float, float]:
+    """Where that swaying hand is."""
+    x, y, z = -np.sin(5 * time) / 25, -0.4 * np.cos(7 * time) / 49, -0.3 * np.sin(4 * time) / 16
+    return 1.5 * x, 1.5 * y, 1.5 * z
+
+
+def held_still(seconds: float, rate_hz: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Readings of a phone at rest, as the swaying hand holds it at the time 0."""
+    time = np.arange(-seconds, 0.0, 1 / rate_hz)
+    force = np.tile(turns(np.zeros(1)).inv().apply(-GRAVITY), (len(time), 1))
+    return time, np.zeros((len(time), 3)), force
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("heading_deg", [0.0, 130.0])
+def test_with_the_browser_s_orientation_sign_and_heading_are_found(sign: float, heading_deg: float) -> None:
+    earth = Rotation.from_euler("z", heading_deg, degrees=True) * LEVEL  # from the tracker's frame to the browser's
+    still, moving = held_still(2.0, 60.0), swaying(20.0, 60.0, np.random.default_rng(1))
+    time, turning, force = (np.concatenate(both) for both in zip(still, moving, strict=True))
+    state, frames, errors = PhoneMotion(), np.arange(-2.0, 20.0, 1 / 30), []
+    upcoming = 0
+    for row, at in enumerate(time.tolist()):
+        while upcoming < len(frames) and frames[upcoming] + 0.1 <= at:
+            seen_at = float(frames[upcoming])
+            where = place_m(max(seen_at, 0.0))
+            state = orientation.seen(ALIGNER, state, ns(seen_at), ns(seen_at + 0.1), where)
+            upcoming += 1
+        if row % 2 == 0:  # orientations come half as often, and a little earlier
+            turned = (earth * turns(np.array([max(at - 0.004, 0.0)]))[0]).as_quat()
+            state = orientation.oriented(state, Orientation(row, 0.0, tuple(turned.tolist()), False), ns(at - 0.004))
+        a = tuple((sign * force[row] / 1000).tolist())
+        r = tuple(np.degrees(turning[row]).tolist())
+        state, values = orientation.moved(ALIGNER, state, Motion(row, 0.0, a, None, r, 16.0), ns(at), ns(at + 0.003))
+        assert values is not None
+        if np.isfinite(values[6:]).all():
+            assert values[:3] == pytest.approx(tuple((force[row] / 1000).tolist()))
+            true = turns(np.array([max(at, 0.0)]))[0]
+            errors.append((at, float(np.degrees((Rotation.from_quat(values[6:]) * true.inv()).magnitude()))))
+    assert state.sign == sign
+    assert errors[0][0] < 5.0
+    assert np.sqrt(np.mean([error**2 for at, error in errors if at > 10])) < 5.0
+
+
+def test_without_one_tilt_comes_from_the_gyroscope() -> None:
+    time, turning, force = swaying(40.0, 60.0, np.random.default_rng(2))
+    state, frames, errors, upcoming = PhoneMotion(), np.arange(0.0, 40.0, 1 / 30), [], 0
+    for row, at in enumerate(time.tolist()):
+        while upcoming < len(frames) and frames[upcoming] + 0.1 <= at:
+            seen_at = float(frames[upcoming])
+            state = orientation.seen(ALIGNER, state, ns(seen_at), ns(seen_at + 0.1), place_m(seen_at))
+            upcoming += 1
+        a, r = tuple((force[row] / 1000).tolist()), tuple(np.degrees(turning[row]).tolist())
+        state, values = orientation.moved(ALIGNER, state, Motion(row, 0.0, a, None, r, 16.0), ns(at), ns(at))
+        if values is not None and np.isfinite(values[6:]).all():
+            true = turns(np.array([at]))[0]
+            errors.append((at, float(np.degrees((Rotation.from_quat(values[6:]) * true.inv()).magnitude()))))
+    assert state.source == "gyroscope"
+    assert np.sqrt(np.mean([error**2 for at, error in errors if at > 20])) < 5.0
+
+
+def test_a_reading_that_lacks_something_or_comes_late_is_none() -> None:
+    state, values = orientation.moved(ALIGNER, PhoneMotion(), Motion(0, 0.0, None, None, (1, 2, 3), 16.0), 0, 0)
+    assert values is None and state == PhoneMotion()
+    state, values = orientation.moved(ALIGNER, state, Motion(0, 0.0, (0, 9.8, 0), None, (1, 2, 3), 16.0), 10**9, 10**9)
+    assert values is not None and np.isnan(values[6:]).all()
+    assert (
+        orientation.moved(ALIGNER, state, Motion(1, 0.0, (0, 9.8, 0), None, (1, 2, 3), 16.0), 10**9 - 5, 10**9)[1]
+        is None
+    )
+
+
+def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: Path) -> None:
+    text = STUDY.replace(
+        "senders: {tracker: {demo: {}}, imu: {demo: {}}}", "senders: {tracker: {demo: {}}, imu: {phone: motion}}"
+    )
+    text = text.replace("{kinect: kinect, fusion: fusion}", "{kinect: fusion, fusion: fusion}")
+    study, setup = study_in(tmp_path, text)
+    run = study_run.begin(setup, setup.empty_plan())
+    messages: list[Message] = []
+
+    def happens(event: object) -> None:
+        nonlocal run
+        run, actions = study_run.step(run, event)  # type: ignore[arg-type]
+        messages.extend(action.message for action in actions if isinstance(action, Write))
+        for action in actions:
+            if isinstance(action, Show):
+                at = action.made_ns
+                happens(Said("phone", 2, Drawn(action.message.n, at / 1e6), at))  # type: ignore[union-attr]
+
+    happens(Joined("operator", 1, ns(-1)))
+    happens(Joined("phone", 2, ns(-1)))
+    behind_ms = 3_600_000.0  # the phone's clock is an hour behind
+    time, turning, force = swaying(12.0, 60.0, np.random.default_rng(3))
+    for row, at in enumerate(time.tolist()):
+        if row % 10 == 0:
+            now = ns(at) / 1e6
+            happens(
+                Said(
+                    "phone",
+                    2,
+                    Ping(now, Exchange(now - behind_ms, now + 2, now + 2, now - behind_ms + 4)),
+                    ns(at + 0.004),
+                )
+            )
+        if row % 2 == 0:
+            happens(Reading("tracker", None, ns(at + 0.001), place_m(max(at - 0.1, 0.0))))
+        a, r = tuple((force[row] / 1000).tolist()), tuple(np.degrees(turning[row]).tolist())
+        happens(Said("phone", 2, Motion(row, ns(at) / 1e6 - behind_ms, a, None, r, 16.0), ns(at + 0.005)))
+        if row == 400:
+            happens(Said("operator", 1, Do("start", "", "d"), ns(at + 0.006)))
+            assert run.phase == "session"
+        happens(Tick(ns(at + 0.007)))
+    logged = [one for one in messages if one.topic == "/phone/imu"]
+    assert len(logged) > 200
+    stamps = np.array([one.stamp_ns for one in logged])
+    assert np.abs(np.interp(stamps, [ns(float(at)) for at in time], np.arange(len(time))) % 1).max() < 0.5
+    late_ms = np.median([one.arrival_ns - one.stamp_ns for one in logged]) / 1e6
+    assert late_ms == pytest.approx(5.0, abs=0.1)  # the clock was found from the pings
+    path = tmp_path / "data/P01_kinect.mcap"
+    path.parent.mkdir()
+    write(path, {"participant": "P01", "condition": "kinect"}, messages)
+    agreed = agreement(study, tmp_path, path, "P01", "kinect")
+    assert agreed is not None
+    assert agreed[0] <= 1e-9
+    assert agreed[1] > 200
+    assert sum(one.topic == study_run.RAW for one in messages) >= len(logged)
