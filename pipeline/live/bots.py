@@ -30,6 +30,7 @@ from pipeline.study.simulation import SelectionSimulation
 SIMULATED = "simulated by Steadyhand: a demo, played through the live study"
 OPERATOR, PHONE, FORMS = 1, 2, 3
 _STEP_NS = 100_000_000
+_FLUSH_NS = 500_000_000
 _SETS_OFF_S = 0.5  # after the countdown
 _NS_PER_MS = 1e6
 _HELLO = Hello("phone", 1, "a simulated phone", (854.0, 480.0, 2.0), "granted", True, True)
@@ -61,7 +62,7 @@ class Players:
         self.played: dict[tuple[str, str], Participant] = {}
         self.pending: deque[Event] = deque()
         self.told: list[tuple[int, Outgoing]] = []
-        self._last_n, self._drawn_at = 0, now_ns
+        self._last_n, self._drawn_at, self._flushed_ns = 0, now_ns, now_ns
         self._form: Form | None = None
 
     def play(self, participants: int, done: Callable[[str], None] = lambda file: None) -> None:
@@ -104,6 +105,9 @@ class Players:
             self.now_ns = max(self.now_ns, tap.at_ns)
             self.says("phone", PHONE, Select(self._last_n, tap.at_ns / _NS_PER_MS))
         self.now_ns = max(self.now_ns, at)
+        if self.now_ns - self._flushed_ns >= _FLUSH_NS:
+            self._flushed_ns = self.now_ns
+            self.happens(self.clerk.flush(lambda: self.now_ns))
         self.happens(Tick(self.now_ns))
         self.happens(reading)
 

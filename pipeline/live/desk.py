@@ -32,7 +32,7 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
     now, found = run.now, []
     if run.phone is None:
         found.append("No phone is connected. Scan the code with the phone.")
-    used = run.setup.estimator(now[0].tasks[now[1]].condition).sensors if now is not None else ()
+    used = sorted(run.setup.uses(now[0].tasks[now[1]].condition)) if now is not None else []
     found += [
         f"{name} is silent. Turn it on, or give a reason to start without it."
         for name in used

@@ -107,7 +107,24 @@ class Agreed:
     at_ns: int
 
 
-Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed
+@dataclass(frozen=True)
+class Woke:
+    """The computer had stopped for `seconds`: it was suspended, or too busy for anything."""
+
+    seconds: float
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class WallClock:
+    """How far the wall clock is from recorder time by now; `was_set` if it jumped since the last time."""
+
+    off_ms: float
+    was_set: bool
+    at_ns: int
+
+
+Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed | Woke | WallClock
 
 
 @dataclass(frozen=True)

@@ -75,12 +75,17 @@ class Journal:
         return inside(self.folder, name, "sessions", must_exist=False)
 
     def open(self, participant: str, condition: str, facts: Mapping[str, str]) -> None:
-        """Begin a log. OSError where one is there already: nothing is overwritten."""
+        """Begin a log. OSError where one is there already: nothing is overwritten.
+
+        What a full disk may have left of an attempt that was set aside goes where it belongs.
+        """
         path = self.path(participant, condition)
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists():
             raise FileExistsError(f"{path.name} is there already")
         part = path.with_name(path.name + PART)
+        if part.exists():
+            self._rename(part, set_aside=True)
         file = part.open("xb")
         self._log = part, file, LogWriter(file, facts)
         self.flush()
@@ -94,9 +99,11 @@ class Journal:
     def flush(self) -> None:
         """Put everything written so far onto the disk."""
         if self._log is not None:
-            _, file, writer = self._log
+            part, file, writer = self._log
             writer.flush()
             _sync(file)
+            if not part.exists():
+                raise FileNotFoundError(f"{part.name} is not there any more")
             self.written_ns = time.monotonic_ns()
 
     @property

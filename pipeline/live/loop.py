@@ -32,6 +32,8 @@ from pipeline.live.events import (
     Show,
     Tell,
     Tick,
+    WallClock,
+    Woke,
     Write,
 )
 from pipeline.live.messages import Incoming, Mouse
@@ -42,18 +44,50 @@ from pipeline.live.setup import Setup
 _TICK_S = 0.005
 _FLUSH_NS = 500_000_000
 _FILES_S = 0.1
+_STOOD_STILL_S = 2.0
+_WALL_CLOCK_NS = 10_000_000_000
+_SET_NS = 100_000_000  # by which a wall clock jumps when it is set; it drifts by 1 ms in 10 s
+_S_PER_NS = 1e-9
 _MOST_WAITING = 256  # messages of one page: one that does not read is closed
 
 
 class Clock:
     """Recorder time: the wall clock at start, and what the monotonic clock has counted since."""
 
-    def __init__(self) -> None:
-        self._epoch_ns = time.time_ns() - time.monotonic_ns()
+    def __init__(
+        self,
+        wall_ns: Callable[[], int] = time.time_ns,
+        steady_ns: Callable[[], int] = time.monotonic_ns,
+        awake_or_not_ns: Callable[[], int] | None = None,
+    ) -> None:
+        self._wall_ns, self._steady_ns = wall_ns, steady_ns
+        self._always_ns = awake_or_not_ns or _always_ns
+        self._epoch_ns = wall_ns() - steady_ns()
+        self._asleep_ns = self._always_ns() - steady_ns()
+        self._wall_off_ns = 0
 
     def __call__(self) -> int:
         """Now, in ns."""
-        return self._epoch_ns + time.monotonic_ns()
+        return self._epoch_ns + self._steady_ns()
+
+    def slept_s(self) -> float:
+        """How long the computer has been suspended since this was last asked, where it can tell."""
+        asleep = self._always_ns() - self._steady_ns()
+        slept, self._asleep_ns = (asleep - self._asleep_ns) * _S_PER_NS, asleep
+        return slept
+
+    def wall_clock(self) -> WallClock:
+        """How the wall clock stands, and whether it was set since this was last asked."""
+        now = self()
+        off = self._wall_ns() - now
+        was_set, self._wall_off_ns = abs(off - self._wall_off_ns) > _SET_NS, off
+        return WallClock(off * 1e-6, was_set, now)
+
+
+def _always_ns() -> int:
+    """A clock that counts while the computer is suspended too, which Linux's monotonic one does not."""
+    boot = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic_ns() if boot is None else time.clock_gettime_ns(boot)
 
 
 class Outbox:
@@ -85,9 +119,10 @@ class Outbox:
 class Loop:
     """A study that is run. `happens` takes events from adapters; `pages` are the outboxes by client."""
 
-    def __init__(self, setup: Setup, folder: Path, clerk: Clerk, known: Plan, clock: Callable[[], int]) -> None:
+    def __init__(self, setup: Setup, folder: Path, clerk: Clerk, known: Plan, clock: Clock) -> None:
         self.run = study_run.begin(setup, known)
         self.now_ns, self.pages = clock, dict[int, Outbox]()
+        self._ticked_ns, self._wall_ns = clock(), clock()
         self._folder, self._clerk = folder, clerk
         self._files: list[Action] = []
         self._urgent = asyncio.Event()
@@ -163,10 +198,21 @@ class Loop:
         while True:
             await asyncio.sleep(_TICK_S)
             now = self.now_ns()
+            self._watch_clocks(now)
             if self._mouse is not None:
                 for reading in self._mouse.readings(now):
                     self.happens(reading)
             self.happens(Tick(now))
+
+    def _watch_clocks(self, now: int) -> None:
+        """Notice a computer that was suspended or stood still, and a wall clock that was set."""
+        stood_s = max((now - self._ticked_ns) * _S_PER_NS, self.now_ns.slept_s())
+        self._ticked_ns = now
+        if stood_s > _STOOD_STILL_S:
+            self.happens(Woke(stood_s, now))
+        if now - self._wall_ns >= _WALL_CLOCK_NS or stood_s > _STOOD_STILL_S:
+            self._wall_ns = now
+            self.happens(self.now_ns.wall_clock())
 
     async def _file(self) -> None:
         running, flushed = asyncio.get_running_loop(), 0

@@ -49,11 +49,12 @@ Phase = Literal["practice", "countdown", "running", "ended"]
 
 @dataclass(frozen=True)
 class Attempt:
-    """What does not change during an attempt."""
+    """What does not change during an attempt; `uses` are the streams that change what the estimator shows."""
 
     participant: str
     condition: str
     estimator: Estimator
+    uses: frozenset[str]
     streams: Mapping[str, LiveStream]
     axes: Sequence[str]
     targets_mm: Sequence[tuple[float, float]]
@@ -214,7 +215,7 @@ def _read(state: Session, reading: Reading) -> Stepped:
     copy = not unstamped and (stamp, reading.values) in heard.recent
     if copy or stamp < heard.newest_ns - _OLDEST_NS:
         return _with_heard(state, reading.stream, changed(heard, dropped=heard.dropped + 1)), NOTHING
-    used = stream.name in state.attempt.estimator.sensors
+    used = stream.name in state.attempt.uses
     origin = arrival if state.origin_ns is None else state.origin_ns
     sample = sample_of(stream, stamp, arrival, reading.values, origin) if used else None
     if used and sample is None:  # logged, a replay would carry its orientation on and use it
@@ -418,7 +419,7 @@ def _tick(state: Session, at_ns: int) -> Stepped:
 def _listen(state: Session, at_ns: int) -> Stepped:
     """Notes where a sensor that is used falls silent, is lost, or comes back."""
     actions: list[Action] = []
-    for name in state.attempt.estimator.sensors:
+    for name in sorted(state.attempt.uses):
         heard = state.heard[name]
         since = at_ns - heard.arrival_ns
         silent, gone = since > _SILENT_NS, since > _LOST_NS

@@ -15,7 +15,7 @@ from pipeline.live.outgoing import Welcome
 from pipeline.live.plan import Plan
 from pipeline.live.session import Attempt
 from pipeline.live.streams import LiveStream, live_streams, required
-from pipeline.sessions.estimators import build_estimator, sensor
+from pipeline.sessions.estimators import build_estimator, sensor, sensors_used
 from pipeline.simulation.layout import targets
 from pipeline.study.recording import Recording
 from pipeline.study.settings import Study
@@ -55,6 +55,10 @@ class Setup:
         """The estimator that a condition shows."""
         return self.estimators[self.study.shown[condition]]
 
+    def uses(self, condition: str) -> frozenset[str]:
+        """The streams that change what a condition shows."""
+        return sensors_used(self.study, self.study.shown[condition])
+
     def attempt(self, participant: str, condition: str) -> Attempt:
         """The settings of an attempt."""
         recording = self.recording
@@ -62,6 +66,7 @@ class Setup:
             participant,
             condition,
             self.estimator(condition),
+            self.uses(condition),
             self.streams,
             self.study.axes,
             self.targets_mm,

@@ -34,6 +34,8 @@ from pipeline.live.events import (
     Tables,
     Tell,
     Tick,
+    WallClock,
+    Woke,
     Write,
 )
 from pipeline.live.health import Health
@@ -183,6 +185,24 @@ def _disk(run: StudyRun, disk: Disk) -> Stepped:
     if disk.fault is not None and run.attempt is not None:
         return _to_attempt(run, session.Aborted(f"the log could not be written: {disk.fault}", disk.at_ns))
     return run, NOTHING
+
+
+def _woke(run: StudyRun, woke: Woke) -> Stepped:
+    return _to_attempt(run, session.Aborted(f"the computer stood still for {woke.seconds:.1f} s", woke.at_ns))
+
+
+def _wall_clock(run: StudyRun, wall: WallClock) -> Stepped:
+    """Stamps go on as before, whatever the wall clock does; the log says what it did."""
+    if run.attempt is None or run.attempt.phase == "ended":
+        return run, NOTHING
+    content = {"sender": "wall clock", "offset_ms": wall.off_ms}
+    write = Write(Message(CLOCK, "anything", wall.at_ns, wall.at_ns, event=content))
+    if not wall.was_set:
+        return run, (write,)
+    run, noted = _to_attempt(
+        run, session.Noted(f"the wall clock is {wall.off_ms:.0f} ms off now", wall.at_ns, "wall_clock")
+    )
+    return run, (write, *noted)
 
 
 def _closed(run: StudyRun, closed: Closed) -> Stepped:
@@ -390,8 +410,6 @@ def _answered(run: StudyRun, event: Said, answer: Answer) -> Stepped:
         "value": answer.value,
         "at_ns": event.at_ns,
     }
-    if person.tasks[index].answers.get((known.id, item.id)) == answer.value:  # sent twice
-        return run, (Tell(event.client, AnswerSaved(answer.id)),)
     return _save(run, record, event.client, answer.id)
 
 
@@ -552,5 +570,7 @@ _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Disk: _disk,
     Saved: _saved,
     Closed: _closed,
+    Woke: _woke,
+    WallClock: _wall_clock,
     Agreed: lambda run, event: (changed(run, agreed=event), NOTHING),
 }

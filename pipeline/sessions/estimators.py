@@ -51,6 +51,16 @@ def fusing(study: Study) -> dict[str, str]:
     return found
 
 
+def sensors_used(study: Study, name: str) -> frozenset[str]:
+    """The streams whose readings change what an estimator shows."""
+    settings = study.estimators[name]
+    named = [one for one in study.sensor_streams if settings.use is None or one in settings.use]
+    if settings.type not in _POSITIONS_ONLY:
+        return frozenset(named)
+    trackers = (one for one in named if study.sensor_streams[one].kind == "position")
+    return frozenset(list(trackers)[:1])
+
+
 def build_estimator(study: Study, name: str, where: str | None = None) -> Estimator:
     """The study's estimator of that name. Raises PipelineError, saying which key or value is wrong.
 

@@ -1,0 +1,260 @@
+"""What goes wrong in a laboratory, and what must happen then. Other faults are in the tests of what they concern."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from pipeline.live import study_run
+from pipeline.live.clerk import Clerk
+from pipeline.live.events import (
+    Action,
+    Close,
+    Closed,
+    Disk,
+    Event,
+    Joined,
+    Left,
+    Open,
+    Reading,
+    Said,
+    Save,
+    Saved,
+    Tell,
+    Tick,
+    WallClock,
+    Woke,
+    Write,
+)
+from pipeline.live.journal import PART, Journal
+from pipeline.live.loop import Clock, Outbox
+from pipeline.live.messages import Do
+from pipeline.live.outgoing import Refused, Say, Whole
+from pipeline.live.study_run import StudyRun
+from pipeline.sessions.logs.mcap import Message
+from tests.pipeline.live.studies import study_in
+
+EPOCH_NS = 1_764_350_000_000_000_000
+MS = 1_000_000
+OPERATOR, PHONE = 1, 2
+
+
+class Lab:
+    """A study that is run by hand: what happens, and what was wanted done."""
+
+    def __init__(self, folder: Path) -> None:
+        self.study, setup = study_in(folder)
+        self.run: StudyRun = study_run.begin(setup, setup.empty_plan())
+        self.actions: list[Action] = []
+        self.at_ms = 0.0
+        self.happens(Joined("operator", OPERATOR, EPOCH_NS))
+        self.happens(Joined("phone", PHONE, EPOCH_NS))
+
+    @property
+    def now(self) -> int:
+        return EPOCH_NS + round(self.at_ms * MS)
+
+    def happens(self, event: Event) -> list[Action]:
+        self.run, actions = study_run.step(self.run, event)
+        self.actions += actions
+        return list(actions)
+
+    def goes_on(self, seconds: float, tracker: bool = True, imu: bool = True) -> list[Action]:
+        """Time passes, and sensors send."""
+        found: list[Action] = []
+        for _ in range(round(seconds * 100)):
+            self.at_ms += 10
+            if imu:
+                values = (0.0, 9.80665, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+                found += self.happens(Reading("imu", self.now, self.now, values))
+            if tracker and round(self.at_ms) % 30 == 0:
+                found += self.happens(Reading("tracker", self.now - 100 * MS, self.now, (0.0, 0.5, 1.0)))
+            found += self.happens(Tick(self.now))
+        return found
+
+    def does(self, what: str, text: str = "") -> list[Action]:
+        return self.happens(Said("operator", OPERATOR, Do(what, text, "d"), self.now))
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Lab:
+    return Lab(tmp_path)
+
+
+def refusals(actions: list[Action]) -> list[str]:
+    return [one.message.why for one in actions if isinstance(one, Tell) and isinstance(one.message, Refused)]
+
+
+def notes(actions: list[Action]) -> list[str]:
+    written = (one.message for one in actions if isinstance(one, Write))
+    return [str(one.event["type"]) for one in written if one.topic == "/recorder/notes" and one.event]
+
+
+def test_a_task_does_not_begin_without_its_sensors_unless_the_operator_says_why(lab: Lab) -> None:
+    lab.goes_on(0.5, imu=False)
+    assert refusals(lab.does("start")) == []  # the first condition's estimator uses the tracker alone
+    lab.does("abort")
+    lab.happens(Closed("data/set-aside/P01_kinect.1.mcap", lab.now))
+    lab.goes_on(1.0, tracker=False)
+    (why,) = refusals(lab.does("start"))
+    assert why.startswith("tracker is silent")
+    opened = [one for one in lab.does("start", "it is being repaired") if isinstance(one, Open)]
+    assert opened[0].facts["started_although"] == "it is being repaired"
+    assert opened[0].facts["attempt"] == "2"
+
+
+def test_without_a_phone_nothing_begins(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.run, _ = study_run.step(lab.run, Left("phone", PHONE, lab.now))
+    lab.goes_on(0.5)
+    assert "No phone is connected" in refusals(lab.does("start", "anyway"))[0]
+
+
+def test_a_tracker_that_falls_silent_is_said_and_noted(lab: Lab) -> None:
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(2.0)
+    silent = lab.goes_on(2.5, tracker=False)
+    assert [one.message.text for one in silent if isinstance(one, Tell) and isinstance(one.message, Say)] == [
+        "Please wait."
+    ]
+    assert notes(silent) == ["sensor_silent", "sensor_lost"]
+    lights = next(
+        one.message.content["lights"]
+        for one in reversed(silent)
+        if isinstance(one, Tell) and isinstance(one.message, Whole) and one.message.type == "lights"
+    )
+    assert isinstance(lights, dict)
+    assert lights["tracker"]["light"] == "red"
+    assert notes(lab.goes_on(0.1)) == ["sensor_back"]
+    assert lab.run.phase == "session"
+
+
+def test_a_suspended_computer_ends_the_attempt_and_a_wall_clock_that_is_set_does_not(lab: Lab) -> None:
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(2.0)
+    assert notes(lab.happens(WallClock(3_600_000.0, True, lab.now))) == ["wall_clock"]
+    assert lab.run.phase == "session"
+    actions = lab.happens(Woke(30.0, lab.now))
+    assert Close(set_aside=True) in actions
+    assert lab.run.attempt is not None
+    assert lab.run.attempt.ended_by == "the computer stood still for 30.0 s"
+
+
+def test_recorder_time_goes_on_whatever_the_wall_clock_does() -> None:
+    wall, steady, always = [EPOCH_NS], [5], [7]
+    clock = Clock(lambda: wall[0], lambda: steady[0], lambda: always[0])
+    assert clock() == EPOCH_NS
+    for name in (wall, steady, always):
+        name[0] += 10**10
+    assert clock() == EPOCH_NS + 10**10
+    assert (clock.wall_clock().was_set, clock.slept_s()) == (False, 0)
+    wall[0] += 3_600 * 10**9
+    assert clock() == EPOCH_NS + 10**10
+    told = clock.wall_clock()
+    assert (told.was_set, told.off_ms) == (True, 3_600_000)
+    assert not clock.wall_clock().was_set
+    wall[0] += 60 * 10**9
+    always[0] += 60 * 10**9  # the monotonic clock stands while the computer is suspended
+    assert clock.slept_s() == pytest.approx(60)
+
+
+def test_a_full_disk_ends_the_attempt_and_keeps_what_is_on_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, _ = study_in(tmp_path)
+    journal = Journal(tmp_path, study)
+    journal.hold()
+    clerk = Clerk(journal, check=None)
+    clerk.perform([Open("P01", "kinect", {"participant": "P01", "condition": "kinect"})], lambda: 1)
+    clerk.perform([Write(Message("/recorder/notes", "anything", 1, 1, event={"type": "note"}))], lambda: 1)
+    clerk.flush(lambda: 1)
+    part = tmp_path / f"data/P01_kinect.mcap{PART}"
+    before = part.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("pipeline.live.journal._sync", full)
+    told = clerk.flush(lambda: 2)
+    assert told.fault is not None
+    assert told.fault.startswith("No space left on device")
+    events = clerk.perform([Close(set_aside=True), Save({"type": "note"}, "7")], lambda: 3)
+    assert Closed("", 3) in events
+    assert not any(isinstance(event, Saved) for event in events)  # nobody is told that it is saved
+    assert part.read_bytes()[: len(before)] == before
+    monkeypatch.undo()
+    assert clerk.perform([Open("P01", "kinect", {})], lambda: 4) == []  # the next attempt goes on beside it
+    assert (tmp_path / "data/set-aside/P01_kinect.1.mcap").read_bytes()[: len(before)] == before
+    clerk.perform([Close()], lambda: 5)
+    journal.release()
+
+
+def test_a_fault_of_the_disk_stops_the_session_and_is_said(lab: Lab) -> None:
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(1.5)
+    actions = lab.happens(Disk(lab.now, 0, fault="No space left on device."))
+    assert Close(set_aside=True) in actions
+    state = next(one.message for one in actions if isinstance(one, Tell) and isinstance(one.message, Whole))
+    assert state.content["problems"] == ["No space left on device."]
+    lab.happens(Closed("", lab.now))
+    assert refusals(lab.does("start", "anyway")) == ["No space left on device."]
+    lab.happens(Disk(lab.now, 150_000_000))
+    assert "nearly full" in refusals(lab.does("start"))[0]
+
+
+def test_a_log_that_is_removed_while_it_is_written_is_noticed(tmp_path: Path) -> None:
+    study, _ = study_in(tmp_path)
+    journal = Journal(tmp_path, study)
+    journal.hold()
+    clerk = Clerk(journal, check=None)
+    clerk.perform([Open("P01", "kinect", {"participant": "P01", "condition": "kinect"})], lambda: 1)
+    (tmp_path / f"data/P01_kinect.mcap{PART}").unlink()
+    fault = clerk.flush(lambda: 2).fault
+    assert fault is not None
+    assert "not there any more" in fault
+    journal.release()
+
+
+def test_nothing_is_ever_overwritten(tmp_path: Path) -> None:
+    study, _ = study_in(tmp_path)
+    journal = Journal(tmp_path, study)
+    journal.hold()
+    for number in range(1, 4):
+        journal.open("P01", "kinect", {"participant": "P01", "condition": "kinect"})
+        path = journal.close(set_aside=True)
+        assert path is not None
+        assert path.name == f"P01_kinect.{number}.mcap"
+    journal.open("P01", "kinect", {"participant": "P01", "condition": "kinect"})
+    journal.close(set_aside=False)
+    with pytest.raises(FileExistsError):
+        journal.open("P01", "kinect", {})
+    journal.release()
+
+
+@pytest.mark.parametrize("kind", ["lights", "state"])
+def test_a_page_that_does_not_read_gets_the_newest_and_holds_up_nobody(kind: str) -> None:
+    outbox = Outbox()
+    for number in range(1000):
+        outbox.put(Whole(kind, {"number": number}))  # type: ignore[arg-type]
+    assert not outbox.full
+    assert outbox._waiting[0] == Whole(kind, {"number": 999})  # type: ignore[arg-type]
+    for _ in range(300):
+        outbox.put(Say(""))
+    assert outbox.full  # and its connection is closed
+
+
+def test_a_participant_who_stops_is_replaced_and_the_log_says_why(lab: Lab) -> None:
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(1.5)
+    actions = lab.does("drop", "felt dizzy")
+    assert Close(set_aside=True) in actions
+    saved = [one.record for one in actions if isinstance(one, Save)]
+    assert [record["type"] for record in saved] == ["set_aside", "dropped"]
+    assert saved[0]["reason"] == "dropped out: felt dizzy"
+    lab.happens(Closed("data/set-aside/P01_kinect.1.mcap", lab.now))
+    first, second = lab.run.plan.persons
+    assert (first.dropped, second.order, lab.run.phase) == (True, first.order, "ready")

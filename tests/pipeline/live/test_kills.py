@@ -1,0 +1,128 @@
+"""A recorder that is killed loses at most a second, and the next one knows where the study stands."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from pipeline.live import plan
+from pipeline.live.bots import Players, as_simulated
+from pipeline.live.events import Event
+from pipeline.live.journal import PART, Journal
+from pipeline.sessions.logs import mcap
+from pipeline.sessions.logs.log import Wanted
+from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.live.studies import STUDY, study_in
+
+EPOCH_NS = 1_764_350_000_000_000_000
+_EVERY_NS = 20_000_000
+_MOST_S = 1.5  # of the wall clock, in which about 15 s are played
+
+
+def play_and_say(folder: Path, ready: int, said: int) -> None:
+    """Play a study, and write the time that it is in the study to `said` again and again."""
+    study, setup = study_in(folder)
+    journal = Journal(folder, study)
+    journal.hold()
+    players = Players(as_simulated(setup), folder, journal, setup.empty_plan(), EPOCH_NS)
+    before, last, begun = players.happens, [0], [False]
+
+    def happens(event: Event) -> None:
+        before(event)
+        if not begun[0] and players.participant is not None:
+            begun[0] = True
+            os.write(ready, b"1")
+        if players.now_ns - last[0] > _EVERY_NS:
+            last[0] = players.now_ns
+            os.write(said, players.now_ns.to_bytes(8, "big"))
+
+    players.happens = happens  # type: ignore[method-assign]
+    players.play(1)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def warm(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Everything is compiled and loaded before processes are forked that are killed within a second."""
+    folder = tmp_path_factory.mktemp("warm")
+    study, setup = study_in(folder)
+    journal = Journal(folder, study)
+    journal.hold()
+    Players(as_simulated(setup), folder, journal, setup.empty_plan(), EPOCH_NS).play(1)
+    journal.release()
+
+
+def killed(folder: Path, after_s: float) -> int:
+    """Play in a process that is killed; returns the time in the study that it had come to, in ns."""
+    (ready_in, ready), (said_in, said) = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            play_and_say(folder, ready, said)
+        finally:
+            os._exit(0)
+    os.close(ready)
+    os.close(said)
+    assert os.read(ready_in, 1) == b"1"
+    time.sleep(after_s)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    told = b""
+    while part := os.read(said_in, 65536):
+        told += part
+    os.close(ready_in)
+    os.close(said_in)
+    return int.from_bytes(told[-8:], "big") if told else EPOCH_NS
+
+
+def survives(folder: Path, after_s: float) -> str:
+    """Kill a study, and look at what is left of it; returns the state of its first task."""
+    came_to = killed(folder, after_s)
+    study, setup = study_in(folder)
+    journal = Journal(folder, study)
+    journal.hold()  # the lock of a process that is dead holds nobody
+    known = setup.empty_plan()
+    for record in journal.records():
+        known = plan.after(known, record)
+    known = plan.with_logs(known, journal.found_logs())
+    journal.release()
+    for path in sorted((folder / "data").glob(f"*{PART}")):
+        topics = [
+            Wanted(stream.topic, "position") for stream in study.streams.values() if stream.kind != "acceleration"
+        ]
+        log = mcap.read(path, topics)
+        newest = max(int(one.arrival_ns.max()) for one in log.topics.values())
+        assert came_to - newest <= 1_000_000_000
+    assert not list((folder / "data").glob("*.new"))
+    return known.persons[0].tasks[0].state if known.persons else "todo"
+
+
+@pytest.mark.parametrize("kills", [pytest.param(4, id="a few"), pytest.param(196, id="many", marks=pytest.mark.slow)])
+def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(kills: int, tmp_path: Path) -> None:
+    chance, states = random.Random(kills), []  # noqa: S311
+    for number in range(kills):
+        states.append(survives(tmp_path / str(number), chance.uniform(0.05, _MOST_S)))
+    assert "cut" in states
+    assert set(states) <= {"todo", "cut", "done"}
+
+
+def test_what_is_left_of_a_cut_session_is_read_by_the_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    killed(tmp_path, 1.0)
+    study, _ = study_in(tmp_path, STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", ""))
+    journal = Journal(tmp_path, study)
+    journal.hold()
+    (found,) = [log for log in journal.found_logs() if not log.whole]
+    journal.resolve(found.participant, found.condition, set_aside=False)
+    journal.tables(({"participant": found.participant, "sequence": "kinect-fusion"},), ())
+    journal.release()
+    (tmp_path / "questionnaires.csv").write_text(
+        "participant,condition,questionnaire,scale,rating\nP01,kinect,nasa_tlx,mental,50\n", encoding="utf-8"
+    )
+    ran = steadyhand("compare", tmp_path)
+    assert ran.code == 1, ran.err  # read in part, and said so
+    assert "ends without its summary" in ran.err
+    assert all(row["max_mm"] <= 1e-9 for row in steadyhand.results()["replay_agreement"])
