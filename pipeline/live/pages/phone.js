@@ -30,7 +30,7 @@ const phone = {
   connection: "connecting",
   said: "",
   stale: false,
-  problemsSeen: false,
+  problemsSeen: Boolean(sessionStorage.getItem("problems-seen")),
 };
 
 // ── Start: permission, wake lock, connection
@@ -44,7 +44,7 @@ async function start() {
   fillScreen();
   phone.permission = await asked;
   await keepAwake();
-  await begin();
+  await begin(null);
 }
 
 // Where the browser can; it is as well without.
@@ -59,20 +59,23 @@ async function fillScreen() {
 
 // After a reload nobody need tap again where the browser lets it be; a phone that is back at once goes on with its trial.
 async function startAgain() {
+  const before = sessionStorage.getItem("started");
   phone.permission = await askPermission();
-  if (phone.permission === "denied") return showOnly("begin");
+  if (phone.permission === "denied" && before !== "denied") return showOnly("begin");
   await keepAwake();
-  return begin();
+  return begin(before);
 }
 
-async function begin() {
-  sessionStorage.setItem("started", "yes");
+// `before` is what the permission came to when this page was loaded first, so that a trial need not wait for readings.
+async function begin(before) {
   showOnly("stage");
   show();
   if (["granted", "unneeded"].includes(phone.permission)) {
-    const comes = await startMotion((message) => phone.link?.sendReading(message));
-    if (!comes) phone.permission = "unavailable";
+    const comes = startMotion((message) => phone.link?.sendReading(message));
+    if (!before && !(await comes)) phone.permission = "unavailable";
   }
+  phone.permission = before ?? phone.permission;
+  sessionStorage.setItem("started", phone.permission);
   phone.link = new Link("phone", { hello, receive, status, pings: true });
   phone.battery = await navigator.getBattery?.().catch(() => null);
   phone.battery?.addEventListener("levelchange", sendBattery);
@@ -89,7 +92,15 @@ function hello() {
     permission: phone.permission,
     secure: isSecureContext,
     wake_lock: Boolean(phone.wakeLock),
+    id: identity(),
   };
+}
+
+// The same after a reload or a break, so that a phone whose old connection only seems to live is not taken for a second one.
+function identity() {
+  const made = sessionStorage.getItem("id") ?? crypto.getRandomValues(new Uint32Array(3)).join("-");
+  sessionStorage.setItem("id", made);
+  return made;
 }
 
 async function keepAwake() {
@@ -119,11 +130,12 @@ function showNext() {
 at("start").addEventListener("click", start, { once: true }); // a second tap would connect twice
 at("go-on").addEventListener("click", () => {
   phone.problemsSeen = true;
+  sessionStorage.setItem("problems-seen", "yes");
   showNext();
 });
 calibrate({ card: at("card"), slider: at("card-size"), button: at("card-fits") }, showNext);
 at("try-again").addEventListener("click", () => {
-  sessionStorage.removeItem("started"); // a page loaded anew asks anew, within a tap
+  sessionStorage.clear(); // a page loaded anew asks anew, within a tap
   location.reload();
 });
 

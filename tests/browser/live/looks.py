@@ -36,7 +36,7 @@ def _phone_runs(tab: Tab, server: LiveServer) -> None:
 
 
 def _phone_stands(tab: Tab, server: LiveServer) -> None:
-    tab.evaluate("sessionStorage.setItem('started', 'yes')")
+    tab.evaluate("sessionStorage.setItem('started', 'granted')")
     tab.open(f"{server.address}/phone")
     server.wait("phone", "hello")
     server.say("phone", **welcome())
@@ -55,7 +55,7 @@ def _phone_lacks(tab: Tab, server: LiveServer) -> None:
 
 
 def _phone_is_measured(tab: Tab, server: LiveServer) -> None:
-    tab.evaluate("sessionStorage.setItem('started', 'yes')")
+    tab.evaluate("sessionStorage.setItem('started', 'granted')")
     tab.open(f"{server.address}/phone")
     server.wait("phone", "hello")
     server.say("phone", **welcome(window="true_size"))

@@ -100,10 +100,15 @@ class Participant:
 
         return is_other
 
-    def play(self) -> None:
-        """Until the task is done."""
+    def play(self, reload_before: int = 0) -> None:
+        """Until the task is done. The page is loaded anew before the trial of that number."""
+        pending = [reload_before] if reload_before else []
 
         def is_done() -> bool:
+            if [self.state.get("trial")] == pending and self.state["state"] == "running":
+                pending.clear()
+                self.drawn = 0
+                self.tab.evaluate("location.reload()")
             self.act()
             return bool(self.state["state"] in ("done", "finished"))
 

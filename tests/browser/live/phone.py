@@ -229,6 +229,10 @@ def without_permission_it_is_a_display(tab: Tab, server: LiveServer) -> None:
     assert "does not let this page use the motion sensors" in text(tab, "#problem-list")
     touch(tab, "#go-on")
     _shown(server, 1)
+    tab.open(f"{server.address}/phone")  # which nobody is asked about twice
+    server.wait("phone", "hello", 2)
+    _shown(server, 2)
+    assert not is_seen(tab, "#problems")
     assert server.said("phone", "motion") == []
 
 
@@ -281,6 +285,7 @@ def a_reload_goes_on_without_a_tap(tab: Tab, server: LiveServer) -> None:
     server.wait("phone", "hello", 2)
     _shown(server, 4)
     assert len(server.said("phone", "select")) == 1
+    assert len({hello["id"] for hello in server.said("phone", "hello")}) == 1
     server.received["phone"] = []
     server.wait("phone", "motion", 5)
 

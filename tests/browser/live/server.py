@@ -24,7 +24,10 @@ from tests.conftest import CLONE
 PAGES = CLONE / "pipeline" / "live" / "pages"
 KEY = "k7QmExample"
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
-_HEADERS = {"Content-Security-Policy": "default-src 'self'", "Cache-Control": "no-store"}
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "Cache-Control": "no-store",
+}
 Message = dict[str, Any]
 Answerer = Callable[["LiveServer", str, Message], None]
 
