@@ -25,7 +25,8 @@ def show(folder: Path | None) -> None:
     cache = _existing(folder)
     items = list(items_in(cache))
     order = [stage.name for stage in STAGES]
-    stages = sorted({item.stage for item in items}, key=lambda name: (not name, name not in order, order.index(name)))
+    place = {name: at for at, name in enumerate(order)}  # replay and the unfinished have none: they come last
+    stages = sorted({item.stage for item in items}, key=lambda name: (not name, place.get(name, len(order)), name))
     console.say(f"{cache.root}: {_amount(items)}")
     lines = []
     for stage in stages:

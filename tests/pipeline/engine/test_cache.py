@@ -288,6 +288,19 @@ def test_a_cache_that_is_not_there_is_said(cache: Callable[..., Ran]) -> None:
 
 
 @pytest.mark.usefixtures("filled")
+def test_cache_shows_entries_of_replay_and_what_a_killed_run_left(
+    cache: Callable[..., Ran], steadyhand: Steadyhand
+) -> None:
+    """Neither is of a stage of the report; they come last."""
+    kept = next(steadyhand.cache.glob("fuse/*/*"))
+    shutil.copytree(kept, steadyhand.cache / "replay" / kept.parent.name / kept.name)
+    (steadyhand.cache / "new" / "left").mkdir(parents=True)
+    ran = cache("show")
+    assert ran.code == 0
+    assert [line.split()[0] for line in ran.out.splitlines()[-2:]] == ["replay", "(unfinished)"]
+
+
+@pytest.mark.usefixtures("filled")
 def test_cache_shows_what_is_kept(cache: Callable[..., Ran]) -> None:
     lines = [line.split() for line in cache("show").out.splitlines()]
     assert [(line[0], line[1]) for line in lines[2:]] == [
