@@ -19,6 +19,7 @@ from pipeline.commands import console, junit, r_process
 from pipeline.commands.junit import Case, Suite
 from pipeline.commands.studies import for_each_study
 from pipeline.engine.messages import session_messages
+from pipeline.engine.progress import show_progress
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.stages import COMPARE
@@ -112,9 +113,16 @@ def _outcomes(result: Result, names: Sequence[str], rscript: str | None) -> list
     problems += families_of(answers)
     of_row: dict[int, list[Agreement]] = {}
     libraries = [LIBRARIES[name].calls for name in names if name in LIBRARIES]
-    for problem, from_r in zip(problems, _all_in_r(problems, rscript), strict=True):
-        theirs = [figures for calls in libraries for figures in ask(calls, problem)] + from_r
-        of_row.setdefault(id(problem.row), []).extend(held_against(problem, figures) for figures in theirs)
+    with show_progress() as progress:
+        if rscript is not None:
+            progress.begin("asking R", 1)
+        in_r_too = _all_in_r(problems, rscript)
+        progress.begin("asking other programs", len(problems), "comparisons")
+        for problem, from_r in zip(problems, in_r_too, strict=True):
+            theirs = [figures for calls in libraries for figures in ask(calls, problem)] + from_r
+            of_row.setdefault(id(problem.row), []).extend(held_against(problem, figures) for figures in theirs)
+            progress.advance()
+        progress.end()
     return [Outcome(row, of_row.get(id(row), [])) for answer in answers for row in answer.rows]
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.commands import console
 from pipeline.commands.studies import for_each_study
+from pipeline.engine.progress import show_progress
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError
 from pipeline.sessions import recording
@@ -38,7 +40,10 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
         if not recordings:
             raise PipelineError(f"{folder}: has no session to fit to")
         try:
-            fitted = fit(result.study, recordings, first_s)
+            with show_progress() as progress:
+                begin = partial(progress.begin, "fitting", unit="steps")
+                fitted = fit(result.study, recordings, first_s, begin, progress.advance)
+                progress.end()
         except PipelineError as error:
             raise PipelineError(f"{folder}: {error}") from None
         folders = [result.entries["ingest"][session.id].folder for session in result.sessions]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,10 +64,17 @@ class Fit:
     gravity_mm_s2: Mapping[str, tuple[FloatArray, FloatArray]]
 
 
-def fit(study: Study, recordings: Mapping[str, Recording], first_s: float) -> Fit:
+def fit(
+    study: Study,
+    recordings: Mapping[str, Recording],
+    first_s: float,
+    begin: Callable[[int], None] = lambda total: None,
+    done: Callable[[], None] = lambda: None,
+) -> Fit:
     """Noise and latency of the sensors, then the parameters of every fusion_kalman and window_gp of the study.
 
-    Raises PipelineError where there is nothing to fit.
+    `begin` is called with the number of steps, which are the sensors, each estimator and each session's score; `done`
+    after each. Raises PipelineError where there is nothing to fit.
     """
     if study.tracker is None:
         raise PipelineError("study.yaml: streams: fitting needs a stream of kind position")
@@ -75,7 +82,9 @@ def fit(study: Study, recordings: Mapping[str, Recording], first_s: float) -> Fi
     parts = [part for part in parts if len(part[study.tracker])]
     if not parts:
         raise PipelineError(f"no session has positions in its first {first_s:g} s")
+    begin(1 + len(study.estimators) + len(recordings))
     fitted = _sensors(study, parts)
+    done()
     known = _with(sensors(study), fitted)
     latency = next((p.fitted.value for p in fitted if p.key == "latency_s" and not p.at_bound), None)
     shifted = [_late(study, part, latency) for part in parts]
@@ -85,10 +94,12 @@ def fit(study: Study, recordings: Mapping[str, Recording], first_s: float) -> Fi
         used = {key: known[key] for key in stated.sensors}
         rows, estimators[name] = _estimator(name, stated, used, shifted)
         fitted += rows
+        done()
     scores = []
     for session, loaded in recordings.items():
         later = loaded.times[loaded.times >= _begin(study, loaded) + first_s + SETTLED_S]
         scores += _scores(study, session, loaded, estimators, later, _late(study, loaded.samples, latency))
+        done()
     return Fit(tuple(fitted), tuple(scores), _gravity(recordings, first_s))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -34,8 +34,16 @@ class StreamsGuess:
     unread: tuple[str, ...]
 
 
-def guess_streams(logs: Sequence[Path]) -> StreamsGuess | None:
-    """The streams of the first log that has any, with noise and latency as the median over all; None if none has."""
+def guess_streams(
+    logs: Sequence[Path],
+    begin: Callable[[int], None] = lambda total: None,
+    done: Callable[[], None] = lambda: None,
+) -> StreamsGuess | None:
+    """The streams of the first log that has any, with noise and latency as the median over all; None if none has.
+
+    `begin` is called with the number of logs, `done` after each.
+    """
+    begin(len(logs))
     inspections: list[Inspection] = []
     facts: list[str] = []
     unread: list[str] = []
@@ -46,6 +54,8 @@ def guess_streams(logs: Sequence[Path]) -> StreamsGuess | None:
         except SessionError as error:
             unread.append(f"{path.name}: {error}")
             continue
+        finally:
+            done()
         inspections.append(inspection)
         facts += [counted.facts["condition"]] if "condition" in counted.facts else []
     usable = [one for one in inspections if one.usable]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from pipeline.commands.new.questions import Questions
+from pipeline.engine.progress import show_progress
 from pipeline.errors import PipelineError
 from pipeline.sessions.guessed_streams import StreamsGuess, guess_streams
 from pipeline.sessions.logs import READERS
@@ -49,7 +51,7 @@ def look(folder: Path, stated: Stated, questions: Questions) -> Found:
     """What the folder holds. Raises PipelineError where there is nothing that a study could use."""
     files = list(_files(folder, _DEPTH_MAX))
     logs = tuple(path for path in files if path.suffix.lower() in READERS)
-    streams = guess_streams(_some(logs)) if logs else None
+    streams = _streams(logs) if logs else None
     names = _names(folder, logs, stated.conditions or (streams.condition_facts if streams is not None else ()))
     known = stated.conditions or (names.conditions if names is not None else ())
     written = [
@@ -78,6 +80,13 @@ def _files(folder: Path, depth: int) -> Iterator[Path]:
                 yield from _files(Path(entry.path), depth - 1)
         elif entry.is_file(follow_symlinks=False):
             yield Path(entry.path)
+
+
+def _streams(logs: Sequence[Path]) -> StreamsGuess | None:
+    with show_progress() as progress:
+        found = guess_streams(_some(logs), partial(progress.begin, "looking at logs", unit="logs"), progress.advance)
+        progress.end()
+    return found
 
 
 def _some(logs: Sequence[Path]) -> list[Path]:

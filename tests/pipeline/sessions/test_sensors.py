@@ -203,6 +203,7 @@ def test_fit_prints_what_the_recordings_say(
     assert after < before
     assert "which agrees with [" in ran.out
     assert "With stamp: arrival this is latency_s; with stamp: measurement it should be 0" in ran.out
+    assert "fitting: 4 steps" in ran.err  # the sensors, two estimators, one session's score
 
 
 def test_fit_holds_gravity_against_study_yaml_and_takes_no_bound(
