@@ -21,7 +21,8 @@ report: .venv/installed ## write the report of STUDY (default: the simulated stu
 check: .venv/installed ## do the bundled studies' statistics still come out the same?
 	@$(steadyhand) check studies/feng2016 studies/reach $(ARGS)
 
-replay: .venv/installed ## variants of the estimators, ranked: STUDY=… ARGS="--set fusion.window=3,5,10"
+replay: STUDY = studies/reach
+replay: .venv/installed ## variants of the estimators, ranked: ARGS="--set fusion.window=3,5,10"; STUDY=… for another study
 	@$(steadyhand) replay "$(STUDY)" $(ARGS)
 
 simulate: .venv/installed ## write the logs of a simulated STUDY anew

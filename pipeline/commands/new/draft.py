@@ -67,9 +67,9 @@ def _logs(found: Found) -> Iterator[Line]:
     if "position" in kinds:
         yield Line("estimators:", "what each would have shown is computed; rename them as you like")
         yield Line("  raw: {type: raw}", "the newest reading of the tracker, held")
-        yield Line("  positions: {type: position_kalman}", "a Kalman filter of the tracker alone")
+        yield Line("  kalman: {type: position_kalman}", "a Kalman filter of the tracker alone")
     if {"position", "acceleration"} <= kinds:
-        yield Line("  fusion: {type: fusion_kalman}", "tracker and phone, by the noise and latency stated above")
+        yield Line("  kalman_fusion: {type: fusion_kalman}", "tracker and phone, by the noise and latency stated above")
         yield Line("  adaptive: {type: fusion_adaptive}", "the same, which finds noise, clock and mounting itself")
 
 

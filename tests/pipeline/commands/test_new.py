@@ -188,7 +188,7 @@ def test_logs_give_streams_with_rates_noise_and_gravity(tmp_path: Path, new: New
             write_session(study / "logs" / f"{person}_{condition}.mcap")
     made = new(study, "--conditions", "kinect,fusion")
     assert made.code == 0
-    assert "which would read 4 sessions and run raw, positions, fusion and adaptive on each" in made.out
+    assert "which would read 4 sessions and run raw, kalman, kalman_fusion and adaptive on each" in made.out
     assert_commented(study)
     found = settings(study)
     assert found["conditions"] == ["kinect", "fusion"]
