@@ -18,8 +18,15 @@ READERS = {
     ".mcap": "pipeline.sessions.logs.mcap",
     ".db3": "pipeline.sessions.logs.rosbag2_sqlite",
     ".bag": "pipeline.sessions.logs.rosbag1",
+    ".xdf": "pipeline.sessions.logs.xdf",
+    ".csv": "pipeline.sessions.logs.tables",
+    ".tsv": "pipeline.sessions.logs.tables",
+    ".txt": "pipeline.sessions.logs.tables",
+    ".tum": "pipeline.sessions.logs.tables",
 }
 """The module that reads a file, by its suffix."""
+
+_TABLES = (".csv", ".tsv", ".tum")
 
 _PACKED = (".zstd", ".zst")
 
@@ -39,7 +46,11 @@ def read_logs(files: Sequence[Path], wanted: Iterable[Wanted], limits: Limits = 
     wants = tuple(wanted)
     if len(files) == 1:
         return _in_units(_read_one(files[0], wants, limits), wants)
-    logs = [file for file in files if _suffix(file) in READERS]
+    logs = [file for file in files if _suffix(file) in READERS and file.suffix != ".txt"]
+    if logs and all(_suffix(file) in _TABLES for file in logs):
+        from pipeline.sessions.logs.tables import read_all
+
+        return _in_units(read_all(logs, wants, limits), wants)
     if not logs:
         names = ", ".join(file.name for file in files[:5])
         raise SessionError(f"no reader for any of its files ({names}); known: {', '.join(READERS)}")

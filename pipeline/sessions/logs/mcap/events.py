@@ -34,7 +34,11 @@ def event(channel: Channel, schema: Schema | None, payload: bytes, farthest_m: f
         raise ValueError(f'its encoding is "{channel.message_encoding}", not json')
     if len(payload) > _EVENT_LIMIT:
         raise ValueError(f"it is longer than {_EVENT_LIMIT // 1024} KiB, which no event is")
-    message = json.loads(payload)
+    return checked_event(json.loads(payload), farthest_m)
+
+
+def checked_event(message: object, farthest_m: float) -> Mapping[str, object]:
+    """The used fields of an event that is already a mapping. ValueError, or what its types raise, for anything else."""
     if not isinstance(message, dict) or message.get("type") not in EVENT_TYPES:
         raise ValueError(f"it is not an event: `type` must be one of {', '.join(EVENT_TYPES)}")
     trial = message.get("trial")

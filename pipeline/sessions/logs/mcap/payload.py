@@ -183,7 +183,8 @@ def _plausible(fields: Fields, content: str, source: Source, failures: Failures)
     """
     motion = fields.values[:, : 6 if content == "acceleration" else 3]
     scale = np.repeat([source.scale, source.turning_scale], 3)[: motion.shape[1]]
-    too_far = ((np.abs(motion * scale) > _PLAUSIBLE[content]) & np.isfinite(motion)).any(axis=1)
+    with np.errstate(invalid="ignore", over="ignore"):  # damaged bytes may be any float
+        too_far = ((np.abs(motion * scale) > _PLAUSIBLE[content]) & np.isfinite(motion)).any(axis=1)
     no_stamp = (fields.nanoseconds < 0) | (fields.nanoseconds >= 1_000_000_000)
     for unfit, reason in ((no_stamp, UNFIT), (too_far, f"{UNFIT}: a figure is out of all range")):
         for index in np.flatnonzero(unfit).tolist():
