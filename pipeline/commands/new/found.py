@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from pipeline.commands.new.questions import Questions
+from pipeline.commands.new.session_logs import logs_among, sessions_of
 from pipeline.engine.progress import show_progress
 from pipeline.errors import PipelineError
 from pipeline.sessions.guessed_streams import StreamsGuess, guess_streams
@@ -50,15 +51,17 @@ class Found:
 def look(folder: Path, stated: Stated, questions: Questions) -> Found:
     """What the folder holds. Raises PipelineError where there is nothing that a study could use."""
     files = list(_files(folder, _DEPTH_MAX))
-    logs = tuple(path for path in files if path.suffix.lower() in READERS)
+    texts = {path: tables_in(path, _people(stated)) for path in files if path.suffix.lower() in SUFFIXES}
+    recorded = logs_among(files, texts, _people(stated))
+    logs = tuple(sessions_of(recorded, files))
     streams = _streams(logs) if logs else None
     names = _names(folder, logs, stated.conditions or (streams.condition_facts if streams is not None else ()))
     known = stated.conditions or (names.conditions if names is not None else ())
     written = [
         replace(one, name=path.relative_to(folder).as_posix()) if isinstance(one, Written) else one
-        for path in files
-        if path.suffix.lower() in SUFFIXES
-        for one in tables_in(path, _people(stated))
+        for path, tables_of in texts.items()
+        if path not in recorded
+        for one in tables_of
     ]
     tables, not_used = _kinds(written, known, stated, questions)
     if not logs and not tables:

@@ -217,6 +217,38 @@ def test_real_logs_give_the_trackers_latency(tmp_path: Path, new: New) -> None:
     assert tracker["noise_sd_mm"] == pytest.approx(8, rel=0.1)
 
 
+def test_a_folder_that_is_a_session_is_one(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
+    """Logs of one name in folders that tell participants and conditions apart, as recorders leave them."""
+    study = tmp_path / "study"
+    for person in ("P01", "P02"):
+        for condition in ("kinect", "fusion"):
+            write_session(study / "data" / f"{person}_{condition}" / "log.mcap")
+    written(
+        study, "measures.csv", "participant,condition,time\nP01,kinect,3\nP01,fusion,4\nP02,kinect,4\nP02,fusion,6\n"
+    )
+    made = new(study, "--conditions", "kinect,fusion")
+    assert "4 logs: data/{participant}_{condition}\n" in made.out
+    assert "measures.csv: read as the measures" in made.out
+    assert steadyhand("compare", study).code == 0
+    assert len({row["session"] for row in steadyhand.results()["quality"]}) == 4
+
+
+def test_text_logs_of_a_session_are_no_tables_of_the_study(tmp_path: Path, new: New) -> None:
+    study = tmp_path / "study"
+    times = [1_700_000_000 + 0.01 * at for at in range(300)]
+    tracker = "Time (s),x (m),y (m),z (m)\n" + "".join(f"{t:.3f},{0.1 * (t % 1):.4f},0,1\n" for t in times[::3])
+    rows = (f"{round(1e9 * t)},{t - times[0]:.3f},0.2,9.8,0.1\n" for t in times)
+    phone = "time,seconds_elapsed,z,y,x\n" + "".join(rows)
+    for name in ("P01_a", "P01_b", "P02_a", "P02_b"):
+        written(study / "data" / name, "tracker.csv", tracker)
+        written(study / "data" / name, "Accelerometer.csv", phone)
+    made = new(study)
+    assert made.code == 0, made.err
+    assert "4 logs: data/{participant}_{condition}\n" in made.out
+    assert "Not used" not in made.out
+    assert settings(study)["streams"]["tracker"]["topic"] == "tracker"
+
+
 def test_names_that_are_not_built_alike_are_asked_to_be(tmp_path: Path, new: New) -> None:
     write_session(tmp_path / "study" / "one.mcap")
     write_session(tmp_path / "study" / "a_b_c_d_e.mcap")
