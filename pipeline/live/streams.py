@@ -23,6 +23,8 @@ from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
 _ALL_AXES = ("x", "y", "z")
+KINDS = ("phone", "udp_json", "demo")
+"""The senders that work."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,11 @@ def required(study: Study, where: str) -> Mapping[str, str]:
     for condition in study.conditions:
         if condition not in study.shown:
             raise PipelineError(f'{where}: shown: has no estimator for "{condition}"; add the one it displays')
+    for name, sender in study.recording.senders.items():
+        if sender.kind not in KINDS:
+            raise PipelineError(
+                f"{where}: recording: senders.{name}: {sender.kind} is not there yet; use {', '.join(KINDS)}"
+            )
     for name, stream in study.sensor_streams.items():
         if name not in study.recording.senders:
             raise PipelineError(f"{where}: recording: senders: has none for {name}, of kind {stream.kind}; add one")
