@@ -18,6 +18,10 @@ _NS_PER_MS = 1e6
 _NS_PER_S = 1e9
 _LEAST_FREE_BYTES = 200_000_000
 _LATE_WRITE_MS = 2_000.0
+_UNALIGNED = (
+    "The phone's orientation is not known yet: hold it still for a second, then move it about in view of the tracker;"
+    " or give a reason to start without it."
+)
 
 
 def phase(run: StudyRun) -> str:
@@ -38,6 +42,8 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
         for name in used
         if health.is_silent(run.health[name], at_ns)
     ]
+    if run.phone is not None and run.setup.motion_stream in used and not run.motion.is_known:
+        found.append(_UNALIGNED)
     if run.disk is not None and run.disk.fault is not None:
         found.append(run.disk.fault)
     elif run.disk is not None and run.disk.free_bytes < _LEAST_FREE_BYTES:
@@ -218,6 +224,8 @@ def _phone_light(run: StudyRun) -> dict[str, object]:
         return {"light": "red", "text": "No phone is connected. Scan the code with the phone."}
     if run.hello is not None and not run.hello.wake_lock and not run.setup.mouse:
         return {"light": "amber", "text": "Connected. Its screen may go dark: set its automatic lock to “never”."}
+    if run.setup.aligner is not None and not run.motion.is_known:
+        return {"light": "amber", "text": "Connected. Its orientation is not known yet: hold it still, then move it."}
     return {"light": "green", "text": "Connected."}
 
 

@@ -14,7 +14,7 @@ import uvicorn
 from pipeline.errors import PipelineError
 from pipeline.live import setup
 from pipeline.live.access import Access
-from pipeline.live.adapters import udp
+from pipeline.live.adapters import osc, udp
 from pipeline.live.clerk import Clerk
 from pipeline.live.journal import Journal, known_plan
 from pipeline.live.loop import Clock, Loop
@@ -84,9 +84,15 @@ async def serve(made: Setup, folder: Path, journal: Journal, access: Access, on:
 
 async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[asyncio.DatagramTransport]:
     found: list[asyncio.DatagramTransport] = []
-    ports = {one.udp_json.port for one in made.recording.senders.values() if one.udp_json is not None}
-    for port in sorted(ports):
-        receiver = udp.Receiver(udp.expected(made, port), access.sensors, loop.happens, loop.now_ns)
+    receivers: dict[int, udp.Limited] = {}
+    for sender in made.recording.senders.values():
+        if sender.udp_json is not None:
+            streams = udp.expected(made, sender.udp_json.port)
+            receivers[sender.udp_json.port] = udp.Receiver(streams, access.sensors, loop.happens, loop.now_ns)
+        if sender.osc is not None:
+            addresses = osc.expected(made, sender.osc.port)
+            receivers[sender.osc.port] = osc.Receiver(addresses, loop.happens, loop.now_ns)
+    for port, receiver in sorted(receivers.items()):
         try:
             found.append(await udp.listen(access.host, port, receiver))
         except OSError as error:

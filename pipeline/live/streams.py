@@ -23,7 +23,7 @@ from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
 _ALL_AXES = ("x", "y", "z")
-KINDS = ("phone", "udp_json", "demo")
+KINDS = ("phone", "udp_json", "osc", "demo")
 """The senders that work."""
 
 

@@ -38,17 +38,11 @@ def expected(setup: Setup, port: int) -> dict[str, Expected]:
     return found
 
 
-class Receiver(asyncio.DatagramProtocol):
-    """One port. `refused` counts what was dropped, by reason."""
+class Limited(asyncio.DatagramProtocol):
+    """A port that takes so much from each source and no more. `refused` counts what was dropped, by reason."""
 
-    def __init__(
-        self,
-        streams: Mapping[str, Expected],
-        key: str,
-        happens: Callable[[Reading], None],
-        now_ns: Callable[[], int],
-    ) -> None:
-        self._streams, self._key, self._happens, self._now_ns = streams, key, happens, now_ns
+    def __init__(self, happens: Callable[[Reading], None], now_ns: Callable[[], int]) -> None:
+        self.happens, self._now_ns = happens, now_ns
         self._flows: dict[str, Flow] = {}
         self.refused: Counter[str] = Counter()
 
@@ -62,10 +56,31 @@ class Receiver(asyncio.DatagramProtocol):
         self._flows[source], admitted = admit(flow, _PER_SECOND, now)
         if not admitted:
             self.refused["too many datagrams"] += 1
-            return
-        if len(data) > DATAGRAM_BYTES:
+        elif len(data) > DATAGRAM_BYTES:
             self.refused["too long"] += 1
-            return
+        else:
+            self.take(data, source, now)
+
+    def take(self, data: bytes, source: str, now: int) -> None:
+        """A datagram within the limits."""
+        raise NotImplementedError
+
+
+class Receiver(Limited):
+    """A port for readings in JSON, which hold the run's key."""
+
+    def __init__(
+        self,
+        streams: Mapping[str, Expected],
+        key: str,
+        happens: Callable[[Reading], None],
+        now_ns: Callable[[], int],
+    ) -> None:
+        super().__init__(happens, now_ns)
+        self._streams, self._key = streams, key
+
+    def take(self, data: bytes, source: str, now: int) -> None:
+        """A datagram within the limits."""
         try:
             readings = parse_datagram(data)
         except MessageError:
@@ -87,10 +102,10 @@ class Receiver(asyncio.DatagramProtocol):
             self.refused["not of the stream's kind"] += 1
             return
         sent = None if datagram.t is None else datagram.t * _MS_PER_S
-        self._happens(Reading(datagram.stream, None, now, values, datagram.seq, sent))
+        self.happens(Reading(datagram.stream, None, now, values, datagram.seq, sent))
 
 
-async def listen(host: str, port: int, receiver: Receiver) -> asyncio.DatagramTransport:
+async def listen(host: str, port: int, receiver: Limited) -> asyncio.DatagramTransport:
     """Open a port. OSError where it is taken."""
     running = asyncio.get_running_loop()
     transport, _ = await running.create_datagram_endpoint(lambda: receiver, local_addr=(host, port))

@@ -13,9 +13,14 @@ from typing import Any
 
 import pytest
 import websockets
+from hypothesis import given
+from hypothesis import strategies as st
+from pythonosc.osc_message_builder import OscMessageBuilder
 
 from pipeline.live import server
 from pipeline.live.access import Access
+from pipeline.live.adapters import osc
+from pipeline.live.adapters.osc import Receiver as OscReceiver
 from pipeline.live.adapters.udp import Receiver, expected
 from pipeline.live.events import Reading
 from pipeline.live.journal import Journal
@@ -318,6 +323,46 @@ def test_what_a_receiver_refuses_is_counted(tmp_path: Path) -> None:
     for number in range(100):
         receiver.datagram_received(good, (f"10.0.0.{number}", 5))
     assert receiver.refused["too many sources"] == 37
+
+
+def test_osc_messages_to_an_address_are_readings(tmp_path: Path) -> None:
+    senders = (
+        "senders: {tracker: {osc: {port: 9000, address: /hand, fields: [2, 0, 1]}, unit: m},"
+        " imu: {osc: {port: 9000, address: /imu, fields: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]}}}"
+    )
+    _, setup = study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}, imu: {demo: {}}}", senders))
+    taken: list[Reading] = []
+    receiver = OscReceiver(osc.expected(setup, 9000), taken.append, lambda: 5)
+
+    def sends(address: str, *arguments: object) -> None:
+        message = OscMessageBuilder(address)
+        for argument in arguments:
+            message.add_arg(argument)  # type: ignore[arg-type]
+        receiver.datagram_received(message.build().dgram, ("127.0.0.1", 1))
+
+    sends("/hand", 0.25, 0.5, 1, "more")
+    sends("/imu", *[0.5] * 6, 0.0, 0.0, 0.0, 1.0)
+    assert taken == [
+        Reading("tracker", None, 5, (1.0, 0.25, 0.5)),
+        Reading("imu", None, 5, (*[0.5] * 6, 0.0, 0.0, 0.0, 1.0)),
+    ]
+    sends("/hand", 0.25, 0.5)
+    sends("/hand", 0.25, 0.5, "one")
+    sends("/hand", 0.25, 0.5, float("nan"))
+    sends("/other", 1.0)
+    for data in (b"", b"/hand", b"#bundle\0" + b"\xff" * 40, b"\0" * 100):
+        receiver.datagram_received(data, ("127.0.0.1", 1))
+    assert len(taken) == 2
+    assert receiver.refused["not of the stream's kind"] == 3
+    assert receiver.refused["no such address"] == 1
+
+
+@given(st.binary(max_size=200))
+def test_random_bytes_are_no_osc(data: bytes) -> None:
+    receiver = OscReceiver({}, lambda reading: None, lambda: 0)
+    receiver.datagram_received(data, ("127.0.0.1", 1))
+    receiver.datagram_received(b"/a\0\0" + data, ("127.0.0.1", 1))
+    receiver.datagram_received(b"#bundle\0" + data, ("127.0.0.1", 1))
 
 
 def test_pages_are_files_beside_the_server() -> None:

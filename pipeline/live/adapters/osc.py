@@ -1,0 +1,92 @@
+"""Readings by Open Sound Control: arguments of messages to an address. It has no key: only this computer is heard.
+
+OSC states a time for bundles alone, and most senders leave it out, so a reading's stamp is its arrival.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from pipeline.live.adapters.udp import Limited
+from pipeline.live.events import Reading
+from pipeline.live.messages import Datagram
+from pipeline.live.setup import Setup
+from pipeline.live.units import Units, in_si, units
+
+_LARGEST = 1e6  # as of every figure in a message
+_POSITION, _MOTION, _ORIENTED = 3, 6, 10  # numbers of a reading
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A stream that comes to an address: which arguments make it, what they hold, and their units."""
+
+    stream: str
+    fields: tuple[int, ...]
+    content: str
+    units: Units
+
+
+def expected(setup: Setup, port: int) -> dict[str, Expected]:
+    """The streams of a port, by address."""
+    found = {}
+    for name, sender in setup.recording.senders.items():
+        if sender.osc is not None and sender.osc.port == port:
+            of_stream = Expected(name, sender.osc.fields, setup.streams[name].content, units(sender))
+            found[sender.osc.address] = of_stream
+    return found
+
+
+class Receiver(Limited):
+    """A port for OSC."""
+
+    def __init__(
+        self, streams: Mapping[str, Expected], happens: Callable[[Reading], None], now_ns: Callable[[], int]
+    ) -> None:
+        super().__init__(happens, now_ns)
+        self._streams = streams
+
+    def take(self, data: bytes, source: str, now: int) -> None:
+        """A datagram within the limits."""
+        from pythonosc.osc_packet import OscPacket, ParseError
+
+        try:
+            messages = [timed.message for timed in OscPacket(data).messages]
+        except (ParseError, ValueError, IndexError, RecursionError, OverflowError):
+            self.refused["not understood"] += 1
+            return
+        for message in messages:
+            stream = self._streams.get(message.address)
+            if stream is None:
+                self.refused["no such address"] += 1
+                continue
+            reading = _reading(stream, message.params)
+            values = None if reading is None else in_si(stream.units, stream.content, reading)
+            if values is None:
+                self.refused["not of the stream's kind"] += 1
+                continue
+            self.happens(Reading(stream.stream, None, now, values))
+
+
+def _reading(stream: Expected, arguments: list[object]) -> Datagram | None:
+    """The numbers of a message as those of a datagram; None where some are missing or none."""
+    if max(stream.fields) >= len(arguments):
+        return None
+    numbers = [arguments[place] for place in stream.fields]
+    figures = [float(one) for one in numbers if isinstance(one, int | float) and not isinstance(one, bool)]
+    if len(figures) != len(numbers) or not all(math.isfinite(one) and abs(one) <= _LARGEST for one in figures):
+        return None
+    if stream.content == "position" and len(figures) == _POSITION:
+        return Datagram("", stream.stream, None, None, _three(figures), None, None, None)
+    if stream.content == "acceleration" and len(figures) in (_MOTION, _ORIENTED):
+        x, y, z, w = figures[6:] if len(figures) == _ORIENTED else (0.0, 0.0, 0.0, 1.0)
+        known = len(figures) == _ORIENTED and 0.8 < x * x + y * y + z * z + w * w < 1.25
+        force, turning = _three(figures), _three(figures[3:])
+        return Datagram("", stream.stream, None, None, None, force, turning, (x, y, z, w) if known else None)
+    return None
+
+
+def _three(figures: list[float]) -> tuple[float, float, float]:
+    return figures[0], figures[1], figures[2]
