@@ -92,6 +92,11 @@ class Tab:
         self.call("Page.navigate", url=address)
         self._until(lambda event: event.get("method") == "Page.loadEventFired")
 
+    def reload(self) -> None:
+        """Load the page anew; what it said before is kept."""
+        self.call("Page.reload")
+        self._until(lambda event: event.get("method") == "Page.loadEventFired")
+
     def evaluate(self, script: str) -> Any:
         """The value of an expression in the page, awaited; plain data."""
         answer = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)

@@ -85,7 +85,7 @@ def write(tab: Tab, words: str) -> None:
 
 def focused(tab: Tab) -> str:
     """The id of the element with the focus."""
-    return str(tab.evaluate("document.activeElement.id"))
+    return str(tab.evaluate("document.activeElement?.id ?? ''"))
 
 
 def fake_sensors(tab: Tab, up: float = 9.8) -> None:

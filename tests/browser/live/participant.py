@@ -108,7 +108,7 @@ class Participant:
             if [self.state.get("trial")] == pending and self.state["state"] == "running":
                 pending.clear()
                 self.drawn = 0
-                self.tab.evaluate("location.reload()")
+                self.tab.reload()
             self.act()
             return bool(self.state["state"] in ("done", "finished"))
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from tests.browser.chromium import BrowserError, Tab, tab
-from tests.browser.live import operator, phone, played, questionnaire
+from tests.browser.live import operator, phone, played, questionnaire, whole_study
 from tests.browser.live.acts import fake_sensors
 from tests.browser.live.looks import SCENES
 from tests.browser.live.looks import faults as looks_faults
 from tests.browser.live.server import LiveServer, live_server
 
 Case = Callable[[Tab, LiveServer], None]
+WHOLE = "study: recorded, played and reported"
 _FLAGS = ("--host-resolver-rules=MAP phone.test 127.0.0.1",)
 CASES: dict[str, Sequence[Case]] = {
     "phone": phone.CASES,
@@ -22,27 +23,34 @@ CASES: dict[str, Sequence[Case]] = {
 
 
 def results(wanted: str = "") -> Iterator[tuple[str, list[str]]]:
-    """Each case's name and its faults; `wanted` is part of a name."""
+    """Each case's name and its faults, the whole study last; `wanted` is part of a name."""
+    wanted = wanted.replace("_", " ")
     for page, cases in CASES.items():
         for case in cases:
             name = f"{page}: {case.__name__.replace('_', ' ')}"
-            if wanted.replace("_", " ") in name:
-                yield name, faults(case)
+            if wanted in name:
+                yield name, faults(lambda case=case: _with_stand_in(case))  # type: ignore[misc]
+    if wanted in WHOLE:
+        yield WHOLE, faults(whole_study.plays_and_reports)
 
 
-def faults(case: Case) -> list[str]:
-    """What is wrong, in a line each."""
+def _with_stand_in(case: Case) -> None:
     with live_server(lambda *_: None) as server, tab(*_FLAGS) as opened:
-        try:
-            case(opened, server)
-        except (AssertionError, BrowserError) as error:
-            lines = [f"{type(error).__name__}: {error}"]
-            trace = error.__traceback__
-            while trace is not None:
-                if "browser/live" in trace.tb_frame.f_code.co_filename:
-                    lines.append(f"{trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}")
-                trace = trace.tb_next
-            return lines
+        case(opened, server)
+
+
+def faults(run: Callable[[], None]) -> list[str]:
+    """What is wrong, in a line each."""
+    try:
+        run()
+    except (AssertionError, BrowserError) as error:
+        lines = [f"{type(error).__name__}: {error}"]
+        trace = error.__traceback__
+        while trace is not None:
+            if "browser/live" in trace.tb_frame.f_code.co_filename:
+                lines.append(f"{trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}")
+            trace = trace.tb_next
+        return lines
     return []
 
 
