@@ -153,6 +153,29 @@ def diff(
 
 
 @app.command()
+def export(
+    studies: Studies,
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="FORMAT",
+            help="csv or parquet: every table, with a dictionary of the columns; r: the tables and a script that"
+            " computes the comparisons anew; mcap: each session's log with every track, and a layout for Foxglove.",
+        ),
+    ],
+    out: Out = None,
+    jobs: Jobs = None,
+    cache: CacheFolder = None,
+    executor: ExecutorName = "process",
+) -> None:
+    """Write a study's data for other programs."""
+    from pipeline.commands import export as command
+
+    command.export(studies, to, out, jobs, cache, executor)
+
+
+@app.command()
 def fit(
     studies: Studies,
     first: Annotated[float, typer.Option(min=5, metavar="S", help="Seconds of each session to fit on.")] = 30.0,
