@@ -148,8 +148,8 @@ def draw(found: Mapping[str, Mapping[str, Mapping[str, Score]]], path: Path) -> 
     axes.invert_yaxis()
     axes.set_xticks([0.1, 0.2, 0.5, 1, 2], ["0.1", "0.2", "0.5", "1", "2"])
     axes.minorticks_off()
-    axes.set_xlabel("error relative to the tracker as it comes, geometric mean over recordings")
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    axes.set_xlabel("Error over that of the tracker as it comes\n(geometric mean over recordings)")
+    figure.legend(frameon=False, fontsize=8, loc="outside upper center", ncols=len(shown))
     axes.grid(axis="y", linewidth=0.3)
     axes.spines[["top", "right"]].set_visible(False)
     mpl.rcParams["svg.hashsalt"] = "departures"
