@@ -18,7 +18,8 @@ from pipeline.study.folder import SETTINGS_FILE, inside
 from pipeline.study.session import ANY, PLACEHOLDER, Session
 from pipeline.study.settings import Study
 
-_PACKED = (".zst", ".zstd")
+PACKED = (".zst", ".zstd")
+"""What stands behind the suffix of a file that is packed as a whole."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def _files_of(folder: Path) -> Iterator[Path]:
 
 
 def _is_packed(path: Path) -> bool:
-    return path.suffix.casefold() in _PACKED
+    return path.suffix.casefold() in PACKED
 
 
 def _cannot_be_a_log(path: Path, relative: str, matches: bool, pattern: _Pattern) -> str | None:

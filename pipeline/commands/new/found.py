@@ -19,6 +19,7 @@ from pipeline.study.guessing.headers import LENGTHS
 from pipeline.study.guessing.kind import TableGuess, guess_kind
 from pipeline.study.guessing.lengths import in_units, with_units
 from pipeline.study.guessing.written import SUFFIXES, NotUsed, Written, tables_in
+from pipeline.study.session_files import PACKED
 
 _LOGS_READ = 3  # of all: noise and latency are the medians over them
 _DEPTH_MAX = 3
@@ -102,7 +103,12 @@ def _some(logs: Sequence[Path]) -> list[Path]:
 def _names(folder: Path, logs: Sequence[Path], conditions: Sequence[str]) -> NamePattern | None:
     if not logs:
         return None
-    return guess_pattern([path.relative_to(folder).as_posix() for path in logs], conditions)
+    ending = (
+        ""
+        if logs[0].is_dir()
+        else "".join(logs[0].suffixes[-2:] if logs[0].suffix in PACKED else logs[0].suffixes[-1:])
+    )
+    return guess_pattern([path.relative_to(folder).as_posix() for path in logs], conditions, ending)
 
 
 def _people(stated: Stated) -> tuple[str, ...]:
@@ -123,6 +129,7 @@ def _kinds(
             if isinstance(guess, TableGuess) and (again or guess.kind != "participants"):
                 pending.remove(one)
                 if guess.kind in tables:
+                    _refuse_one_each(tables[guess.kind], guess)
                     other = tables[guess.kind].written.path.name
                     not_used.append(
                         NotUsed(one.path, f"{other} is read as the {guess.kind}, and a study has one table")
@@ -132,6 +139,15 @@ def _kinds(
             elif isinstance(guess, NotUsed) and again:
                 not_used.append(guess)
     return {kind: tables[kind] for kind in _KINDS if kind in tables}, not_used
+
+
+def _refuse_one_each(table: TableGuess, other: TableGuess) -> None:
+    """Raise PipelineError for two tables with the same columns: people have one each, and a study one for all."""
+    if table.written.header == other.written.header:
+        raise PipelineError(
+            f"{table.written.name} and {other.written.name} have the same columns: a study has one table of"
+            f" {table.kind} for everybody, so join such files into one, with a column for what tells them apart"
+        )
 
 
 def _with_units(table: TableGuess, stated: Stated, questions: Questions) -> TableGuess:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from pipeline.sessions.logs import READERS
+from pipeline.sessions.logs import READERS, log_suffix
 from pipeline.sessions.logs.rosbag2 import METADATA
 from pipeline.study.guessing.headers import meaning
 from pipeline.study.guessing.written import NotUsed, Written
@@ -25,7 +25,7 @@ def logs_among(
     """
     listed = list(files)
     texts = [path for path in listed if path.suffix.lower() in _TEXT and path.suffix.lower() in READERS]
-    others = [path for path in listed if path.suffix.lower() in READERS and path not in texts]
+    others = [path for path in listed if log_suffix(path) in READERS and path not in texts]
     beside = {path.parent for path in others}
     of_sensors = [
         path for path in texts if path.parent not in beside and not _names_people(tables.get(path, ()), participant)

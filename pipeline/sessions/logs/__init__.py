@@ -13,6 +13,7 @@ from pipeline.errors import SessionError
 from pipeline.sessions.logs.joined import joined
 from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, Readings, Source, Wanted
 from pipeline.sessions.logs.rosbag2 import METADATA, missing_messages, missing_parts
+from pipeline.study.session_files import PACKED
 
 READERS = {
     ".mcap": "pipeline.sessions.logs.mcap",
@@ -27,8 +28,6 @@ READERS = {
 """The module that reads a file, by its suffix."""
 
 _TABLES = (".csv", ".tsv", ".tum")
-
-_PACKED = (".zstd", ".zst")
 
 
 def read_log(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
@@ -46,8 +45,8 @@ def read_logs(files: Sequence[Path], wanted: Iterable[Wanted], limits: Limits = 
     wants = tuple(wanted)
     if len(files) == 1:
         return _in_units(_read_one(files[0], wants, limits), wants)
-    logs = [file for file in files if _suffix(file) in READERS and file.suffix != ".txt"]
-    if logs and all(_suffix(file) in _TABLES for file in logs):
+    logs = [file for file in files if log_suffix(file) in READERS and file.suffix != ".txt"]
+    if logs and all(log_suffix(file) in _TABLES for file in logs):
         from pipeline.sessions.logs.tables import read_all
 
         return _in_units(read_all(logs, wants, limits), wants)
@@ -73,15 +72,16 @@ def _read_part(file: Path, wants: Sequence[Wanted], limits: Limits, files: Seque
 
 
 def _read_one(path: Path, wants: Sequence[Wanted], limits: Limits) -> Log:
-    module = READERS.get(_suffix(path))
+    module = READERS.get(log_suffix(path))
     if module is None:
         raise SessionError(f"no reader for files ending in {path.suffix!r}; known: {', '.join(READERS)}")
     log: Log = import_module(module).read(path, wants, limits)
     return log
 
 
-def _suffix(path: Path) -> str:
-    return (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
+def log_suffix(path: Path) -> str:
+    """The suffix that says how a log is read: .mcap of P01_a.mcap.zstd."""
+    return (path.with_suffix("") if path.suffix.lower() in PACKED else path).suffix.lower()
 
 
 def _in_units(log: Log, wants: Sequence[Wanted]) -> Log:

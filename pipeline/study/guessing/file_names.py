@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePosixPath
 
 _TOKEN = re.compile(r"[^_/]+|[_/]")
 _OF_A_PERSON = re.compile(r"(?:p|vp|s|sub|subj|subject|tn|user|proband|participant|id)?[-]?\d+", re.IGNORECASE)
@@ -25,14 +24,13 @@ class NamePattern:
         return tuple(dict.fromkeys(self.every_condition))
 
 
-def guess_pattern(names: Sequence[str], conditions: Sequence[str] = ()) -> NamePattern | None:
+def guess_pattern(names: Sequence[str], conditions: Sequence[str], suffix: str) -> NamePattern | None:
     """The pattern of paths in a study folder, of one suffix; None where the names are not built alike.
 
     Parts between "_" and "/" that differ are placeholders: the condition is the part with the fewest different words
     of those that every participant has, or the one that has the `conditions` known already; the participant is the part
     that looks like an id. One more part that differs is the session.
     """
-    suffix = PurePosixPath(names[0]).suffix
     tokens = [_TOKEN.findall(name.removesuffix(suffix)) for name in names]
     if len({len(one) for one in tokens}) != 1:
         return None

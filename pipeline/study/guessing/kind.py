@@ -7,14 +7,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.study.guessing.codes import missing_words
-from pipeline.study.guessing.headers import EVERY, meaning, split_unit
-from pipeline.study.guessing.shapes import Entry, crossed_headers, numeric_columns, questionnaire_of, tlx_names
+from pipeline.study.guessing.headers import EVERY, meaning, plain, split_unit
+from pipeline.study.guessing.shapes import (
+    Entry,
+    crossed_headers,
+    numbered_entry,
+    numeric_columns,
+    questionnaire_of,
+    tlx_names,
+)
 from pipeline.study.guessing.written import NotUsed, Written
 
 _PLACES = {"target_x", "target_y", "selected_x", "selected_y"}
 _OF_TRIALS = (*_PLACES, "target_z", "selected_z", "start", "selection", "target_width")
 _IDS = ("participant", "condition", "session", "trial", "period", "sequence", "practice")
 _OF_PEOPLE = ("age", "sex")
+_ANY_ID = ("id", "code", "nr", "no")
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,9 @@ def _ours(header: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
         column = meaning(name)
         if column is not None and name not in ours.values():
             ours.setdefault(column, name)
+    for name in header:  # what is called so may be anything's id, so a better name goes first
+        if plain(name) in _ANY_ID and name not in ours.values():
+            ours.setdefault("participant", name)
     return ours
 
 
@@ -116,6 +127,9 @@ def _with_values(written: Written, ours: Mapping[str, str], conditions: Sequence
         return _wide(table, "questionnaires", items[1], {"questionnaire": items[0], "scale": items[1]})
     if not free:
         return NotUsed(written.path, "no column holds numbers to compare")
+    numbered = numbered_entry(free, [written.column(written.header[table.header.index(name)]) for name in free])
+    if numbered is not None:
+        return _wide(table, numbered.kind, free, numbered.entry)
     renamed = {name: _with_unit(name) for name in free}
     values = list(renamed.values())
     return _wide(_with_names(table, renamed), "measures", values, {"measure": values})

@@ -13,6 +13,10 @@ from pipeline.study.scoring_rules import RULES, is_weight, weighed_item
 NO_VALUE = ("", "NA", "N/A", "NaN", "nan", "-", "n/a", "k. A.", "k.A.")
 _OF_PEOPLE = ("age", "sex", "participant", "condition", "session", "trial", "period", "sequence", "practice")
 _SHARE_OF_NUMBERS = 0.8
+_NUMBERED = re.compile(r"(?P<stem>.*\D)\d+")
+_NUMBERED_MIN = 3
+_ITEM_WORDS = ("q", "item", "question", "frage", "f", "pregunta", "i")
+_SUS_MAX = 5
 _MEASURE_WORD = re.compile(
     "time|zeit|temps|tiempo|rt|mt|duration|dauer|error|fehler|erreur|score|rating|count|anzahl|number|accuracy|speed|"
     "throughput|value|wert|tlx|sus|mse|rmse|hits|clicks",
@@ -68,6 +72,29 @@ def questionnaire_of(names: Sequence[str]) -> tuple[str, list[str]] | None:
         if len(items) == len(rule.items):
             return rule.name, items
     return None
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """What columns that differ in a number alone are: the kind of their table, and the entry of `wide` for them."""
+
+    kind: str
+    entry: Entry
+
+
+def numbered_entry(names: Sequence[str], cells: Sequence[Sequence[str]]) -> Numbered | None:
+    """The entry for columns such as q1, q2, … or rt_1, rt_2, …: items of a questionnaire, or trials, else None."""
+    matches = [_NUMBERED.fullmatch(name) for name in names]
+    stems = {match["stem"] for match in matches if match is not None}
+    if len(names) < _NUMBERED_MIN or None in matches or len(stems) != 1:
+        return None
+    stem = stems.pop()
+    if stem.strip("_ ").casefold() not in _ITEM_WORDS:
+        return Numbered("measures", {"columns": f"{stem}{{trial}}", "measure": stem.strip("_ -.")})
+    answers = [value for column in cells for cell in column if (value := number_of(cell, ".")) is not None]
+    known = {(10, True): "sus", (26, False): "ueq"}
+    name = known.get((len(names), max(answers, default=0) <= _SUS_MAX), "questionnaire")
+    return Numbered("questionnaires", {"questionnaire": name, "scale": list(names)})
 
 
 def wide_entry(

@@ -103,7 +103,7 @@ def test_nothing_is_ever_overwritten(tmp_path: Path, new: New) -> None:
 def test_a_folder_without_anything_names_the_templates(tmp_path: Path, new: New) -> None:
     ran = new(written(tmp_path / "study", "notes.txt", "nothing here\n"))
     assert ran.code == 2
-    assert "holds no logs (.mcap) and no tables that a study can use" in ran.err
+    assert "and no tables that a study can use" in ran.err
     assert "--template peephole (or tlx, fitts, between)" in ran.err
     assert new(tmp_path / "study", "--template", "fits").err.count('did you mean "fitts"?') == 1
 
@@ -181,6 +181,32 @@ def test_a_row_a_participant_with_a_column_a_condition(
     assert steadyhand.results()["comparisons"][0]["n"] == 2
 
 
+@pytest.mark.parametrize(
+    ("columns", "key", "entry"),
+    [
+        (["t1", "t2", "t3"], "measures", {"columns": "t{trial}", "measure": "t"}),
+        (
+            [f"q{item}" for item in range(1, 11)],
+            "questionnaires",
+            {"questionnaire": "sus", "scale": [f"q{item}" for item in range(1, 11)]},
+        ),
+    ],
+)
+def test_columns_that_differ_in_a_number_are_trials_or_items(
+    tmp_path: Path, new: New, steadyhand: Steadyhand, columns: list[str], key: str, entry: dict[str, Any]
+) -> None:
+    rows = "".join(
+        f"{person},{condition},{','.join(str(1 + (person * at + len(condition)) % 5) for at in range(len(columns)))}\n"
+        for person in (1, 2, 3)
+        for condition in ("old", "newer")
+    )
+    study = written(tmp_path / "study", "data.csv", f"id,cond,{','.join(columns)}\n{rows}")
+    assert new(study).code == 0
+    assert settings(study)["wide"] == {key: entry}
+    assert steadyhand("compare", study).code == 0
+    assert steadyhand.results()["comparisons"][0]["n"] == 3
+
+
 def test_logs_give_streams_with_rates_noise_and_gravity(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
     study = tmp_path / "study"
     for person in ("P01", "P02"):
@@ -249,6 +275,27 @@ def test_text_logs_of_a_session_are_no_tables_of_the_study(tmp_path: Path, new: 
     assert settings(study)["streams"]["tracker"]["topic"] == "tracker"
 
 
+def test_a_folder_of_ros_2_is_a_session(tmp_path: Path, new: New) -> None:
+    study = tmp_path / "study"
+    for person in ("P01", "P02"):
+        for condition in ("kinect", "fusion"):
+            bag = study / "bags" / f"{person}_{condition}"
+            write_session(bag / f"{person}_{condition}_0.mcap")
+            written(bag, "metadata.yaml", "rosbag2_bagfile_information: {}\n")
+    made = new(study, "--conditions", "kinect,fusion")
+    assert made.code == 0, made.err
+    assert settings(study)["sessions"] == "bags/{participant}_{condition}"
+    assert "which would read 4 sessions" in made.out
+
+
+def test_tables_of_one_person_each_are_to_be_joined(tmp_path: Path, new: New) -> None:
+    for person in ("P01", "P02"):
+        written(tmp_path / "study", f"{person}.csv", f"participant,condition,time\n{person},a,3\n{person},b,4\n")
+    ran = new(tmp_path / "study")
+    assert ran.code == 2
+    assert "P01.csv and P02.csv have the same columns" in ran.err
+
+
 def test_names_that_are_not_built_alike_are_asked_to_be(tmp_path: Path, new: New) -> None:
     write_session(tmp_path / "study" / "one.mcap")
     write_session(tmp_path / "study" / "a_b_c_d_e.mcap")
@@ -281,7 +328,7 @@ def test_without_a_terminal_what_was_taken_is_said_with_its_option(tmp_path: Pat
 def test_files_that_are_not_used_are_named(tmp_path: Path, new: New) -> None:
     study = tmp_path / "study"
     shutil.copytree(CASES / "wide", study, ignore=shutil.ignore_patterns("study.yaml"))
-    written(study, "zzz.csv", "participant,condition,time\n1,kinect,3\n1,fusion,4\n")
+    written(study, "zzz.csv", "participant,condition,clicks\n1,kinect,3\n1,fusion,4\n")
     written(study, "notes.csv", "day,weather\n1,rain\n")
     out = new(study).out
     assert "Not used: zzz.csv: measures.csv is read as the measures, and a study has one table" in out

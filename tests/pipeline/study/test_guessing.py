@@ -94,13 +94,13 @@ def test_a_unit_is_split_off(header: str, parts: tuple[str, str | None]) -> None
     ],
 )
 def test_the_pattern_of_logs(names: list[str], conditions: tuple[str, ...], pattern: str, found: str) -> None:
-    guess = guess_pattern(names, conditions)
+    guess = guess_pattern(names, conditions, ".mcap")
     assert guess is not None
     assert (guess.pattern, guess.conditions) == (pattern, tuple(found))
 
 
 def test_names_that_are_not_built_alike_have_no_pattern() -> None:
-    assert guess_pattern(["a_b.mcap", "c.mcap"]) is None
+    assert guess_pattern(["a_b.mcap", "c.mcap"], (), ".mcap") is None
 
 
 def test_columns_of_conditions_and_measures_are_told_apart() -> None:
