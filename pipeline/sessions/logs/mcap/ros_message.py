@@ -70,12 +70,13 @@ def decoder(definition: Definition, type_name: str, content: str, source: Source
             except ValueError:
                 left = left[1:]
                 continue
-            alike = _alike(rows[left], rows[left[0]], found.fixed)
+            every = len(left) == len(rows)  # as mostly; rows need no copy then
+            alike = _alike(rows if every else rows[left], rows[left[0]], found.fixed)
             own = left[alike]
             if found.of_other_frame:
                 fields.of_other_frame[which[own]] = True
             else:
-                read = _read(rows[own], found, wire, content, source)
+                read = _read(rows if len(own) == len(rows) else rows[own], found, wire, content, source)
                 fields.take_named(which[own], read, found.child, found.parent)
             left = left[~alike]
 
