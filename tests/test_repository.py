@@ -93,7 +93,8 @@ def test_the_example_of_fusion_core_runs() -> None:
 
 
 def test_units_are_in_the_names_of_columns() -> None:
-    of_measure, of_stream = {"value", "statistic", "sd", "mean", "median"}, {"residual", "x", "y", "z"}
+    of_measure = {"value", "statistic", "sd", "mean", "median", "stated"}
+    of_stream = {"residual", "x", "y", "z"}
     bare = of_measure | of_stream  # in the unit of theirs
     dimensionless = {
         "p",
