@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.live import plan, study_run
+from pipeline.live import plan, run_state, study_run
 from pipeline.live.adapters.demo import Participant
 from pipeline.live.clerk import Clerk, FileAction
 from pipeline.live.events import Action, Event, Joined, Open, Said, Show, Tell, Tick
 from pipeline.live.journal import Journal
 from pipeline.live.messages import Answer, Do, Drawn, Exchange, Hello, Ping, Select, Submit
 from pipeline.live.outgoing import Form, Outgoing
+from pipeline.live.run_state import StudyRun
 from pipeline.live.setup import Setup
-from pipeline.live.study_run import StudyRun
 from pipeline.sessions.recording import seeded
 from pipeline.simulation.session import Setting
 from pipeline.simulation.workload import ratings
@@ -56,7 +56,7 @@ class Players:
 
     def __init__(self, setup: Setup, folder: Path, journal: Journal, known: plan.Plan, now_ns: int) -> None:
         self.setting = Setting(setup.study, str(folder / "study.yaml"))
-        self.run: StudyRun = study_run.begin(setup, known)
+        self.run: StudyRun = run_state.begin(setup, known)
         self.clerk, self.now_ns = Clerk(journal), now_ns
         self.participant: Participant | None = None
         self.played: dict[tuple[str, str], Participant] = {}

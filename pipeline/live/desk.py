@@ -10,7 +10,7 @@ from pipeline.live.outgoing import Whole
 from pipeline.study.recording import BUILT_IN
 
 if TYPE_CHECKING:
-    from pipeline.live.study_run import StudyRun
+    from pipeline.live.run_state import StudyRun
 
 __all__ = ["BUILT_IN", "facts", "lights", "may", "state", "summary", "trace"]
 

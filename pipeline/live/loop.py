@@ -15,7 +15,7 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from pipeline.live import study_run
+from pipeline.live import run_state, study_run
 from pipeline.live.adapters.mouse import MouseHand
 from pipeline.live.clerk import Clerk, FileAction, agreement
 from pipeline.live.events import (
@@ -120,7 +120,7 @@ class Loop:
     """A study that is run. `happens` takes events from adapters; `pages` are the outboxes by client."""
 
     def __init__(self, setup: Setup, folder: Path, clerk: Clerk, known: Plan, clock: Clock) -> None:
-        self.run = study_run.begin(setup, known)
+        self.run = run_state.begin(setup, known)
         self.now_ns, self.pages = clock, dict[int, Outbox]()
         self._ticked_ns, self._wall_ns = clock(), clock()
         self._folder, self._clerk = folder, clerk

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import PipelineError
-from pipeline.live import plan, study_run
+from pipeline.live import plan, run_state
 from pipeline.live.bots import FORMS, PHONE, Players, as_simulated
 from pipeline.live.events import Joined, Left, Said, Tick
 from pipeline.live.journal import PART, Journal
@@ -230,4 +230,4 @@ def test_messages_of_pages_that_are_not_active_change_nothing(tmp_path: Path) ->
     for message in (Drawn(5, 1.0), Select(5, 1.0)):
         playing.happens(Said("phone", 77, message, EPOCH_NS))
     assert playing.run == before
-    assert study_run.form(playing.run).TYPE == "state"
+    assert run_state.form(playing.run).TYPE == "state"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.live import study_run
+from pipeline.live import run_state, study_run
 from pipeline.live.clerk import Clerk
 from pipeline.live.events import (
     Action,
@@ -32,7 +32,7 @@ from pipeline.live.journal import PART, Journal
 from pipeline.live.loop import Clock, Outbox
 from pipeline.live.messages import Do
 from pipeline.live.outgoing import Refused, Say, Whole
-from pipeline.live.study_run import StudyRun
+from pipeline.live.run_state import StudyRun
 from pipeline.sessions.logs.mcap import Message
 from tests.pipeline.live.studies import study_in
 
@@ -46,7 +46,7 @@ class Lab:
 
     def __init__(self, folder: Path) -> None:
         self.study, setup = study_in(folder)
-        self.run: StudyRun = study_run.begin(setup, setup.empty_plan())
+        self.run: StudyRun = run_state.begin(setup, setup.empty_plan())
         self.actions: list[Action] = []
         self.at_ms = 0.0
         self.happens(Joined("operator", OPERATOR, EPOCH_NS))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.live import orientation, study_run
+from pipeline.live import orientation, run_state, study_run
 from pipeline.live.clerk import agreement
 from pipeline.live.events import Joined, Reading, Said, Show, Tick, Write
 from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Ping
@@ -103,7 +103,7 @@ def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: P
     )
     text = text.replace("{kinect: kinect, fusion: fusion}", "{kinect: fusion, fusion: fusion}")
     study, setup = study_in(tmp_path, text)
-    run = study_run.begin(setup, setup.empty_plan())
+    run = run_state.begin(setup, setup.empty_plan())
     messages: list[Message] = []
 
     def happens(event: object) -> None:
