@@ -15,6 +15,7 @@ ZEROS, HELD, FROZEN, CLIPPED = "exact zeros", "held positions", "frozen readings
 
 _HELD_S, _FROZEN_S = 0.3, 0.3
 _REPUBLISHED = 0.2  # share of positions that repeat the one before
+_STEPS_APART = 1e6  # of the least step in a usual one
 _COARSE = 0.25  # of the stated noise: a position that is so coarsely rounded repeats by itself
 _CLIPPED_RUN, _CLIPPED_SHARE = 4, 0.001
 _STEPS_MIN = 200  # of the resolution within the range: with fewer the largest reading comes often by itself
@@ -90,7 +91,10 @@ def _coarse(positions: Positions) -> bool:
     for column in positions.value_mm.T:
         steps = np.diff(np.unique(column))
         if len(steps) and noise is not None and float(np.median(steps)) > _COARSE * noise and len(steps) < 1000:
-            return len(np.unique(np.round(steps / steps.min(), 3) % 1.0)) < 3
+            least = float(steps.min())
+            if least * _STEPS_APART < float(np.median(steps)):
+                return False  # no grid has such a step; and what is divided by it may be too large for any number
+            return len(np.unique(np.round(steps / least, 3) % 1.0)) < 3
     return False
 
 

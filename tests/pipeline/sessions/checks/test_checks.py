@@ -11,6 +11,8 @@ import pytest
 
 from pipeline.sessions.checks import Finding, checked
 from pipeline.sessions.checks.of_log import of_log
+from pipeline.sessions.checks.recorded import Positions, Recorded, Times
+from pipeline.sessions.checks.repeats import held
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log, Readings
 from pipeline.sessions.wanted import of_stream
@@ -192,3 +194,12 @@ def test_streams_that_are_empty_or_short_raise_nothing(topic: str) -> None:
         alone = Log({}, {topic: short})
         assert alarms(alone, study) == []
         assert all(one.found for one in checked(of_log(Log({}, {**log.topics, topic: short}), study)))
+
+
+def test_a_step_too_small_to_divide_by_is_no_grid() -> None:
+    """A position of 5e-324 mm beside ones of decimetres: their ratio is larger than any number."""
+    values = np.array([0.0, 5e-324, *range(1, 12)]) * np.array([1, 1, *[100.0] * 11])
+    stamps = np.arange(len(values), dtype=np.int64) * 33_000_000
+    positions = Positions("tracker", "position", Times(stamps, stamps, 0), np.tile(values[:, None], 3), 8.0)
+    (found,) = held(Recorded(positions=(positions,)))
+    assert found.status == "green"
