@@ -15,10 +15,13 @@ _TOGETHER = 0.5  # of the shorter of two streams
 _OFFSET_S = (2.0, 10.0)
 _HOUR_S, _NEAR_HOUR_S = 3600.0, 120.0
 _QUARTERS = 4  # time zones are apart by quarters of an hour
+_YEAR_S = 365.25 * 86_400.0
 
 
 def offset_in_words(seconds: float) -> str:
-    """Seconds, or hours with what they hint at."""
+    """Seconds, hours or years, with what they hint at."""
+    if abs(seconds) > _YEAR_S:
+        return f"{seconds / _YEAR_S:.3g} years, as where one counts since 1970 and the other from its start"
     quarter = _HOUR_S / _QUARTERS
     zone = abs(seconds) > quarter and abs(seconds - round(seconds / quarter) * quarter) < _NEAR_HOUR_S
     if abs(seconds) > _HOUR_S / 2:
