@@ -142,7 +142,7 @@ def form(run: StudyRun) -> Form | FormState:
     """What a questionnaire's page shows now."""
     now = run.now
     if now is None or run.phase != "questionnaire":
-        return FormState("waiting" if now is not None and now[1] == 0 else "thanks")
+        return FormState("thanks" if now is None or now[1] > 0 or _follows_somebody(run, now[0]) else "waiting")
     person, index = now
     name = plan.open_questionnaire(run.plan, person.tasks[index])
     known = next((one for one in run.setup.recording.questionnaires if one.id == name), None)
@@ -164,6 +164,11 @@ def form(run: StudyRun) -> Form | FormState:
     return Form(
         known.id, f"Task {index + 1}", known.title if own else None, items, [], ids.index(known.id) + 1, len(ids)
     )
+
+
+def _follows_somebody(run: StudyRun, person: Person) -> bool:
+    """Is a participant who has not begun preceded by one who has: whose page still thanks them?"""
+    return not person.begun and any(one.begun for one in run.plan.persons)
 
 
 def tell_everybody(run: StudyRun) -> Actions:

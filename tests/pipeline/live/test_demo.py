@@ -16,7 +16,7 @@ from pipeline.live.bots import FORMS, PHONE, Players, as_simulated
 from pipeline.live.events import Joined, Left, Said, Tick
 from pipeline.live.journal import PART, Journal
 from pipeline.live.messages import Answer, Do, Drawn, Select, Submit
-from pipeline.live.outgoing import AnswerSaved, Form, Refused, to_json
+from pipeline.live.outgoing import AnswerSaved, Form, FormState, Refused, to_json
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand
@@ -107,6 +107,11 @@ def test_orders_and_ratings_are_in_the_tables(demo: Demo) -> None:
     assert len(ratings) == 1 + 2 * 2 * 6
     records = [json.loads(line) for line in (demo.folder / "data/.recorder/answers.jsonl").read_bytes().splitlines()]
     assert sum(record["type"] == "answer" for record in records) == 24
+
+
+def test_who_has_done_everything_is_thanked(demo: Demo, tmp_path: Path) -> None:
+    assert run_state.form(demo.players.run) == FormState("thanks")
+    assert run_state.form(players(tmp_path).run) == FormState("waiting")  # nobody has begun
 
 
 def test_a_study_goes_on_where_it_stands(demo: Demo, tmp_path: Path) -> None:
