@@ -25,6 +25,8 @@ _COMMAND = re.compile(r"^\s*(?:\.venv/bin/)?steadyhand ((?:[^\n\\]|\\\n)+)", re.
 _BLOCK = re.compile(r"^```sh\n(.*?)^```|((?:^    \S[^\n]*\n)+)", re.MULTILINE | re.DOTALL)
 _WITH_LOGS = ("replay", "fit", "simulate")
 _WITH_JOBS = ("report", "compare", "check", "replay", "fit", "simulate", "explore")
+_PLAYED = "record studies/peephole --demo --bots --participants 1 --out demo"
+"""In the place of every `record`, which serves pages until somebody ends it."""
 _MINUTES = re.compile(r"studies/peephole")
 # A contradiction among printed figures, and a difference between two results, are answers too.
 _CODES = {"audit": (0, 3), "diff": (0, 3)}
@@ -51,7 +53,7 @@ def every_command() -> list[ParameterSet]:
     """Each command once."""
     seen: dict[str, ParameterSet] = {}
     for command in (*(one for page in PAGES for one in shown_in(page)), *shown_by_make()):
-        words = shlex.join(shlex.split(command))
+        words = _PLAYED if command.startswith("record ") else shlex.join(shlex.split(command))
         seen[words] = pytest.param(words, marks=[pytest.mark.slow] if _MINUTES.search(words) else [], id=words)
     return list(seen.values())
 
@@ -63,7 +65,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("feng2016", "reach"):
         shutil.copytree(CLONE / "studies" / name, root / "studies" / name)
     (root / "studies" / "peephole").mkdir()
-    shutil.copy(CLONE / "studies" / "peephole" / "study.yaml", root / "studies" / "peephole")
+    settings = (CLONE / "studies" / "peephole" / "study.yaml").read_text(encoding="utf-8")
+    fewer = settings.replace("  participants: 12\n", "  participants: 3\n").replace("  repeats: 20\n", "  repeats: 1\n")
+    assert fewer != settings
+    (root / "studies" / "peephole" / "study.yaml").write_text(fewer, encoding="utf-8")
     (root / "reports").mkdir()
     return root
 
@@ -80,13 +85,18 @@ def in_place_of_names(command: str, place: Path) -> list[str]:
         "path/to/printed.yaml": "studies/feng2016/printed.yaml",
         "printed.yaml": "studies/feng2016/printed.yaml",
     }
-    return [copies.get(word, word) for word in shlex.split(command)]
+    words = [copies.get(word, word) for word in shlex.split(command)]
+    if words[0] == "explore":  # the same options of fewer people and trackers: one figure of each list is enough
+        words = [word.split(",")[0] if re.fullmatch(r"[\d.]+(,[\d.]+)+", word) else word for word in words]
+        words += ["--participants", "2", "--repeats", "1"]
+    return words
 
 
 def prepared(words: list[str], place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make what the command is about to read, and take away what an earlier one wrote and is never overwritten."""
     shutil.rmtree(place / "empty", ignore_errors=True)
     shutil.rmtree(place / "folder", ignore_errors=True)
+    shutil.rmtree(place / "demo", ignore_errors=True)
     for name in ("preregistered.yaml", "preregistration.md"):
         (place / "studies" / "feng2016" / name).unlink(missing_ok=True)
     for word in ("participants.csv", "blocks.csv"):
