@@ -35,8 +35,8 @@ MUTANTS = (
         _SESSIONS,
     ),
     Mutant(
-        'recorded = trials[trials["estimator"] == "recorded"]\n    selected',
-        "recorded = trials\n    selected",
+        'recorded = trials[trials["estimator"] == "recorded"]\n    recorded = recorded.assign',
+        "recorded = trials\n    recorded = recorded.assign",
         _SESSIONS,
     ),
     Mutant("duration_s=duration_s.where(duration_s >= 0)", "duration_s=duration_s", _MEASURE),

@@ -25,7 +25,7 @@ def _lead_words(lead_curves: pd.DataFrame, lag_s: Mapping[str, float]) -> Words:
         parts.append(f"{name} {place}" + ("" if lag is None else f" (lag {milliseconds(lag)} ms)"))
     peaks = f"Peaks: {listed(parts)}."
     where = lead_curves["session"].iloc[0]
-    lags = " Lag: behind the reference, where the squared error is least." if lag_s else ""
+    lags = " Lag: where the squared error is least." if lag_s else ""
     return Words(
         f"How far each estimator is ahead of the tracker as it arrived, by the paper's method (session {where})."
         f" {peaks}{lags} A peak at 0 need not mean that nothing is gained: an estimate shares the noise of the"

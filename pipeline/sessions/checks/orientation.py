@@ -275,6 +275,5 @@ def covariances(recorded: Recorded) -> Iterator[Finding]:
                 "red" if empty else "amber",
                 f"{what}_covariance[0] is -1 in {int(disclaimed.sum())} messages",
                 "not -1",
-                f'"{imu.name}" says by {what}_covariance[0] = -1, or by having none, that its {what} is not to be used;'
-                f" {cause}",
+                f'"{imu.name}" says by {what}_covariance[0] = -1 that its {what} is to be disregarded; {cause}',
             )

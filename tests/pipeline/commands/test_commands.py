@@ -129,8 +129,8 @@ def test_inspect_counts_every_message_and_says_which_a_study_would_lose(
         ("/position", "/events", "/other"), (6, 0)
     )
     assert rows["/position"]["note"] == (
-        "counted, but a study would lose them: 1 messages cannot be read: it has no header.stamp or timestamp; "
-        "45 samples missing (88.2%)"
+        "counted, but a study would lose them: 1 messages cannot be read: it has no header.stamp or timestamp or"
+        " stamp; 45 samples missing (88.2%)"
     )
     assert rows["/events"]["note"] is None  # they come as they come, and none is missing
     assert rows["/other"]["note"] is None
