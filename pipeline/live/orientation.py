@@ -31,8 +31,8 @@ from pipeline.live.units import product
 from pipeline.sessions import tilt
 from pipeline.sessions.tilt import Tilt
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.units import RAD_PER_DEG
 
-_RAD_PER_DEG = math.pi / 180
 _GRAVITY_M_S2 = 9.81
 _STILL_RAD_S, _STILL_M_S2 = 0.2, 0.5
 _STILL_S = 1.0
@@ -124,7 +124,7 @@ def moved(
     time = (stamp_ns - origin) * _S_PER_NS
     if time <= state.moved_s:
         return state, None
-    turning = tuple(rate * _RAD_PER_DEG for rate in message.r)
+    turning = tuple(rate * RAD_PER_DEG for rate in message.r)
     state = changed(state, origin_ns=origin, moved_s=time)
     state, upright = _upright(state, time, message.a, turning)
     if state.sign is None or upright is None:

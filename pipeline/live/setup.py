@@ -21,6 +21,7 @@ from pipeline.study.recording import Recording
 from pipeline.study.settings import Study
 from pipeline.study.simulation import Task
 from pipeline.study.streams import AccelerationStream
+from pipeline.study.units import G_MM_S2
 
 _NS_PER_S = 1e9
 _WARM_UP_STEPS = 50
@@ -148,7 +149,7 @@ def warm_up(setup: Setup) -> None:
         for step in range(_WARM_UP_STEPS):
             for name, of_stream in estimator.sensors.items():
                 time, rotation = step / 30, np.eye(3)[: of_stream.dimension]
-                force = np.array([0.0, 9806.65, 0.0])
+                force = np.array([0.0, G_MM_S2, 0.0])
                 reading = Sample(time, time + 0.01, np.zeros(of_stream.dimension), rotation, force)
                 state = estimator.update(state, name, reading)
             estimator.predict(state, step / 30 + 0.02)

@@ -20,6 +20,7 @@ from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Content, Log, MessageType, Readings, Wanted
 from pipeline.sessions.stream_quality import quality_row
 from pipeline.study.settings import Study
+from pipeline.study.units import G_MM_S2
 
 _CONTENTS: Sequence[Content] = ("position", "acceleration", "events")
 _NEEDS: Mapping[Content, str] = {
@@ -29,7 +30,6 @@ _NEEDS: Mapping[Content, str] = {
 }
 _USABLE_SHARE = 0.5  # of a topic's messages: if fewer can be read, the topic holds something else
 _LATE_MIN_S = 0.03
-_G_MM_S2 = 9806.65
 _ALONG_DEG = 5.0  # gravity this close to an axis is taken to be along it
 
 
@@ -125,7 +125,7 @@ def _streams(topics: Iterable[Topic]) -> dict[str, dict[str, Any]]:
         name = _name(kind, topic.name, found)
         found[name] = {"topic": topic.name, "kind": kind}
         if kind == "acceleration":
-            found[name]["gravity_mm_s2"] = [0.0, 0.0, -_G_MM_S2]
+            found[name]["gravity_mm_s2"] = [0.0, 0.0, -G_MM_S2]
     return found
 
 
@@ -168,9 +168,9 @@ def _gravity(imu: Imu) -> list[float]:
     """Gravity, 9806.65 mm/s² long: along the nearest axis if close to one; along −z if the log does not show it."""
     seen = gravity_seen_mm_s2(imu)
     if seen is None or not _tells_gravity(imu):
-        return [0.0, 0.0, -_G_MM_S2]
+        return [0.0, 0.0, -G_MM_S2]
     direction = seen / np.linalg.norm(seen)
     axis = int(np.argmax(np.abs(direction)))
     if np.degrees(np.arccos(min(1.0, abs(float(direction[axis]))))) < _ALONG_DEG:
         direction = np.where(np.arange(3) == axis, np.sign(direction[axis]), 0.0)
-    return [round(float(value), 2) + 0.0 for value in _G_MM_S2 * direction]
+    return [round(float(value), 2) + 0.0 for value in G_MM_S2 * direction]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from pipeline.sessions.logs.log import Content, Source, Wanted
 from pipeline.study.settings import Events, Study
 from pipeline.study.streams import AccelerationStream, Stream
+from pipeline.study.units import G_M_S2, M_PER_INCH, RAD_PER_DEG
 
 _CONTENT: Mapping[str, Content] = {
     "acceleration": "acceleration",
@@ -18,21 +17,20 @@ _CONTENT: Mapping[str, Content] = {
     "reference": "position",
     "display": "position",
 }
-_G_M_S2 = 9.80665  # standard gravity, by definition
 _SI: Mapping[str, float] = {
     "m": 1.0,
     "cm": 0.01,
     "mm": 0.001,
-    "in": 0.0254,
+    "in": M_PER_INCH,
     "m/s": 1.0,
     "cm/s": 0.01,
     "mm/s": 0.001,
     "m/s2": 1.0,
     "mm/s2": 0.001,
-    "g": _G_M_S2,
-    "-g": -_G_M_S2,
+    "g": G_M_S2,
+    "-g": -G_M_S2,
     "rad/s": 1.0,
-    "deg/s": float(np.pi / 180.0),
+    "deg/s": RAD_PER_DEG,
 }
 _STAMP_UNIT_S: Mapping[str | None, float | None] = {None: None, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 

@@ -9,14 +9,15 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from pipeline.errors import did_you_mean
 from pipeline.study.fields import Finite, Frozen, Id, Positive, Seconds, Vector, unique
+from pipeline.study.units import G_M_S2, RAD_PER_DEG
 
 Port = Annotated[int, Field(ge=1, le=65535)]
 SignedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Unit = Literal["mm", "cm", "m", "g", "m_s2", "deg_s", "rad_s"]
 
 METRES: Mapping[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-M_S2: Mapping[str, float] = {"g": 9.80665, "m_s2": 1.0}
-RAD_S: Mapping[str, float] = {"deg_s": 0.017453292519943295, "rad_s": 1.0}
+M_S2: Mapping[str, float] = {"g": G_M_S2, "m_s2": 1.0}
+RAD_S: Mapping[str, float] = {"deg_s": RAD_PER_DEG, "rad_s": 1.0}
 """What one of a unit is in SI."""
 
 SENDERS = ("phone", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")

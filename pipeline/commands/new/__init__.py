@@ -21,11 +21,11 @@ from pipeline.study.session_files import find_sessions
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
 from pipeline.study.table_file import table_file
+from pipeline.study.units import G_MM_S2
 from pipeline.study.yaml_text import parse, read_yaml
 from pipeline.words.phrases import counted, listing
 
 _BASELINES = ("baseline", "control", "kontrolle", "kontrollbedingung", "standard", "temoin", "none", "raw", "ohne")
-_GRAVITY_MM_S2 = 9806.65
 _AXES = ("x", "y", "z")
 
 
@@ -130,7 +130,7 @@ def _with_gravity(found: Found, stated: Stated, questions: Questions) -> Found:
     if answer not in axes:
         raise PipelineError(f'--gravity: "{answer}" is none of {", ".join(axes)}')
     vector = [0.0, 0.0, 0.0]
-    vector[_AXES.index(answer[1])] = _GRAVITY_MM_S2 if answer[0] == "+" else -_GRAVITY_MM_S2
+    vector[_AXES.index(answer[1])] = G_MM_S2 if answer[0] == "+" else -G_MM_S2
     changed = {
         name: {**stream, "gravity_mm_s2": vector} if name in streams.gravity_guessed else stream
         for name, stream in streams.streams.items()

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.causes import G_M_S2
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.motion import Compared, Interval
 from pipeline.sessions.checks.recorded import Imu, Positions, Recorded
+from pipeline.study.units import G_M_S2
 
 LAG, SIZE, AXES, SPEED = "lag", "size of the movement", "frame of the movement", "speed"
 LAG_UNKNOWN = "cannot be told from this movement"

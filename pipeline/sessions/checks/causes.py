@@ -11,11 +11,11 @@ from pipeline.sessions.checks.motion import Compared
 from pipeline.sessions.checks.recorded import Imu
 from pipeline.sessions.checks.turns import turned
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.units import G_M_S2
 
 _EXPLAINS_M_S2 = 0.7  # of the mean that is left once the mistake is undone
 _TURNED_DEG = 15.0
 _AT_MOST = 2000  # readings looked at: a mean needs no more
-G_M_S2 = 9.80665
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.sessions.checks.causes import G_M_S2, Cause, causes
+from pipeline.sessions.checks.causes import Cause, causes
 from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Imu, Recorded
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.units import G_M_S2
 
 FORCE, GRAVITY, REST = "specific force", "length of gravity", "mean acceleration"
 

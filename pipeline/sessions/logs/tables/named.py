@@ -14,6 +14,7 @@ from pathlib import Path
 
 from pipeline.sessions.logs.tables.sheet import LENGTHS, TIMES, Sheet, Vector
 from pipeline.sessions.logs.tables.text import Text, separator_of, split_line, table_of
+from pipeline.study.units import G_M_S2, RAD_PER_DEG
 
 _WITH_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^)\]]*)[)\]]$")
 _STAMPS = ("timestamp", "time", "t", "time_s", "time_ms", "time_us", "time_ns", "seconds_elapsed", "stamp")
@@ -36,8 +37,8 @@ _OF_FILE: Mapping[str, str] = {
     "orientation": "orientation",
 }
 _SENSOR_LOGGER = {"time": 1e-9, "seconds_elapsed": 1.0}
-_ACCELERATIONS = {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "m s^-2": 1.0, "g": 9.80665}
-_TURNINGS = {"rad/s": 1.0, "rad s^-1": 1.0, "deg/s": 0.017453292519943295, "°/s": 0.017453292519943295}
+_ACCELERATIONS = {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "m s^-2": 1.0, "g": G_M_S2}
+_TURNINGS = {"rad/s": 1.0, "rad s^-1": 1.0, "deg/s": RAD_PER_DEG, "°/s": RAD_PER_DEG}
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "position": LENGTHS,
     "acceleration": _ACCELERATIONS,

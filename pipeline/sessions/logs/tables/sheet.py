@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from pipeline.sessions.logs.log import IntArray
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.units import M_PER_INCH
 
 Vector = tuple[str, ...]
 """The names of a vector's columns: x, y, z, or x, y, z, w of an orientation."""
@@ -20,8 +21,8 @@ LENGTHS: Mapping[str, float] = {
     "centimeters": 0.01,
     "mm": 0.001,
     "millimeters": 0.001,
-    "in": 0.0254,
-    "inches": 0.0254,
+    "in": M_PER_INCH,
+    "inches": M_PER_INCH,
 }
 """Metres of a unit, as recorders write it."""
 
