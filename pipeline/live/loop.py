@@ -40,6 +40,7 @@ from pipeline.live.messages import Incoming, Mouse
 from pipeline.live.outgoing import Outgoing, Whole
 from pipeline.live.plan import Plan
 from pipeline.live.setup import Setup
+from pipeline.tables.columns import S_PER_NS
 
 _TICK_S = 0.005
 _FLUSH_NS = 500_000_000
@@ -47,7 +48,6 @@ _FILES_S = 0.1
 _STOOD_STILL_S = 2.0
 _WALL_CLOCK_NS = 10_000_000_000
 _SET_NS = 100_000_000  # by which a wall clock jumps when it is set; it drifts by 1 ms in 10 s
-_S_PER_NS = 1e-9
 _MOST_WAITING = 256  # messages of one page: one that does not read is closed
 
 
@@ -73,7 +73,7 @@ class Clock:
     def slept_s(self) -> float:
         """How long the computer has been suspended since this was last asked, where it can tell."""
         asleep = self._always_ns() - self._steady_ns()
-        slept, self._asleep_ns = (asleep - self._asleep_ns) * _S_PER_NS, asleep
+        slept, self._asleep_ns = (asleep - self._asleep_ns) * S_PER_NS, asleep
         return slept
 
     def wall_clock(self) -> WallClock:
@@ -206,7 +206,7 @@ class Loop:
 
     def _watch_clocks(self, now: int) -> None:
         """Notice a computer that was suspended or stood still, and a wall clock that was set."""
-        stood_s = max((now - self._ticked_ns) * _S_PER_NS, self.now_ns.slept_s())
+        stood_s = max((now - self._ticked_ns) * S_PER_NS, self.now_ns.slept_s())
         self._ticked_ns = now
         if stood_s > _STOOD_STILL_S:
             self.happens(Woke(stood_s, now))

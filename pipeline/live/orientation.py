@@ -24,21 +24,22 @@ import numpy as np
 from fusion_core import Sensor
 from fusion_core.phone.heading import HeadingFilter
 from fusion_core.phone.orientation import level_rotation, rotation
+from fusion_core.phone.quaternion import product, turn
 from pipeline.live.changes import changed
 from pipeline.live.events import Values
 from pipeline.live.messages import Four, Motion, Orientation
-from pipeline.live.units import product
 from pipeline.sessions import tilt
+from pipeline.sessions.phone import HEADING_SD_RAD
 from pipeline.sessions.tilt import Tilt
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.units import RAD_PER_DEG
+from pipeline.tables.columns import S_PER_NS
 
 _GRAVITY_M_S2 = 9.81
 _STILL_RAD_S, _STILL_M_S2 = 0.2, 0.5
 _STILL_S = 1.0
 _FRESH_S = 0.2  # an orientation of the browser's that is older is not used
-_HEADING_SD_RAD = 0.3  # as in a report (pipeline.sessions.phone)
-_S_PER_NS, _MM_PER_M = 1e-9, 1000.0
+_MM_PER_M = 1000.0
 
 Source = Literal["none", "browser", "gyroscope"]
 
@@ -91,7 +92,7 @@ class PhoneMotion:
     @property
     def is_known(self) -> bool:
         """Whether orientations are."""
-        return self.sd < _HEADING_SD_RAD
+        return self.sd < HEADING_SD_RAD
 
 
 def seen(aligner: Aligner, state: PhoneMotion, stamp_ns: int, arrival_ns: int, position_m: Values) -> PhoneMotion:
@@ -99,7 +100,7 @@ def seen(aligner: Aligner, state: PhoneMotion, stamp_ns: int, arrival_ns: int, p
     if state.origin_ns is None or state.heading is None:
         return state
     place = aligner.to_level @ (np.array(position_m) * _MM_PER_M)
-    time, arrival = (at * _S_PER_NS for at in (stamp_ns - state.origin_ns, arrival_ns - state.origin_ns))
+    time, arrival = (at * S_PER_NS for at in (stamp_ns - state.origin_ns, arrival_ns - state.origin_ns))
     return changed(state, heading=aligner.filter.position(state.heading, time, arrival, place))
 
 
@@ -108,7 +109,7 @@ def oriented(state: PhoneMotion, message: Orientation, stamp_ns: int) -> PhoneMo
     if state.origin_ns is None:
         state = changed(state, origin_ns=stamp_ns)
     assert state.origin_ns is not None  # noqa: S101
-    return changed(state, browser=((stamp_ns - state.origin_ns) * _S_PER_NS, message.q))
+    return changed(state, browser=((stamp_ns - state.origin_ns) * S_PER_NS, message.q))
 
 
 def moved(
@@ -121,7 +122,7 @@ def moved(
     if message.a is None or message.r is None:
         return state, None
     origin = stamp_ns if state.origin_ns is None else state.origin_ns
-    time = (stamp_ns - origin) * _S_PER_NS
+    time = (stamp_ns - origin) * S_PER_NS
     if time <= state.moved_s:
         return state, None
     turning = tuple(rate * RAD_PER_DEG for rate in message.r)
@@ -131,7 +132,7 @@ def moved(
         sign = state.sign if state.sign is not None else 1.0
         return state, (*(sign * part for part in message.a), *turning, *(math.nan,) * 4)
     force = tuple(state.sign * part for part in message.a)
-    state = _headed(aligner, state, time, (arrival_ns - origin) * _S_PER_NS, force, upright)
+    state = _headed(aligner, state, time, (arrival_ns - origin) * S_PER_NS, force, upright)
     if not state.is_known:
         return state, (*force, *turning, *(math.nan,) * 4)
     about = (0.0, 0.0, math.sin(state.angle / 2), math.cos(state.angle / 2))
@@ -146,7 +147,7 @@ def _upright(
     """The orientation xyzw to a frame whose z points up, its heading unknown; and with it, in time, the sign."""
     browser = state.browser
     if browser is not None and abs(time - browser[0]) <= _FRESH_S:
-        upright = product(browser[1], _turn(turning, time - browser[0]))
+        upright = product(browser[1], turn(turning, time - browser[0]))
         if state.source != "browser":
             state = changed(state, source="browser", heading=None, sd=math.inf)
         return (state if state.sign is not None else _signed(state, time, acceleration, turning, upright)), upright
@@ -174,14 +175,6 @@ def _signed(state: PhoneMotion, time: float, acceleration: Values, turning: Valu
     if time - still[0] < _STILL_S or count < 10:
         return changed(state, still=still)
     return changed(state, still=still, sign=-1.0 if total < 0 else 1.0)
-
-
-def _turn(turning: Values, seconds: float) -> Values:
-    """The turn xyzw of an angular velocity over a time."""
-    x, y, z = (rate * seconds for rate in turning)
-    angle = math.sqrt(x * x + y * y + z * z)
-    scale = 0.5 if angle < 1e-9 else math.sin(angle / 2) / angle
-    return x * scale, y * scale, z * scale, math.cos(angle / 2)
 
 
 def _headed(

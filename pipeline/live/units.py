@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fusion_core.phone.orientation import rotation
+from fusion_core.phone.quaternion import product
 from pipeline.live.events import Values
 from pipeline.live.messages import Datagram
 from pipeline.study.recording import M_S2, METRES, RAD_S, Sender
@@ -75,18 +76,6 @@ def in_si(of: Units, content: str, reading: Datagram) -> Values | None:
     if reading.orientation is None:
         return (*force, *turning, *_UNKNOWN)
     return (*force, *turning, *product(of.turn_xyzw, product(reading.orientation, of.back_xyzw)))
-
-
-def product(first: Sequence[float], then: Sequence[float]) -> Values:
-    """The product of two quaternions xyzw: `then` is applied first to a vector."""
-    ax, ay, az, aw = first
-    bx, by, bz, bw = then
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
 
 
 def _permuted(of: Units, vector: Sequence[float], factor: float) -> Values:

@@ -22,7 +22,8 @@ from pipeline.statistics.arrays import FloatArray
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns
 
-_HEADING_SD_RAD = 0.3  # above it an orientation is not known
+HEADING_SD_RAD = 0.3
+"""Of a heading: above it an orientation is not known."""
 
 IN_LOG, CARRIED, FOUND = "in_log", "carried", "found"
 
@@ -129,7 +130,7 @@ def _orientation_from_motion(imu: Imu, gravity: FloatArray, tracker: Tracker | N
     upright = Samples(imu.time[rows], imu.arrival[rows], rotate(tilted[rows], imu.force_mm_s2[rows]) + down)
     positions = replace(tracker[0], value=rotate(up * np.array([-1.0, -1.0, -1.0, 1.0]), tracker[0].value))
     angle, sd = heading(positions, tracker[1], upright, imu.sensor)
-    known = sd < _HEADING_SD_RAD
+    known = sd < HEADING_SD_RAD
     unknown[rows[known]] = _turned(up, turn_about_vertical(tilted[rows[known]], angle[known]))
     return unknown
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fusion_core.phone.quaternion import product, turn
 from pipeline.statistics.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -120,15 +121,6 @@ def _orientation(vqf: VQF) -> tuple[float, float, float, float]:
 def _carried_on(state: Tilt, reading: Reading) -> FloatArray:
     """The orientation at the reading, xyzw (4,): that of the newest grid point, turned on by the gyroscope."""
     rest_s = reading.time - (state.origin_s + (state.points - 1) * STEP_S)
-    x, y, z = (reading.gyroscope_rad_s * rest_s).tolist()
-    angle = float(np.sqrt(x * x + y * y + z * z))
-    scale = 0.5 - angle * angle / 48 if angle < 1e-3 else float(np.sin(angle / 2)) / angle
-    x, y, z, w = x * scale, y * scale, z * scale, float(np.cos(angle / 2))
-    pw, px, py, pz = state.at_grid_wxyz
-    turned = (
-        pw * x + px * w + py * z - pz * y,
-        pw * y - px * z + py * w + pz * x,
-        pw * z + px * y - py * x + pz * w,
-        pw * w - px * x - py * y - pz * z,
-    )
+    w, x, y, z = state.at_grid_wxyz
+    turned = product((x, y, z, w), turn(reading.gyroscope_rad_s.tolist(), rest_s))
     return np.array(turned) / float(np.sqrt(sum(part * part for part in turned)))
