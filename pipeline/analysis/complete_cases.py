@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pipeline.analysis.factors import Factors, factors_of, missing_cells, parsed
+from pipeline.analysis.factors import Factors, factors_of, missing_cells, parsed, without_rare
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.comparison import Comparison
@@ -106,10 +106,7 @@ def rows_and_factors(request: Request, table: pd.DataFrame) -> tuple[pd.DataFram
     """The measure's rows of a table without those of levels that are likely misspelt, and what its factors are."""
     rows = table[table["measure"] == request.measure]
     factors = factors_of(rows)
-    if factors.rare:
-        rare = {(level.factor, level.level) for level in factors.rare}
-        rows = rows[[not (rare & set(fact.items())) for fact in parsed(rows["factors"])]]
-    return rows, factors
+    return without_rare(rows, factors), factors
 
 
 def rare_levels(request: Request, factors: Factors) -> list[Row]:

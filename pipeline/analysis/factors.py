@@ -87,6 +87,14 @@ def factors_of(rows: pd.DataFrame) -> Factors:
     return Factors(crossed, tuple(between), tuple(rare))
 
 
+def without_rare(rows: pd.DataFrame, factors: Factors) -> pd.DataFrame:
+    """One measure's rows without those of levels that are likely misspelt."""
+    if not factors.rare:
+        return rows
+    rare = {(level.factor, level.level) for level in factors.rare}
+    return rows[[not (rare & set(fact.items())) for fact in parsed(rows["factors"])]]
+
+
 def _rare_levels(name: str, people_with: Mapping[str, set[str]], people: int) -> list[RareLevel]:
     """Levels that hardly anybody has, where others are common."""
     common = [level for level, who in people_with.items() if len(who) > _COMMON_SHARE * people]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from pipeline.analysis.factors import BETWEEN_FACTORS, factors_of, missing_cells, parsed
+from pipeline.analysis.factors import BETWEEN_FACTORS, factors_of, missing_cells, without_rare
 from pipeline.study.comparison import matching_measures
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -20,9 +20,7 @@ def person_means(study: Study, measures: pd.DataFrame, name: str) -> pd.DataFram
     """
     rows = measures[measures["measure"] == name]
     factors = factors_of(rows)
-    rare = {(level.factor, level.level) for level in factors.rare}
-    if rare:
-        rows = rows[[not (rare & set(fact.items())) for fact in parsed(rows["factors"])]]
+    rows = without_rare(rows, factors)
     wide = tables.participant_means(rows, name, study.conditions)
     if not factors.crossed or _takes_what_is_available(study, name):
         return wide

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pipeline.analysis.against import in_r
 from pipeline.analysis.against.agreement import Agreement, Difference, held_against
-from pipeline.analysis.against.problems import Problem, families_of, problems_of
+from pipeline.analysis.against.problems import Problem, all_problems
 from pipeline.analysis.against.programs import LIBRARIES, R, named
 from pipeline.analysis.against.theirs import Theirs, ask
 from pipeline.analysis.comparisons import answered, people_of
@@ -109,8 +109,7 @@ def _outcomes(result: Result, names: Sequence[str], rscript: str | None) -> list
     """Every row of the study's comparisons, in order, with the agreement of each program."""
     values = read_values(result.entry("measure"), people_of(result.study, result.folder))
     answers = answered(result.study, values)
-    problems = [problem for answer in answers for problem in problems_of(answer)]
-    problems += families_of(answers)
+    problems = all_problems(answers)
     of_row: dict[int, list[Agreement]] = {}
     libraries = [LIBRARIES[name].calls for name in names if name in LIBRARIES]
     with show_progress() as progress:

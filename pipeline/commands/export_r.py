@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.analysis.against import in_r
-from pipeline.analysis.against.problems import Problem, families_of, problems_of
+from pipeline.analysis.against.problems import Problem, all_problems
 from pipeline.analysis.comparisons import answered, people_of
 from pipeline.analysis.complete_cases import read_values
 from pipeline.commands.export_tables import as_csv
@@ -36,8 +36,7 @@ def for_r(result: Result, folder: Path) -> int:
 
 def _problems(result: Result) -> list[Problem]:
     values = read_values(result.entry("measure"), people_of(result.study, result.folder))
-    answers = answered(result.study, values)
-    return [*(problem for answer in answers for problem in problems_of(answer)), *families_of(answers)]
+    return all_problems(answered(result.study, values))
 
 
 def _write_ours(problems: Sequence[Problem], path: Path) -> None:

@@ -107,6 +107,11 @@ def problems_of(answered: Answered) -> Iterator[Problem]:
             yield Problem(row, *found, entry)
 
 
+def all_problems(answered: Sequence[Answered]) -> list[Problem]:
+    """What there is to compute anew of a study: each row that can be, then each p that is adjusted."""
+    return [*(problem for one in answered for problem in problems_of(one)), *families_of(answered)]
+
+
 def families_of(answered: Sequence[Answered]) -> Iterator[Problem]:
     """One for each row whose p is adjusted: the p values of its family, as they stand in the table."""
     by_row = {id(row): one.request.entry for one in answered for row in one.rows}
