@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from pipeline.errors import did_you_mean
 from pipeline.study.fields import Finite, Frozen, Id, Positive, Seconds, Vector, unique
+from pipeline.study.measures import QUESTIONNAIRES
 from pipeline.study.units import G_M_S2, RAD_PER_DEG
 
 Port = Annotated[int, Field(ge=1, le=65535)]
@@ -165,11 +166,11 @@ class Questionnaire(Frozen):
 
 def _nasa_tlx() -> Questionnaire:
     """NASA-TLX (Hart and Staveland 1988); its definitions are among the pages' texts, in their languages."""
-    low_high = dict.fromkeys(("mental", "physical", "temporal", "effort", "frustration"), ("very low", "very high"))
-    ends = {**low_high, "performance": ("perfect", "failure")}
-    order = ("mental", "physical", "temporal", "performance", "effort", "frustration")
-    items = tuple(Item(id=name, text=name, low=ends[name][0], high=ends[name][1]) for name in order)
-    return Questionnaire(id="nasa_tlx", title="NASA-TLX", items=items)
+    known = QUESTIONNAIRES["nasa_tlx"]
+    own_ends = {"performance": ("perfect", "failure")}
+    ends = {name: own_ends.get(name, ("very low", "very high")) for name in known.scales}
+    items = tuple(Item(id=name, text=name, low=low, high=high) for name, (low, high) in ends.items())
+    return Questionnaire(id=known.name, title=known.label, items=items)
 
 
 BUILT_IN: Mapping[str, Questionnaire] = {"nasa_tlx": _nasa_tlx()}

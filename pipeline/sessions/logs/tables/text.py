@@ -7,6 +7,7 @@ than a float holds.
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -176,4 +177,4 @@ def numbered(names: Sequence[str]) -> list[str]:
 def _has_decimal_commas(table: Any) -> bool:
     first = table.slice(0, 5).to_pylist()
     cells = [cell for row in first for cell in row.values() if cell]
-    return any("," in cell and _number(cell.replace(",", ".")) == _number(cell.replace(",", ".")) for cell in cells)
+    return any("," in cell and not math.isnan(_number(cell.replace(",", "."))) for cell in cells)
