@@ -142,9 +142,7 @@ RECIPES: dict[str, dict[str, Edit]] = {
         "pipeline/sessions/logs/mcap/schemas.py": after(
             '    "PointStamped": "position",\n', '    "SpotReading": "position",\n'
         ),
-        "pipeline/sessions/logs/mcap/fields.py": lambda text: text.replace(
-            '= (("point",), ', '= (("point",), ("spot",), '
-        ),
+        "pipeline/sessions/logs/mcap/layout.py": after('    "position": (\n', '        ("spot",),\n'),
     },
     "A section of the report with a table": {
         "pipeline/report/sections/": lambda _: SECTION,
