@@ -412,15 +412,15 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
     for sentence in (
         "M: F(1, 11) = 5.81, p = .0346, Holm-adjusted p = .0346, η²G = .10 [.00, .29], n = 12, lower by 5.70.",
         "M: ART ANOVA: F(1, 11) = 5.77, p = .0351, η²p = .34 [.00, .65], n = 12.",
-        "M: mixed model: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
-        "M: mixed model: period, t(10) = −4.01, p = .0025, estimate = −6.16 [−9.58, −2.73], n = 12.",
+        "M: mixed model with period: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
+        "M: mixed model with period: period, t(10) = −4.01, p = .0025, estimate = −6.16 [−9.58, −2.73], n = 12.",
         "M: crossover: kinect − fusion, t(10) = 3.71, p = .0040, estimate = 5.70 [2.28, 9.13], n = 12.",
         "M: crossover: carry-over: KF − FK, t(10) = 0.27, p = .7892, estimate = 2.57 [−18.30, 23.44], n = 12.",
         "the conditions are equivalent within the bounds at the 5 % level",
         "the data are 2.20 times as likely under a difference as under none",
         "Bayes factor (JZS, prior scale 0.707): kinect − fusion, BF₁₀ = 2.20",
         "Design: 1 remark, about effect of the period.",
-        "mixed model: linear mixed model, random intercept, REML, Satterthwaite degrees of freedom",
+        "mixed model with period: linear mixed model, random intercept, REML, Satterthwaite degrees of freedom",
     ):
         assert sentence in text, sentence
     for row in steadyhand.results()["comparisons"]:
