@@ -6,6 +6,7 @@ import os
 import random
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -56,8 +57,31 @@ def warm(tmp_path_factory: pytest.TempPathFactory) -> None:
     journal.release()
 
 
-def killed(folder: Path, after_s: float) -> int:
-    """Play in a process that is killed; returns the time in the study that it had come to, in ns."""
+def after(seconds: float) -> Callable[[int], bytes]:
+    """Waits so long by the wall clock, at whatever moment of the study that is."""
+
+    def wait(_: int) -> bytes:
+        time.sleep(seconds)
+        return b""
+
+    return wait
+
+
+def in_the_study(seconds: float) -> Callable[[int], bytes]:
+    """Waits until so much of the study is played since it was first said, however fast this machine plays it."""
+
+    def wait(said_in: int) -> bytes:
+        told = os.read(said_in, 8)
+        began = int.from_bytes(told, "big")
+        while int.from_bytes(told[-8:], "big") - began < seconds * 1e9:
+            told += os.read(said_in, 8)
+        return told
+
+    return wait
+
+
+def killed(folder: Path, wait: Callable[[int], bytes]) -> int:
+    """Play in a process that is killed after a wait; returns the time in the study that it had come to, in ns."""
     (ready_in, ready), (said_in, said) = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:
@@ -68,10 +92,9 @@ def killed(folder: Path, after_s: float) -> int:
     os.close(ready)
     os.close(said)
     assert os.read(ready_in, 1) == b"1"
-    time.sleep(after_s)
+    told = wait(said_in)
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    told = b""
     while part := os.read(said_in, 65536):
         told += part
     os.close(ready_in)
@@ -81,7 +104,7 @@ def killed(folder: Path, after_s: float) -> int:
 
 def survives(folder: Path, after_s: float) -> str:
     """Kill a study, and look at what is left of it; returns the state of its first task."""
-    came_to = killed(folder, after_s)
+    came_to = killed(folder, after(after_s))
     study, setup = study_in(folder)
     journal = Journal(folder, study)
     journal.hold()  # the lock of a process that is dead holds nobody
@@ -111,7 +134,7 @@ def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(kills: int, tmp_
 
 
 def test_what_is_left_of_a_cut_session_is_read_by_the_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
-    killed(tmp_path, 1.0)
+    killed(tmp_path, in_the_study(3.0))
     study, _ = study_in(tmp_path, STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", ""))
     journal = Journal(tmp_path, study)
     journal.hold()
