@@ -40,6 +40,7 @@ from fusion_core.samples import FloatArray
 
 _FORGET_S = 10.0
 _USUAL_S = 2.0  # of the slow averages of couplings
+_USUAL_ARM_S = 0.3  # of the lever arm's: a member's position follows slower turns, as it follows slow noise
 _CORRELATED_S = 0.5  # how long an acceleration error from a wrong mounting lasts
 _TAIL = 3.0  # per axis: how fast the likelihood falls where positions surprise
 _RATE_SD = 1000.0  # mm/s²: the acceleration error before any reading, of a mounting that is off by 6°
@@ -82,13 +83,13 @@ def considered(model: Model, state: State, turned: FloatArray, coupling: FloatAr
     Only changes against the couplings of the last seconds count: what does not change is a constant of the member.
     """
     usual, covariance = state.usual, state.covariance
-    share, position, acceleration = 1.0 - np.exp(-dt / _USUAL_S), 0.0, 0.0
-    apart = np.empty(3 + INPUTS)
+    of_arm, of_input = 1.0 - np.exp(-dt / _USUAL_ARM_S), 1.0 - np.exp(-dt / _USUAL_S)
+    position, acceleration, apart = 0.0, 0.0, np.empty(3 + INPUTS)
     for axis in range(model.dimension):
         for part in range(3 + INPUTS):
             now = turned[axis, part] if part < 3 else coupling[0, axis, part - 3] / dt
             apart[part] = now - usual[axis, part]
-            usual[axis, part] += share * apart[part]
+            usual[axis, part] += (of_arm if part < 3 else of_input) * apart[part]
         for one in range(3):
             for other in range(3):
                 position += apart[one] * apart[other] * covariance[ARM + one, ARM + other]

@@ -111,7 +111,7 @@ class Dense:
 
     def _considered(self, dt: float, turned: np.ndarray, coupling: np.ndarray) -> tuple[float, float]:
         apart = np.column_stack([turned, coupling]) - self.usual
-        self.usual = self.usual + (1 - np.exp(-dt / 2.0)) * apart
+        self.usual = self.usual + (1 - np.exp(-dt / np.repeat([0.3, 2.0], [3, 11]))) * apart
         arm = np.trace(apart[:, :3] @ self.covariance[ARM, ARM] @ apart[:, :3].T) / 3
         inputs = np.trace(apart[:, 3:] @ self.covariance[INPUT, INPUT] @ apart[:, 3:].T) / 3
         return float(arm), float(0.5 * inputs)
