@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.commands import console
+from pipeline.commands import console, fit_frames
 from pipeline.commands.studies import for_each_study
 from pipeline.engine.progress import show_progress
 from pipeline.engine.result import Result
@@ -47,9 +47,10 @@ def fit_studies(studies: Sequence[Path], first_s: float, jobs: int | None, cache
         except PipelineError as error:
             raise PipelineError(f"{folder}: {error}") from None
         folders = [result.entries["ingest"][session.id].folder for session in result.sessions]
+        frames = list(fit_frames.lines(result.study, dict(zip(recordings, folders, strict=True)), first_s))
         checks = list(tables.records("checks", tables.read("checks", folders)))
         lines = _lines(result.study, result.name, fitted, first_s, recordings)
-        for line in (*_in_doubt(checks, len(recordings)), *lines, *_of_checks(checks)):
+        for line in (*_in_doubt(checks, len(recordings)), *lines, *frames, *_of_checks(checks)):
             console.say(line)
         return result.exit_code
 

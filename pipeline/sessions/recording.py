@@ -146,6 +146,13 @@ def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
     return origin_ns, found
 
 
+def in_space(study: Study, entry: Path, name: str) -> Samples:
+    """A stream of positions with all three axes, in the tracker's frame and clock as study.yaml states them."""
+    table = tables.read_arrow("positions", entry)
+    origin_ns = pc.min(table["arrival_ns"]).as_py() if len(table) else 0
+    return _vectors(tables.of_stream(table, name), study.streams[name], origin_ns)
+
+
 def shown_axes(study: Study, name: str) -> tuple[str, ...]:
     """Those of the analysed axes that a stream of positions has."""
     return tuple(study.axes_of(name)) if name in study.sensor_streams else tuple(study.axes)
