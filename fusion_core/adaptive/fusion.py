@@ -52,11 +52,15 @@ class FusionAdaptive:
     trust, and the lever arm from it to the tracked point. A stated latency is where the clock's search begins, a stated
     noise where the noise's does. Readings later than `history_s` are left out.
 
-    Raises ValueError for other sensors than these two, or a sensor later than the history.
+    Two clocks that disagree do not say which is wrong. `trusted_clock` names the sensor whose stamps, less its stated
+    latency, are right. Without it the accelerometer's are believed, and the SD counts its being wrong as likely.
+
+    Raises ValueError for other sensors than these two, a sensor later than the history, or a clock of neither.
     """
 
     sensors: Mapping[str, Sensor]
     history_s: float = 0.5
+    trusted_clock: str | None = None
 
     def __post_init__(self) -> None:
         require_fit(self.sensors)
@@ -67,6 +71,8 @@ class FusionAdaptive:
             raise ValueError(
                 "fusion_adaptive is for one tracker and one accelerometer, each of all axes; fusion_kalman takes any"
             )
+        if self.trusted_clock is not None and self.trusted_clock not in self.sensors:
+            raise ValueError(f"trusted_clock must be one of {', '.join(self.sensors)}, got {self.trusted_clock}")
 
     @cached_property
     def tracker(self) -> str:
@@ -92,6 +98,7 @@ class FusionAdaptive:
         model = np.zeros(1, layout.MODEL)
         for field, value in {
             "dimension": dimension,
+            "trusted": self._trusted,
             "prior": prior,
             "walk": walk,
             "member": member,
@@ -103,6 +110,12 @@ class FusionAdaptive:
         }.items():
             model[field] = value
         return model
+
+    @property
+    def _trusted(self) -> int:
+        if self.trusted_clock is None:
+            return layout.NEITHER
+        return layout.THE_TRACKER if self.trusted_clock == self.tracker else layout.THE_PHONE
 
     def start(self) -> Memory:
         """Nothing seen."""

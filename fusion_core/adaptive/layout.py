@@ -31,6 +31,9 @@ UNTURNED, ORIENTED, FELT = 0.0, 1.0, 2.0  # what is known: nothing, the rotation
 VALUE, TURNED, CROSSED, CLIPPED, ROW = 0, 3, 12, 21, 22
 FORCE, KNOWN, COLUMNS = 22, 25, 26
 
+# Model.trusted: whose clock is right, of the tracker's and the phone's.
+NEITHER, THE_PHONE, THE_TRACKER = 0, 1, 2
+
 # A member of the bank.
 TRACKER_VARIANCE, ACCELERATION_PSD, RATE_PSD, USES_PHONE, DRIFT_VARIANCE, DRIFT_S, MEMBER = 0, 1, 2, 3, 4, 5, 6
 
@@ -63,6 +66,7 @@ class Model(Protocol):
     """What does not change. Variances and densities in mm and s."""
 
     dimension: int
+    trusted: int  # whose clock
     first_alone: int  # the first member that does not use the phone
     surprise: float  # the squared innovation beyond which a position counts for less
     history_s: float
@@ -105,6 +109,7 @@ class Phone(NamedTuple):
 MODEL = np.dtype(
     [
         ("dimension", np.int64),
+        ("trusted", np.int64),
         ("first_alone", np.int64),
         ("surprise", np.float64),
         ("history_s", np.float64),

@@ -20,6 +20,7 @@ from fusion_core.adaptive.layout import (
     AT,
     BIAS,
     CLIPPED,
+    CLOCK_S,
     DRIFT,
     ERROR,
     EXPECTED,
@@ -29,6 +30,7 @@ from fusion_core.adaptive.layout import (
     KNOWN,
     KNOWS_ARM,
     MIXED,
+    NEITHER,
     NOISE,
     NOISE_DRIFT,
     ORIENTED,
@@ -41,6 +43,7 @@ from fusion_core.adaptive.layout import (
     STATED,
     SURPRISE,
     TAKEN,
+    THE_TRACKER,
     TRUST,
     TURNED,
     VELOCITY,
@@ -183,16 +186,33 @@ def _noise(state: State) -> float:
 
 
 @compiled
+def _of_either_clock(model: Model, state: State) -> float:
+    """The variance of not knowing whose clock is wrong: no frame shows it, since all are off by as much.
+
+    As likely as not it is the phone's; the hand is then where it was shown to be so much earlier or later.
+    """
+    if model.trusted != NEITHER:
+        return 0.0
+    squared = 0.0
+    for axis in range(model.dimension):
+        squared += (state.mean[VELOCITY + axis] + state.head[0, axis]) ** 2 / model.dimension
+    return float(0.5 * squared * state.fact[CLOCK_S] ** 2)
+
+
+@compiled
 def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArray, sd: FloatArray, at: int) -> None:
     """Position and SD at a time, into row `at` of `mean` and `sd`; NaN before the first position."""
     if state.count[TAKEN] == 0:
         for axis in range(model.dimension):
             mean[at, axis], sd[at, axis] = np.nan, np.nan
         return
+    if model.trusted == THE_TRACKER:
+        time += state.fact[CLOCK_S]
     answers = np.empty(SHOWN)
     answer(model, state, phone, time, answers)
     variance = answers[STATED]
     if state.fact[SCORED] >= _ENOUGH and state.fact[SURPRISE] > 1.0:
         variance += (state.fact[SURPRISE] - 1.0) * (variance + _noise(state))
+    variance += _of_either_clock(model, state)
     for axis in range(model.dimension):
         mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance)

@@ -49,8 +49,9 @@ def folded(material: Material) -> list[Folded]:
         " with 95 % intervals. Look for what lies far from what study.yaml states.",
         columns(titles, 1),
         cells,
-        "Of the two clocks only the difference shows: a phone that stamps early looks like a late tracker. Wide"
-        " intervals: the hand moved too little to tell.",
+        "Of the two clocks only the difference shows: a phone that stamps early looks like a late tracker. Whoever"
+        " knows which is right names it in study.yaml, as the estimator's trusted_clock. Wide intervals: the hand moved"
+        " too little to tell.",
     )
     return [Folded("What the sensors turned out to be like", (table,))]
 
