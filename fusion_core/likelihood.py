@@ -16,6 +16,8 @@ from fusion_core.sensors import position_sensor
 _STEP = 0.02  # of a numerical derivative, in logarithms
 _LARGEST_SD = np.log(3.0) / 1.96  # of a parameter that counts as identified: within a factor of three either way,
 _LARGEST_SHARE_OF_PRIOR = 0.5  # and its SD at most this share of the prior's
+_FEW_BLOCKS = 12
+_WIDEST = 50.0  # of half an interval of a logarithm: anything is possible, and its exponential still a number
 _RIDGE = 1e-12  # keeps a flat curvature invertible
 
 
@@ -101,19 +103,24 @@ def maximise(
     optimum = minimize(cost, origin, method="Powell", options={"xtol": 1e-3, "ftol": 1e-8})
     best = np.atleast_1d(np.asarray(optimum.x, dtype=np.float64))
     sd = _sandwich(lambda logarithm: blocks(np.exp(logarithm)), best, spread)
+    half = np.minimum(1.96 * sd, _WIDEST)
     return [
         Fitted(
             float(np.exp(log_value)),
-            float(np.exp(log_value - 1.96 * log_sd)),
-            float(np.exp(log_value + 1.96 * log_sd)),
+            float(np.exp(log_value - half_width)),
+            float(np.exp(log_value + half_width)),
             bool(log_sd < min(_LARGEST_SD, _LARGEST_SHARE_OF_PRIOR * log_prior_sd)),
         )
-        for log_value, log_sd, log_prior_sd in zip(best, sd, spread, strict=True)
+        for log_value, half_width, log_sd, log_prior_sd in zip(best, half, sd, spread, strict=True)
     ]
 
 
 def _sandwich(blocks: Callable[[FloatArray], FloatArray], best: FloatArray, prior_sd: FloatArray) -> FloatArray:
-    """SDs (m,) of a maximum: A⁻¹ B A⁻¹ with the curvature A and the scatter B of the blocks' slopes."""
+    """SDs (m,) of a maximum: A⁻¹ B A⁻¹ with the curvature A and the scatter B of the blocks' slopes.
+
+    A few blocks' slopes scatter little by chance (two that sum to nothing are opposite, whatever they are): then no SD
+    is below that of a model taken for right, which is A⁻¹'s.
+    """
     count = len(best)
     steps = _STEP * np.eye(count)
     ahead = np.array([blocks(best + step) for step in steps])
@@ -131,4 +138,6 @@ def _sandwich(blocks: Callable[[FloatArray], FloatArray], best: FloatArray, prio
                 curvature[column, row] -= bend
     inverse = np.linalg.pinv(curvature, hermitian=True)
     variance = np.diag(inverse @ (scatter + np.diag(prior_sd**-2.0)) @ inverse)
+    if ahead.shape[1] < _FEW_BLOCKS:
+        variance = np.maximum(variance, np.diag(inverse))
     return np.where(np.diag(curvature) > 0, np.sqrt(np.maximum(variance, 0.0)), np.inf)

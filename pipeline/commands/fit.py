@@ -72,15 +72,50 @@ def _lines(
                 f" estimate; probably other settings of study.yaml do not match the data; {_short(row.stated)} was"
                 " kept."
             )
+        elif row.worse:
+            yield (
+                f"# {row.where}.{row.key}: {_short(row.fitted.value)} fits the first {first_s:g} s and makes the rest"
+                f" less likely; {_short(row.stated)} was kept."
+            )
         elif not row.fitted.identified:
             yield (
                 f"# {row.where}.{row.key} cannot be fitted from these data: anything from {_short(row.fitted.low)} to"
                 f" {_short(row.fitted.high)} fits; {_short(row.stated)} was kept."
             )
+    yield from _latencies(study, fitted.parameters)
+    yield from _apart(fitted, first_s)
     if fitted.scores:
         yield "# RMSE in mm on the rest of each session, with study.yaml's values -> with the fitted ones:"
     for score in fitted.scores:
         yield f"#   {score.session}  {score.estimator}: {score.stated_rmse_mm:.1f} -> {score.fitted_rmse_mm:.1f}"
+
+
+def _latencies(study: Study, parameters: Sequence[Parameter]) -> Iterator[str]:
+    """A tracker that is later or earlier than stated may as well be a phone that is: only the difference shows."""
+    phone = study.stream_of_kind("acceleration")
+    for row in parameters:
+        if row.key != "latency_s" or not row.usable or row.fitted.low <= row.stated <= row.fitted.high:
+            continue
+        off_ms = 1000.0 * (row.fitted.value - row.stated)
+        other = f"{phone} is stamped {abs(off_ms):.0f} ms too {'early' if off_ms > 0 else 'late'}"
+        yield f"# {row.where}.latency_s: or it is right as stated and {other}: the data cannot tell which"
+
+
+def _apart(fitted: Fit, first_s: float) -> Iterator[str]:
+    """The sensors session by session, to see whether one value suits all."""
+    if len(fitted.apart) > 1:
+        yield f"# Each session alone, by its first {first_s:g} s, with 95 % intervals:"
+        for session, rows in fitted.apart.items():
+            values = (f"{row.where.split('.', 1)[1]}.{row.key} {_alone(row)}" for row in rows)
+            yield f"#   {session}  {'; '.join(values)}"
+    if all(row.gain is None for row in fitted.parameters):
+        yield f"# No session goes on after its first {first_s:g} s, so that nothing of this could be checked on a rest."
+
+
+def _alone(row: Parameter) -> str:
+    if row.at_bound or not row.fitted.identified:
+        return "cannot be told"
+    return f"{_short(row.fitted.value)} [{_short(row.fitted.low)}, {_short(row.fitted.high)}]"
 
 
 def _gravity(study: Study, stream: str, mean: FloatArray, half: float) -> Iterator[str]:

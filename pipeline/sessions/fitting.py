@@ -1,4 +1,8 @@
-"""Fits a study's parameters to its recordings: on the first part of each session; scored on the rest."""
+"""Fits a study's parameters to its recordings: on the first part of each session; judged on the rest.
+
+Judged by the likelihood of the rest's positions, which needs no reference: what makes them less likely than the values
+of study.yaml do is not proposed, however well it fits the first part.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +30,17 @@ _FARTHEST = 100.0  # times what is stated, or a hundredth of it
 
 @dataclass(frozen=True)
 class Parameter:
-    """One fitted parameter: its section and key in study.yaml, the value stated there, and the fitted one."""
+    """One fitted parameter: its section and key in study.yaml, the value stated there, and the fitted one.
+
+    `gain` is by how much the log likelihood of the rest's positions rises with the fitted values of this section's
+    parameters together; None where no session goes on after the fitted part.
+    """
 
     where: str
     key: str
     stated: float
     fitted: Fitted
+    gain: float | None = None
 
     @property
     def at_bound(self) -> bool:
@@ -40,9 +49,14 @@ class Parameter:
         return not 1 / farthest < self.fitted.value / self.stated < farthest
 
     @property
+    def worse(self) -> bool:
+        """Whether it does worse than the stated value on the part that was not fitted."""
+        return self.gain is not None and self.gain < 0
+
+    @property
     def usable(self) -> bool:
-        """Whether the data determine it and the search did not run away."""
-        return self.fitted.identified and not self.at_bound
+        """Whether the data determine it, the search did not run away, and it holds on the rest."""
+        return self.fitted.identified and not self.at_bound and not self.worse
 
 
 @dataclass(frozen=True)
@@ -57,9 +71,13 @@ class Score:
 
 @dataclass(frozen=True)
 class Fit:
-    """Parameters, scores, and by phone gravity (3,) in mm/s² with the half widths of its interval."""
+    """Parameters, scores, and by phone gravity (3,) in mm/s² with the half widths of its interval.
+
+    `apart` has the sensors' parameters by session, each fitted to that session alone.
+    """
 
     parameters: tuple[Parameter, ...]
+    apart: Mapping[str, tuple[Parameter, ...]]
     scores: tuple[Score, ...]
     gravity_mm_s2: Mapping[str, tuple[FloatArray, FloatArray]]
 
@@ -73,34 +91,55 @@ def fit(
 ) -> Fit:
     """Noise and latency of the sensors, then the parameters of every fusion_kalman and window_gp of the study.
 
-    `begin` is called with the number of steps, which are the sensors, each estimator and each session's score; `done`
-    after each. Raises PipelineError where there is nothing to fit.
+    `begin` is called with the number of steps, which are the sensors, each session's sensors apart, each estimator and
+    each session's score; `done` after each. Raises PipelineError where there is nothing to fit.
     """
     if study.tracker is None:
         raise PipelineError("study.yaml: streams: fitting needs a stream of kind position")
-    parts = [_part(loaded.samples, -np.inf, _begin(study, loaded) + first_s) for loaded in recordings.values()]
-    parts = [part for part in parts if len(part[study.tracker])]
+    parts, rests = _cut(study, recordings, first_s)
     if not parts:
         raise PipelineError(f"no session has positions in its first {first_s:g} s")
-    begin(1 + len(study.estimators) + len(recordings))
-    fitted = _sensors(study, parts)
+    begin(1 + len(parts) + len(study.estimators) + len(recordings))
+    fitted = _sensors(study, list(parts.values()), list(rests.values()))
     done()
+    apart = {}
+    for session, part in parts.items():
+        apart[session] = tuple(_sensors(study, [part], []))
+        done()
     known = _with(sensors(study), fitted)
-    latency = next((p.fitted.value for p in fitted if p.key == "latency_s" and not p.at_bound), None)
-    shifted = [_late(study, part, latency) for part in parts]
+    latency = next((p.fitted.value for p in fitted if p.key == "latency_s" and not p.at_bound and not p.worse), None)
+    shifted, later = ([_late(study, one, latency) for one in cut.values()] for cut in (parts, rests))
     estimators: dict[str, Estimator] = {}
     for name in study.estimators:
         stated = build_estimator(study, name)
         used = {key: known[key] for key in stated.sensors}
-        rows, estimators[name] = _estimator(name, stated, used, shifted)
+        rows, estimators[name] = _estimator(name, stated, used, shifted, later)
         fitted += rows
         done()
     scores = []
     for session, loaded in recordings.items():
-        later = loaded.times[loaded.times >= _begin(study, loaded) + first_s + SETTLED_S]
-        scores += _scores(study, session, loaded, estimators, later, _late(study, loaded.samples, latency))
+        times = loaded.times[loaded.times >= _begin(study, loaded) + first_s + SETTLED_S]
+        scores += _scores(study, session, loaded, estimators, times, _late(study, loaded.samples, latency))
         done()
-    return Fit(tuple(fitted), tuple(scores), _gravity(recordings, first_s))
+    return Fit(tuple(fitted), apart, tuple(scores), _gravity(recordings, first_s))
+
+
+_Part = Mapping[str, Samples]
+
+
+def _cut(
+    study: Study, recordings: Mapping[str, Recording], first_s: float
+) -> tuple[dict[str, _Part], dict[str, _Part]]:
+    """The first part of each session, and the rest; sessions without positions in it are left out."""
+    parts, rests = {}, {}
+    for session, loaded in recordings.items():
+        until = _begin(study, loaded) + first_s
+        part, rest = _part(loaded.samples, -np.inf, until), _part(loaded.samples, until, np.inf)
+        if len(part[study.tracker or ""]):
+            parts[session] = part
+        if len(rest[study.tracker or ""]) > 1:
+            rests[session] = rest
+    return parts, rests
 
 
 def _begin(study: Study, loaded: Recording) -> float:
@@ -128,7 +167,7 @@ def _late(study: Study, samples: Mapping[str, Samples], latency_s: float | None)
     return shifted
 
 
-def _sensors(study: Study, parts: Sequence[Mapping[str, Samples]]) -> list[Parameter]:
+def _sensors(study: Study, parts: Sequence[_Part], rests: Sequence[_Part]) -> list[Parameter]:
     """Latency and noise of the tracker, noise of the accelerometer, by the fusion filter with all its own free."""
     tracker, imu = study.tracker or "", study.stream_of_kind("acceleration")
     stated, plain = sensors(study), _plain(study)
@@ -139,7 +178,7 @@ def _sensors(study: Study, parts: Sequence[Mapping[str, Samples]]) -> list[Param
             wanted.append((f"streams.{tracker}", "latency_s", stated[tracker].latency_s, _FREE))
     own = [plain.jerk_psd_mm2_s5, plain.bias_walk_mm_s2_per_sqrt_s]
 
-    def blocks(values: FloatArray) -> FloatArray:
+    def blocks(values: FloatArray, stretches: Sequence[_Part] = parts) -> FloatArray:
         changed = dict(stated)
         changed[tracker] = replace(stated[tracker], noise_sd=float(values[0]))
         if imu is not None:
@@ -147,10 +186,27 @@ def _sensors(study: Study, parts: Sequence[Mapping[str, Samples]]) -> list[Param
         latency = float(values[2]) if len(wanted) > 2 else None
         used = {name: changed[name] for name in plain.sensors}
         filter_ = replace(plain, sensors=used, jerk_psd_mm2_s5=float(values[-2]), bias_walk_mm_s2_per_sqrt_s=values[-1])
-        return np.concatenate([position_log_likelihood(filter_, _late(study, part, latency)) for part in parts])
+        return np.concatenate([position_log_likelihood(filter_, _late(study, one, latency)) for one in stretches])
 
-    fitted = maximise(blocks, [row[2] for row in wanted] + own, [row[3] for row in wanted] + [_FREE, _FREE])
-    return [Parameter(where, key, value, fit) for (where, key, value, _), fit in zip(wanted, fitted, strict=False)]
+    start = [row[2] for row in wanted] + own
+    fitted = maximise(blocks, start, [row[3] for row in wanted] + [_FREE, _FREE])
+    gain = _gain(blocks, start, fitted, rests)
+    return [
+        Parameter(where, key, value, fit, gain) for (where, key, value, _), fit in zip(wanted, fitted, strict=False)
+    ]
+
+
+def _gain(
+    blocks: Callable[[FloatArray, Sequence[_Part]], FloatArray],
+    stated: Sequence[float],
+    fitted: Sequence[Fitted],
+    rests: Sequence[_Part],
+) -> float | None:
+    """By how much fitted values make the rest likelier than the stated ones; None without a rest."""
+    if not rests:
+        return None
+    better, as_stated = (np.sum(blocks(np.array(values), rests)) for values in ([fit.value for fit in fitted], stated))
+    return float(better - as_stated)
 
 
 def _plain(study: Study) -> FusionKalman:
@@ -172,7 +228,7 @@ def _with(stated: Mapping[str, Sensor], fitted: Sequence[Parameter]) -> dict[str
 
 
 def _estimator(
-    name: str, stated: Estimator, used: dict[str, Sensor], parts: Sequence[Mapping[str, Samples]]
+    name: str, stated: Estimator, used: dict[str, Sensor], parts: Sequence[_Part], rests: Sequence[_Part]
 ) -> tuple[list[Parameter], Estimator]:
     """The fitted parameters of one estimator, and the estimator with those that the data determine."""
     where = f"estimators.{name}"
@@ -187,12 +243,13 @@ def _estimator(
         return [], stated
     start = [float(getattr(stated, key)) for key in keys]
 
-    def blocks(values: FloatArray) -> FloatArray:
+    def blocks(values: FloatArray, stretches: Sequence[_Part] = parts) -> FloatArray:
         tried = replace(plain, **dict(zip(keys, map(float, values), strict=True)))  # type: ignore[arg-type]
-        return np.concatenate([score(tried, part) for part in parts])
+        return np.concatenate([score(tried, one) for one in stretches])
 
     fitted = maximise(blocks, start, [_FREE] * len(keys))
-    rows = [Parameter(where, key, value, fit) for key, value, fit in zip(keys, start, fitted, strict=True)]
+    gain = _gain(blocks, start, fitted, rests)
+    rows = [Parameter(where, key, value, fit, gain) for key, value, fit in zip(keys, start, fitted, strict=True)]
     identified = {row.key: row.fitted.value for row in rows if row.usable}
     return rows, replace(stated, sensors=used, **identified)  # type: ignore[arg-type]
 

@@ -203,7 +203,8 @@ def test_fit_prints_what_the_recordings_say(
     assert after < before
     assert "which agrees with [" in ran.out
     assert "With stamp: arrival this is latency_s; with stamp: measurement it should be 0" in ran.out
-    assert "fitting: 4 steps" in ran.err  # the sensors, two estimators, one session's score
+    assert "fitting: 5 steps" in ran.err  # the sensors, one session's alone, two estimators, one session's score
+    assert "tracker.latency_s: or it is right as stated and imu is stamped 20 ms too early" in ran.out
 
 
 def test_fit_holds_gravity_against_study_yaml_and_takes_no_bound(
@@ -219,6 +220,9 @@ def test_fit_holds_gravity_against_study_yaml_and_takes_no_bound(
     off = Parameter("streams.tracker", "noise_sd_mm", 8.0, Fitted(0.001, 0.0009, 0.0011, True))
     assert off.at_bound
     assert not off.usable
+    lost = Parameter("streams.tracker", "noise_sd_mm", 8.0, Fitted(9.0, 8.5, 9.5, True), -0.1)
+    assert lost.worse
+    assert not lost.usable
 
 
 def test_fit_without_logs_says_so(
