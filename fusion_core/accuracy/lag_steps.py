@@ -75,7 +75,8 @@ def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shif
     quadratic, begin = np.empty((3, len(segments.time))), 0
     quadratic[2] = 0.0
     for axis in range(len(segments.slope)):
-        quadratic[2, :-1] += segments.slope[axis] ** 2
+        for segment in range(segments.slope.shape[1]):
+            quadratic[2, segment] += segments.slope[axis, segment] ** 2
     for row in range(len(time)):
         while begin < len(segments.time) - 2 and segments.time[begin + 1] <= time[row] - shifts[-1]:
             begin += 1
@@ -150,15 +151,17 @@ def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArra
     NaN where all its blocks are still, since any shift fits then.
     """
     groups, count = len(blocks.cost), len(blocks.total)
-    scale = blocks.total.max()
+    scale = 0.0
+    for of_all in blocks.total:
+        scale = max(scale, of_all)
     best_shift, bound, cost = np.full(len(picks), np.nan), np.empty(groups), np.empty(groups * _GROUP)
     for row in range(len(picks)):
         own = picks[row]
-        if np.all(blocks.still[own]):
+        if _all_still(blocks.still, own):
             continue
         _summed(blocks.bound, own, bound)
         cost[:] = np.inf
-        group = int(np.argmin(bound))
+        group = _first_of_lowest(bound, groups, 0.0)
         least = _costs_of(blocks, group, own, cost)
         bound[group] = np.inf
         for group in range(groups):
@@ -171,6 +174,22 @@ def best_of_resamples(blocks: Blocks, picks: npt.NDArray[np.int64]) -> FloatArra
                 _costs_of(blocks, group, own, cost)
         best_shift[row] = best(cost[:count], scale)
     return best_shift
+
+
+@compiled
+def _all_still(still: npt.NDArray[np.bool_], picks: npt.NDArray[np.int64]) -> bool:
+    for pick in picks:  # noqa: SIM110 - Numba has no generators
+        if not still[pick]:
+            return False
+    return True
+
+
+@compiled
+def _lowest(cost: FloatArray) -> float:
+    lowest = np.inf
+    for one in cost:
+        lowest = min(lowest, one)
+    return lowest
 
 
 @compiled
@@ -193,13 +212,13 @@ def _costs_of(blocks: Blocks, group: int, picks: npt.NDArray[np.int64], cost: Fl
     """Writes a resample's costs at one group of shifts; returns the lowest of them."""
     own = cost[group * _GROUP : (group + 1) * _GROUP]
     _summed(blocks.cost[group], picks, own)
-    return float(own.min())
+    return _lowest(own)
 
 
 @compiled
 def _first_of_lowest(cost: FloatArray, count: int, scale: float) -> int:
     """The index of the lowest of the first `count` costs; the first of those that are equal up to round-off."""
-    enough = cost[:count].min() + _ROUND_OFF * scale
+    enough = _lowest(cost[:count]) + _ROUND_OFF * scale
     at = 0
     while cost[at] > enough:
         at += 1

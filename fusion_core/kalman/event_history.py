@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fusion_core.compilation import compiled
 from fusion_core.kalman.motion import Motion
 from fusion_core.samples import FloatArray
 
@@ -84,3 +85,37 @@ def empty_history(capacity: int, dimension: int, constants: int, states: int) ->
         np.empty((capacity, size, size)),
         np.empty((capacity, ADAPTED)),
     )
+
+
+@compiled
+def copy_rows(of: History, into: History, first: int, count: int, at: int) -> None:
+    """The rows first:count of a history into another from row `at` on; or further up into the same.
+
+    By single numbers: what copies a whole array also says which shapes do not fit, and that text takes longer to
+    compile than the filter's correction.
+    """
+    for row in range(first, count):
+        to = at + row - first
+        into.time[to], into.sensor[to] = of.time[row], of.sensor[row]
+        for axis in range(of.value.shape[1]):
+            into.value[to, axis] = of.value[row, axis]
+            for constant in range(of.coupling.shape[2]):
+                into.coupling[to, axis, constant] = of.coupling[row, axis, constant]
+        for state in range(of.mean.shape[1]):
+            into.mean[to, state] = of.mean[row, state]
+            for other in range(of.mean.shape[1]):
+                into.covariance[to, state, other] = of.covariance[row, state, other]
+        for fact in range(ADAPTED):
+            into.adapted[to, fact] = of.adapted[row, fact]
+
+
+@compiled
+def write_reading(
+    history: History, row: int, time: float, sensor: int, value: FloatArray, coupling: FloatArray
+) -> None:
+    """A reading into a row, whose moments are still to be computed."""
+    history.time[row], history.sensor[row] = time, sensor
+    for axis in range(len(value)):
+        history.value[row, axis] = value[axis]
+        for constant in range(coupling.shape[1]):
+            history.coupling[row, axis, constant] = coupling[axis, constant]

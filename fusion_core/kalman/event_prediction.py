@@ -67,7 +67,32 @@ def whole_step(motion: Motion, dimension: int, size: int, dt: float, density: fl
 def move_anchored(
     motion: Motion, dimension: int, mean: FloatArray, covariance: FloatArray, row: int, dt: float, density: float
 ) -> None:
-    """The same as `move_wiener` for a process that returns to a constant, by whole matrices."""
-    transition, noise = whole_step(motion, dimension, mean.shape[1], dt, density)
-    mean[row] = transition @ mean[row - 1]
-    covariance[row] = transition @ covariance[row - 1] @ transition.T + noise
+    """The same as `move_wiener` for a process that returns to a constant.
+
+    The transition is one axis's for each, and constants stay. P is symmetric, so its rows through F are F P.
+    """
+    states, size = len(motion.stationary), mean.shape[1]
+    of_axis, noise, half = np.empty((states, states)), np.empty((states, states)), np.empty((size, size))
+    step(motion, dt, density, of_axis, noise)
+    for line in range(size):
+        mean[row, line] = _through_states(of_axis, dimension, mean, row - 1, line)
+        for column in range(size):
+            half[line, column] = _through_states(of_axis, dimension, covariance[row - 1], column, line)
+    for line in range(size):
+        for column in range(size):
+            covariance[row, line, column] = _through_states(of_axis, dimension, half, line, column)
+    for state in range(states):
+        for other in range(states):
+            for axis in range(dimension):
+                covariance[row, state * dimension + axis, other * dimension + axis] += noise[state, other]
+
+
+@compiled
+def _through_states(of_axis: FloatArray, dimension: int, rows: FloatArray, row: int, at: int) -> float:
+    """Element `at` of F x, with a row of `rows` as x."""
+    states, moved = len(of_axis), 0.0
+    if at >= states * dimension:
+        return float(rows[row, at])
+    for other in range(states):
+        moved += of_axis[at // dimension, other] * rows[row, other * dimension + at % dimension]
+    return moved

@@ -5,23 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fusion_core.compilation import compiled
-from fusion_core.kalman.event_history import JERK_PSD, History, Model, Readings
+from fusion_core.kalman.event_history import JERK_PSD, History, Model, Readings, copy_rows, write_reading
 from fusion_core.kalman.event_steps import begin, insert, oldest_needed, write_prediction
 from fusion_core.kalman.motion import position_step
 from fusion_core.samples import FloatArray
-
-
-@compiled
-def _shift_down(history: History, first: int, count: int) -> None:
-    """Moves the rows first:count to the top of the history, which makes room at its end."""
-    for row in range(first, count):
-        history.time[row - first] = history.time[row]
-        history.sensor[row - first] = history.sensor[row]
-        history.value[row - first] = history.value[row]
-        history.coupling[row - first] = history.coupling[row]
-        history.mean[row - first] = history.mean[row]
-        history.covariance[row - first] = history.covariance[row]
-        history.adapted[row - first] = history.adapted[row]
 
 
 @compiled
@@ -41,11 +28,11 @@ def insert_reading(
     """
     oldest, count = span
     if count == 0:
-        history.time[0], history.sensor[0], history.value[0], history.coupling[0] = time, sensor, value, coupling
+        write_reading(history, 0, time, sensor, value, coupling)
         begin(model, history)
         return 0, 1
     if count == len(history.time):
-        _shift_down(history, oldest, count)
+        copy_rows(history, history, oldest, count, 0)
         oldest, count = 0, count - oldest
     if insert(model, history, oldest, count, time, sensor, value, coupling) > oldest:
         count += 1
@@ -71,7 +58,7 @@ def replay(
     dimension = len(model.axes)
     mean, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
     recent, adapted, of_position = history.time, history.adapted, np.zeros(len(model.states))
-    oldest, count, upcoming = 0, 0, 0
+    oldest, count, upcoming = int(0), int(0), 0  # noqa: RUF046, UP018 - for a bare 0 all is compiled once more
     for index in range(len(times)):
         while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
             time, sensor = readings.time[upcoming], readings.sensor[upcoming]
@@ -81,8 +68,11 @@ def replay(
         if count > 0:
             if len(constants[0]):
                 begins = len(model.states) * dimension
-                constants[0][index] = history.mean[count - 1, begins:]
-                constants[1][index] = history.covariance[count - 1, begins:, begins:]
+                for one in range(len(model.constants)):
+                    constants[0][index, one] = history.mean[count - 1, begins + one]
+                    for other in range(len(model.constants)):
+                        shared = history.covariance[count - 1, begins + one, begins + other]
+                        constants[1][index, one, other] = shared
             row = count - 1
             noise = position_step(
                 model.motion, max(times[index] - recent[row], 0.0), adapted[row, JERK_PSD], of_position

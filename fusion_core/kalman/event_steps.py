@@ -58,6 +58,8 @@ from fusion_core.kalman.event_history import (
     SQUARED,
     History,
     Model,
+    copy_rows,
+    write_reading,
 )
 from fusion_core.kalman.event_prediction import move_anchored, move_wiener
 from fusion_core.kalman.motion import position_step
@@ -189,11 +191,7 @@ def insert(
             values[row, axis] = values[row - 1, axis]
             for constant in range(len(model.constants)):
                 couplings[row, axis, constant] = couplings[row - 1, axis, constant]
-    times[at], sensors[at] = time, sensor
-    for axis in range(len(model.axes)):
-        values[at, axis] = value[axis]
-        for constant in range(len(model.constants)):
-            couplings[at, axis, constant] = coupling[axis, constant]
+    write_reading(history, at, time, sensor, value, coupling)
     update_rows(model, history, at, count + 1)
     return at
 
@@ -260,16 +258,8 @@ def insert_into_copy(
 
     Returns the oldest row that is still needed, or −1 where the reading came too late.
     """
-    count = at = len(history.time)
-    while at > 0 and history.time[at - 1] > time + SAME_S:
-        at -= 1
-    copy.time[:count], copy.sensor[:count] = history.time, history.sensor
-    copy.value[:count], copy.coupling[:count] = history.value, history.coupling
-    copy.mean[:at], copy.covariance[:at], copy.adapted[:at] = (
-        history.mean[:at],
-        history.covariance[:at],
-        history.adapted[:at],
-    )
-    if insert(model, copy, 0, count, time, sensor, value, coupling) == 0:
+    count, oldest = len(history.time), int(0)  # noqa: RUF046, UP018 - as in `event_replay.replay`
+    copy_rows(history, copy, 0, count, 0)
+    if insert(model, copy, oldest, count, time, sensor, value, coupling) == oldest:
         return -1
-    return oldest_needed(copy.time, 0, count + 1, history_s)
+    return oldest_needed(copy.time, oldest, count + 1, history_s)

@@ -166,7 +166,8 @@ def position_step(motion: Motion, dt: float, jerk_psd: float, of_position: Float
     states = len(motion.stationary)
     transition, noise = np.empty((states, states)), np.empty((states, states))
     step(motion, dt, jerk_psd, transition, noise)
-    of_position[:] = transition[0]
+    for state in range(states):
+        of_position[state] = transition[0, state]
     return float(noise[0, 0])
 
 

@@ -93,7 +93,7 @@ def replay_late(
     dimension = len(model.axes)
     mean, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
     of_position = np.zeros(len(model.states))
-    oldest, count, upcoming = 0, 0, 0
+    oldest, count, upcoming = int(0), int(0), 0  # noqa: RUF046, UP018 - for a bare 0 all is compiled once more
     for index in range(len(times)):
         while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
             time, sensor = readings.time[upcoming], readings.sensor[upcoming]
