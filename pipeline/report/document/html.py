@@ -15,6 +15,7 @@ from markupsafe import Markup, escape
 from pipeline.report.document.model import CrossReference, Document, Figure, Link, Strong, numbered, repeats, unfolded
 from pipeline.report.document.pictures import pictures
 from pipeline.report.document.typography import Run, Style, typeset, typeset_heading
+from pipeline.report.glyphs import FAMILY, FONTS
 
 # Direction controls would reverse the text and numbers that follow.
 _DIRECTIONS = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))
@@ -22,6 +23,11 @@ _CONTROLS = {code: "□" for code in (*range(32), *range(127, 160), *_DIRECTIONS
 _UNBROKEN = {0x2009: "\u202f"}  # the space that groups a number's digits: no line may break there
 _TAGS: dict[Style, str] = {"italic": "var", "subscript": "sub"}
 _HERE = Path(__file__).parent
+_FACES = (
+    ("SteadyhandSans-Regular.woff2", "normal", "400"),
+    ("SteadyhandSans-Semibold.woff2", "normal", "500 700"),
+    ("SteadyhandSans-Italic.woff2", "italic", "400 700"),
+)
 
 
 def render(document: Document, figures: Path, path: Path) -> None:
@@ -43,15 +49,26 @@ def write_page(template: str, scripts: Sequence[str], path: Path, origin: str, *
     """
     style, *parts = ((_HERE / name).read_text(encoding="utf-8") for name in ("style.css", *scripts))
     code = "".join(parts)
+    style = f"{_fonts()}{style}"
     style += f"@page {{ @bottom-left {{ content: {_quoted(origin)}; }} }}\n"
     policy = (
-        f"default-src 'none'; img-src data:; style-src {_hashed(style)}; script-src {_hashed(code)};"
+        f"default-src 'none'; img-src data:; font-src data:; style-src {_hashed(style)}; script-src {_hashed(code)};"
         " base-uri 'none'; form-action 'none'"
     )
     page = (
         _environment().get_template(template).render(style=style, script=code, policy=policy, origin=origin, **values)
     )
     path.write_text(page.translate(_CONTROLS | _UNBROKEN), encoding="utf-8")
+
+
+@cache
+def _fonts() -> str:
+    """The faces of the reports' family as CSS, within the page, which loads nothing."""
+    return "".join(
+        f'@font-face {{ font-family: "{FAMILY}"; font-style: {style}; font-weight: {weight};'
+        f" src: url(data:font/woff2;base64,{base64.b64encode((FONTS / file).read_bytes()).decode()}); }}\n"
+        for file, style, weight in _FACES
+    )
 
 
 def _quoted(text: str) -> str:

@@ -5,7 +5,7 @@
 // { type: "circle", x, y, radius, colour, fill?, stroke? }                { type: "text", x, y, text, colour, align? }
 // { type: "group", box: { x, y, width, height }, shapes }                 cuts off what is outside its box
 
-const FONT_PX = 13, FAMILY = "system-ui, sans-serif";
+const FONT_PX = 13, FAMILY = "'Steadyhand Sans', system-ui, sans-serif";
 const SVG = "http://www.w3.org/2000/svg";
 
 const PAINT = {

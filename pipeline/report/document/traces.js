@@ -86,7 +86,7 @@ function panel(context, box, title, pairs, look) {
   const [low, high] = range(pairs);
   const x = (time) => box.left + (time - state.from) / (state.to - state.from) * box.width;
   const y = (value) => box.top + (high - value) / (high - low) * box.height;
-  context.font = "13px system-ui, sans-serif";
+  context.font = `${FONT_PX}px ${FAMILY}`;
   context.lineWidth = 1;
   context.strokeStyle = look.line;
   context.fillStyle = look.soft;

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.report.glyphs import font_folder
+from pipeline.report.glyphs import FONTS, fallback_folder
 
 if TYPE_CHECKING:
     import typst
@@ -18,7 +18,7 @@ def compiler_of(source: bytes, figures: Path, **inputs: str) -> typst.Compiler:
     return typst.Compiler(
         source,
         root=figures.resolve(),
-        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[font_folder()]),
+        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[FONTS, fallback_folder()]),
         ignore_system_fonts=True,
         sys_inputs=inputs,
     )

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any, Literal, ParamSpec
 
 import matplotlib as mpl
+import matplotlib.font_manager
 import matplotlib.ticker
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.report.glyphs import showable
+from pipeline.report.glyphs import FALLBACK, FAMILY, FONTS, showable
 from pipeline.statistics import T
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words.numbers import MINUS, THIN_SPACE
@@ -26,6 +27,7 @@ Place = Literal["outside upper left", "outside lower left", "outside right cente
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 BLACK = COLOURS[6]
+FAMILIES = [FAMILY, FALLBACK]
 GREY = "#6b757d"
 PALE = "#e3e7ea"
 WIDTH = 7.2  # inches: the width of a page's text
@@ -35,7 +37,7 @@ _NAME_LENGTH = 32
 _TICKS = 8.5
 
 _STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
+    "font.family": FAMILIES,
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -53,6 +55,9 @@ _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "steadyhand",
     "savefig.dpi": 150,  # of bitmaps
 }
+
+
+matplotlib.font_manager.fontManager.addfont(FONTS / "SteadyhandSans-Regular.ttf")
 
 
 def styled(function: Callable[Drawn, Figure]) -> Callable[Drawn, Figure]:

@@ -275,12 +275,13 @@ def test_the_page_is_whole_without_network_and_runs_nothing_but_its_own_script(r
     found = checked(page)
     assert found.scripts == [script("report.js")]
     digest = base64.b64encode(hashlib.sha256(found.scripts[0].encode()).digest()).decode()
-    assert "default-src 'none'; img-src data:; style-src 'sha256-" in page
+    assert "default-src 'none'; img-src data:; font-src data:; style-src 'sha256-" in page
     assert f"script-src 'sha256-{digest}'" in page
     assert found.pictures_without_alt == 0
     ours = ("#", "data:image/svg+xml;charset=utf-8,", "traces.html")
     assert all(reference.startswith(ours) for reference in found.references)
-    assert "url(" not in page.split("</style>")[0]
+    style = page.split("</style>")[0]
+    assert style.count("url(") == style.count("url(data:font/woff2;base64,") == 3
     assert found.tags.count("h1") == 1
     assert "Simulated data" in page
     titles = re.findall(r"<h2[^>]*>([^<]*)</h2>", page)

@@ -84,7 +84,7 @@ def test_many_long_sessions_are_thinned_out_to_fit_and_say_so(tmp_path: Path, mo
     ]
     short = Traces("short", None, None, (Series("a", "estimator", ("x",), time_s[:50], np.zeros((50, 1))),))
     packed = page_of([*walk, short], tmp_path)
-    assert (tmp_path / "traces.html").stat().st_size < 60_000 + 40_000
+    assert (tmp_path / "traces.html").stat().st_size < 60_000 + 130_000  # beside the data: fonts, style and scripts
     assert packed[0]["step_s"] > 0
     assert packed[2]["step_s"] == 0
     times = unpacked(packed[0])[0] / 1e3

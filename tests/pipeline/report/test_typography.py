@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from fontTools.ttLib import TTFont
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib import font_manager
 
 from pipeline.report.document.typography import typeset, typeset_heading
+from pipeline.report.figures.style import FAMILIES
+from pipeline.report.glyphs import FONTS
 
 
 def marked(text: str) -> str:
@@ -57,3 +63,18 @@ def test_an_interval_stays_on_one_line_and_a_list_in_brackets_does_not() -> None
     assert run.text == "it was 1.54 [−0.68,\u00a02.38] and 47 [27\u2009727,\u00a066\u2009538]"
     (run,) = typeset("conditions: [kinect, fusion]")
     assert "\u00a0" not in run.text
+
+
+def test_pages_pdf_and_figures_are_set_in_one_family_that_comes_with_the_program() -> None:
+    (family, _), found = FAMILIES, font_manager.findfont(FAMILIES[0], fallback_to_default=False)
+    assert Path(found).parent == FONTS
+    document = FONTS.parent / "document"
+    assert f'font: ("{family}", ' in (document / "report.typ").read_text(encoding="utf-8")
+    assert f'"{family}", system-ui' in (document / "style.css").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("style", ["Regular", "Semibold"])
+def test_the_fonts_have_the_letters_and_symbols_of_reports(style: str) -> None:
+    with TTFont(FONTS / f"SteadyhandSans-{style}.ttf") as font:
+        lacking = [symbol for symbol in "ÄéñøŁβηχωε²×−±≤≥–—“”…→✓▲₊µΔσ□" if ord(symbol) not in font.getBestCmap()]
+    assert not lacking
