@@ -41,7 +41,7 @@ def for_print(document: Document, names: Mapping[str, str]) -> Document:
 def _blocks(blocks: Sequence[Block], names: Mapping[str, str]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Folded):
-            yield Paragraph((f"{block.summary} {_places(block, names)}".rstrip(),))
+            yield Paragraph((_folded(block, names),))
         elif isinstance(block, ToPaste):
             # A link to a row of the report is of use on a page only, and belongs to no paper.
             texts = tuple(_without_links(text) for text in block.texts[:_TEXTS_MAX])
@@ -68,13 +68,14 @@ def _without_links(text: Text) -> Text:
     return tuple(kept)
 
 
-def _places(block: Folded, names: Mapping[str, str]) -> str:
-    """Where what is folded is to be found."""
+def _folded(block: Folded, names: Mapping[str, str]) -> str:
+    """What is folded and where it is to be found: `Each session's lights (Table 1 in the annex).`"""
     tables = [names[one.id] for one in block.blocks if isinstance(one, Table) and one.rows]
     figures = [f"figures/{one.file}" for one in block.blocks if isinstance(one, Figure)]
     places = [f"{listing(tables)} in the annex"] if tables else []
     places += [f"{listing(figures)} in report.html"] if figures else []
-    return f"({'; '.join(places)})" if places else ""
+    where = f" ({'; '.join(places)})" if places else ""
+    return f"{block.summary.rstrip('.')}{where}."
 
 
 def _shortened(tables: Sequence[Table]) -> Iterator[Table]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
@@ -72,13 +73,19 @@ def _content(document: Document) -> dict[str, Any]:
         "running": document.title if len(document.title) <= _HEAD else f"{document.title[:_HEAD]}…",
         "subtitle": document.subtitle,
         "origin": document.origin,
-        "sections": [_section(section, names) for section in for_print(document, names).sections],
+        "sections": list(_sections(for_print(document, names).sections, names)),
     }
 
 
-def _section(section: Section, names: dict[str, str]) -> dict[str, Any]:
-    blocks = [_block(block, names) for block in section.blocks]
-    return {"id": section.id, "title": section.title, "blocks": blocks}
+def _sections(sections: Sequence[Section], names: dict[str, str]) -> Iterator[dict[str, Any]]:
+    for place, section in enumerate(sections):
+        blocks = [_block(block, names) for block in section.blocks]
+        following = [*section.blocks[1:], *(one.blocks[0] for one in sections[place + 1 : place + 2])]
+        for data, block, after in zip_longest(blocks, section.blocks, following):
+            if isinstance(block, Figure):
+                # Words that follow fill the page where it does not fit; the summary keeps its order.
+                data["floats"] = place > 0 and isinstance(after, Paragraph | Table)
+        yield {"id": section.id, "title": section.title, "blocks": blocks}
 
 
 def _text(text: Text) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
+from pipeline.report.prose.references import has_publication
 from pipeline.sessions.estimators import build_estimator
 from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON
 from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES
@@ -41,7 +42,7 @@ def methods(study: Study, results: Mapping[str, Any], versions: Mapping[str, str
         *_tests(study, results["comparisons"]),
         *_intervals(results["descriptives"]),
         *_exclusions(study, results["exclusions"]),
-        *_software(versions),
+        computed_with(versions),
     ]
     return " ".join(sentences)
 
@@ -285,7 +286,11 @@ def _exclusions(study: Study, rows: Sequence[Row]) -> Iterator[str]:
         yield f"{counted(len(incomplete), 'participant')} lacked a value and {were} left out of those comparisons."
 
 
-def _software(versions: Mapping[str, str]) -> Iterator[str]:
-    listed = [f"{name} {version}" for name, version in versions.items() if name not in ("steadyhand", "Python")]
+def computed_with(versions: Mapping[str, str]) -> str:
+    """`Everything was computed with Steadyhand 0.1.0 on Python 3.11.7 (numpy 2.4.6, …)`: the packages to be cited.
+
+    Those that read logs or lay out pages are in provenance.json, as all are.
+    """
+    listed = [f"{name} {version}" for name, version in versions.items() if has_publication(name)]
     ours = f"Steadyhand {versions['steadyhand']}" if "steadyhand" in versions else "Steadyhand"
-    yield f"Everything was computed with {ours} on Python {versions['Python']} ({', '.join(listed)})."
+    return f"Everything was computed with {ours} on Python {versions['Python']} ({', '.join(listed)})."

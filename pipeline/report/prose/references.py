@@ -74,7 +74,7 @@ class Reference:
 
     @property
     def of_package(self) -> str:
-        """`numpy 2.3.5 (harris2020)`, or without a key where the package has no publication."""
+        """`numpy (harris2020)`, or without a key where the package has no publication."""
         return self.package + ("" if self.key.startswith(_PACKAGE) else f" ({self.key})")
 
     @property
@@ -194,14 +194,19 @@ def _source(study: Study) -> Reference | None:
     return Reference("misc", "study", fields, "the study's source")
 
 
+def has_publication(package: str) -> bool:
+    """Whether a package is cited by a publication of its own."""
+    return package in _OF_PACKAGE
+
+
 def _package(name: str, version: str, listed: Mapping[str, object]) -> Reference:
     """A package with its version: by its paper, or as a program where it has none or the paper is `listed` already."""
     key = _OF_PACKAGE.get(name)
     if key is not None and key not in listed:
         published = _with(entries()[key], name, note=f"{name}, version {version}")
-        return replace(published, package=f"{name} {version}")
+        return replace(published, package=name)
     fields = {"title": name, "version": version}
-    return Reference("software", f"{_PACKAGE}{name}", fields, "software", f"{name} {version}")
+    return Reference("software", f"{_PACKAGE}{name}", fields, "software", name)
 
 
 def escaped(text: str) -> str:

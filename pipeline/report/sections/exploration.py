@@ -12,7 +12,7 @@ import pandas as pd
 from pipeline.report.document.model import Block, Document, Notice, Paragraph, Section, Strong, Table, columns
 from pipeline.report.figures.exploration import ERROR, NAMES, TIME, outcome, participants
 from pipeline.report.sections.material import draw_now
-from pipeline.report.sections.provenance import libraries
+from pipeline.report.sections.provenance import program
 from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, Way
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row, records
@@ -54,7 +54,7 @@ def document(explored: Explored, drawn: Path) -> Document:
     ]
     if len(explored.tables["explore_differences"]):
         sections.append(Section("needed", "How many participants show a difference?", tuple(_needed(explored, drawn))))
-    sections.append(Section("how", "How this was explored", (_how(explored), libraries())))
+    sections.append(Section("how", "How this was explored", (_how(explored), program())))
     return Document("A better tracker or a better filter?", f"Study “{explored.name}”", ORIGIN, tuple(sections))
 
 

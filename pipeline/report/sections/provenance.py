@@ -9,6 +9,7 @@ from typing import Any
 from pipeline.engine.code_digest import versions
 from pipeline.engine.provenance import LIBRARIES
 from pipeline.report.document.model import Column, Folded, Paragraph, Section, Table
+from pipeline.report.prose.methods import computed_with
 from pipeline.report.sections.material import Material
 from pipeline.statistics import WILSON
 from pipeline.study.statistical_tests import TESTS
@@ -33,10 +34,9 @@ def statistics_libraries(results: Mapping[str, Any]) -> set[str]:
     return used
 
 
-def libraries(statistics: Iterable[str] = ()) -> Table:
+def program() -> Paragraph:
     """What made the report, in which version."""
-    titles = (Column("Name", False), Column("Version", False))
-    return Table("table-versions", "Program and libraries.", titles, tuple(used_versions(statistics).items()))
+    return Paragraph((computed_with(used_versions()),))
 
 
 def section(material: Material) -> Section:
@@ -44,14 +44,13 @@ def section(material: Material) -> Section:
     text = (
         f"Made by Steadyhand from the study folder “{material.name}”, {counted(len(material.inputs), 'file')}. Every"
         " number in this report is in results.json and in the tables folder beside it; provenance.json holds the"
-        " settings and the command."
+        " settings, the command and the version of every library."
     )
     return Section(
         "provenance",
         "Provenance",
         (
             Paragraph((text,)),
-            Folded("The program and its libraries", (libraries(statistics_libraries(material.results)),)),
             Folded("Digests of the files that were read", (_inputs(material),)),
         ),
     )

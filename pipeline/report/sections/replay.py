@@ -21,7 +21,7 @@ from pipeline.report.document.model import (
 )
 from pipeline.report.sections.accuracy import SMOOTHED_REMARK
 from pipeline.report.sections.material import ORIGINS, draw_now
-from pipeline.report.sections.provenance import libraries
+from pipeline.report.sections.provenance import program
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
@@ -58,7 +58,7 @@ def document(studies: Sequence[Row], results: Mapping[str, pd.DataFrame], drawn:
     left_out = _left_out(results["replay_exclusions"])
     if left_out is not None:
         sections.append(Section("exclusions", "Missing or excluded", (left_out,)))
-    sections.append(Section("provenance", "Provenance", (_studies(studies), libraries())))
+    sections.append(Section("provenance", "Provenance", (_studies(studies), program())))
     subtitle = f"Replay of {counted(len(studies), 'study', 'studies')}"
     return Document("Variants of estimators", subtitle, " ".join(origins), tuple(sections))
 

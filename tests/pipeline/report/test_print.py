@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pypdf import PdfReader
 
+from pipeline.report.document import pdf
 from pipeline.report.document.for_print import for_print
 from pipeline.report.document.model import (
     CrossReference,
@@ -40,8 +46,8 @@ def test_a_fold_is_a_line_that_says_where_the_rest_is() -> None:
         Pages("Participants", (Link("P01", "p01.html"),)),
     )
     assert [block.text for block in section.blocks if isinstance(block, Paragraph)] == [
-        ("Each session's lights (Table 1 in the annex)",),
-        ("What arrived when (figures/a.svg in report.html)",),
+        ("Each session's lights (Table 1 in the annex).",),
+        ("What arrived when (figures/a.svg in report.html).",),
     ]
     assert len(section.blocks) == 2
     assert annex.blocks == (a_table("lights", 3),)
@@ -97,3 +103,31 @@ def test_the_annex_never_outgrows_two_pages_and_says_what_it_left_out(lengths: l
     longest_cut = max((len(by_id[t.id].rows) for t in tables if len(by_id[t.id].rows) < len(t.rows)), default=0)
     shortest_whole = [len(t.rows) for t in tables if len(by_id[t.id].rows) == len(t.rows)]
     assert all(rows <= longest_cut + 1 for rows in shortest_whole) or not longest_cut
+
+
+@pytest.mark.parametrize("paragraphs", range(24, 38, 2))
+def test_a_table_that_goes_over_a_page_leaves_no_row_alone(paragraphs: int, tmp_path: Path) -> None:
+    words = tuple(Paragraph(("Words before the table.",)) for _ in range(paragraphs))
+    rows = tuple((f"row{at}", "2.5") for at in range(23))
+    table = Table("t", "What is in it.", columns(("Name", "Value"), 1), rows)
+    pdf.render(Document("d", "", "", (Section("s", "S", (*words, table)),)), tmp_path, tmp_path / "r.pdf")
+    texts = [page.extract_text() for page in PdfReader(tmp_path / "r.pdf").pages]
+    counts = [len(re.findall(r"row\d+", text)) for text in texts]
+    assert sum(counts) == len(rows)
+    assert min(count for count in counts if count) >= 3
+    captioned = next(at for at, text in enumerate(texts) if "What is in it." in text)
+    assert counts[captioned] >= 3
+    assert not any(counts[:captioned])
+
+
+def test_words_after_a_figure_fill_the_page_on_which_it_does_not_fit(tmp_path: Path) -> None:
+    size = 'width="500pt" height="400pt"'
+    (tmp_path / "a.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {size}></svg>', encoding="utf-8")
+    words = tuple(Paragraph((f"Line {at} of words.",)) for at in range(40))
+    figure = Figure("f", "a.svg", "A caption.", "A")
+    first = Section("summary", "Summary", (Paragraph(("The answer.",)),))
+    second = Section("s", "S", (*words[:25], figure, *words[25:]))
+    pdf.render(Document("d", "", "", (first, second)), tmp_path, tmp_path / "r.pdf")
+    before, after = (page.extract_text() for page in PdfReader(tmp_path / "r.pdf").pages)
+    assert "A caption." in after
+    assert "Line 26 of words." in before

@@ -42,3 +42,10 @@ def test_a_report_names_what_computed_its_statistics(
 
 def test_every_library_of_a_test_is_one_that_can_be_named() -> None:
     assert {name for test in TESTS.values() for name in test.libraries} == set(OF_STATISTICS)
+
+
+def test_the_versions_of_the_libraries_are_said_once(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    page = read(steadyhand, study(tmp_path / "s", TIMES, ["measure: time_s, test: t_paired"]))
+    assert page.count(version("numpy")) == page.count(f"numpy {version('numpy')}") == 1
+    provenance = (steadyhand.out / "provenance.json").read_text(encoding="utf-8")
+    assert all(version(name) in provenance for name in ("numpy", "orjson", "typst"))
