@@ -25,15 +25,15 @@ LINES_MAX = 12
 """As many lines fit on the first page, with all else that belongs there."""
 
 _RATIOS = ("odds ratio", "rate ratio")
-_SIGNED = ("Cohen's d_z", "Cohen's d_av", "matched-pairs rank-biserial", "rank-biserial")
 
 HEADER = ("Measure", "Pair", "Means", "Difference [95 % interval]", "Effect size", "p")
 
 
 @dataclass(frozen=True)
 class Line:
-    """One pair in one measure, as text. `pair` is `fusion − kinect`: differences are the first named minus the other.
+    """One pair in one measure, as text. `pair` is `kinect − fusion`: differences are the first named minus the other.
 
+    So they have the sign that they have in results.json, in the figures and in the other tables.
     `significant` is None where the test is undefined.
     """
 
@@ -171,27 +171,14 @@ def _line(
     first, second = pair
     row = with_difference(row, described.get((row["measure"], first)))
     name = measure_label(row["measure"]) + (f", {test_label(row)}" if names_test else "")
-    compared = f"{second} {MINUS} {first}"
+    compared = f"{first} {MINUS} {second}"
     means = _means(row, described.get((row["measure"], first)), described.get((row["measure"], second)))
     if row["status"] != OK:
         return Line(name, compared, means, f"{test_label(row)}: {row['status']}", NO_VALUE, NO_VALUE, None)
     p = decisive_p(row)
-    size = NO_VALUE if row["effect_size_name"] in (RATIO, "estimate") else effect_size(_of_second_minus_first(row))
+    size = NO_VALUE if row["effect_size_name"] in (RATIO, "estimate") else effect_size(row)
     significant = None if p is None else p < alpha
-    return Line(name, compared, means, _difference(row, bool(significant)), size, p_value(p), significant)
-
-
-def _of_second_minus_first(row: Row) -> Row:
-    """The row with its effect size the other way round, where that has a sign."""
-    if row["effect_size_name"] in _RATIOS and row["effect_size"] is not None:
-        low, high = (1 / bound if bound else None for bound in (row["ci_high"], row["ci_low"]))
-        if row["effect_size"] == 0:  # the ratio is infinite this way round, as a division by nobody is
-            return {**row, "effect_size": None}
-        return {**row, "effect_size": 1 / row["effect_size"], "ci_low": low, "ci_high": high}
-    if row["effect_size_name"] not in _SIGNED or row["effect_size"] is None:
-        return row
-    low, high = (None if bound is None else -bound for bound in (row["ci_high"], row["ci_low"]))
-    return {**row, "effect_size": -row["effect_size"], "ci_low": low, "ci_high": high}
+    return Line(name, compared, means, _difference(row, pair, bool(significant)), size, p_value(p), significant)
 
 
 def _means(row: Row, one: Row | None, other: Row | None) -> str:
@@ -211,32 +198,31 @@ def _means(row: Row, one: Row | None, other: Row | None) -> str:
     return f"{number(first)} → {number(second)} {unit}".strip()
 
 
-def _difference(row: Row, significant: bool) -> str:
-    """`−11.80 s [−19.28, −4.32], 26.7 % lower (better)`, or `× 0.81` where geometric means are compared.
+def _difference(row: Row, pair: tuple[str, str], significant: bool) -> str:
+    """`11.80 s [4.32, 19.28]; fusion 26.7 % lower (better)`, or `fusion = 0.81 × kinect` of geometric means.
 
     "Better" and "worse" are said of significant differences only.
     """
+    first, second = pair
     details, unit = row["details"] or {}, measure(row["measure"]).unit
     if details.get("ratio_to_first") is not None:
-        bounds = interval(*details["ratio_to_first_ci"])
-        return f"× {number(details['ratio_to_first'])} {'' if bounds == NO_VALUE else bounds}".strip()
+        ratio = f"{second} = {number(details['ratio_to_first'])} × {first}"
+        return _with_bounds(ratio, details["ratio_to_first_ci"])
     if row["mean_difference"] is None:
         if row["effect_size_name"] != "estimate" or row["effect_size"] is None:
             return NO_VALUE
-        return _signed(row["effect_size"], (row["ci_low"], row["ci_high"]), unit)
-    amount = _signed(row["mean_difference"], details.get("ci_difference") or (None, None), unit)
+        return _with_bounds(f"{number(row['effect_size'])} {unit}".strip(), (row["ci_low"], row["ci_high"]))
+    amount = f"{number(row['mean_difference'])} {unit}".strip()
+    amount = _with_bounds(amount, details.get("ci_difference") or (None, None))
     if row["mean_difference"] == 0:
         return amount
     reduction = meaningful_reduction(row)
     share = "" if reduction is None else f"{percent(abs(reduction))} "
     side = direction(row) if significant else direction(row).partition(" ")[0]
-    return f"{amount}, {share}{side}"
+    return f"{amount}; {second} {share}{side}"
 
 
-def _signed(first_minus_second: float, bounds: Sequence[float | None], unit: str) -> str:
-    """The second minus the first, with its unit and interval."""
-    low, high = bounds
-    value = number(-first_minus_second or 0.0)
-    sign = "+" if first_minus_second < 0 else ""
-    text = f"{sign}{value} {unit}".strip()
-    return text if low is None or high is None else f"{text} {interval(-high or 0.0, -low or 0.0)}"
+def _with_bounds(text: str, bounds: Sequence[float | None]) -> str:
+    """The text with its interval, where it has one."""
+    shown = interval(*bounds)
+    return text if shown == NO_VALUE else f"{text} {shown}"

@@ -42,7 +42,7 @@ from pipeline.words.comparison import EFFECTS_OF_CONDITION, decisive_p
 from pipeline.words.effect_sizes import ratio_to_first
 from pipeline.words.evidence import statistic
 from pipeline.words.names import adjustment_label, measure_label, short_label, unit_of, was
-from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_phrase
+from pipeline.words.numbers import NO_VALUE, interval, number, p_phrase
 from pipeline.words.phrases import counted, listing, participants_counted
 from pipeline.words.sentences import brief_sentence, verdict
 
@@ -256,8 +256,8 @@ def _key_figure(row: Row) -> KeyFigure:
         return KeyFigure(f"× {number(row['details']['ratio_to_first'])}", label, evidence)
     if row["mean_difference"] is None:
         return KeyFigure(p, label, f"{statistic(row)}, n = {row['n']}")
-    sign = MINUS if row["mean_difference"] >= 0 else "+"
-    return KeyFigure(f"{sign}{amount_of_change(row)}", label, evidence)
+    side = direction(row).partition(" ")[0] if row["mean_difference"] else ""
+    return KeyFigure(f"{amount_of_change(row)} {side}".strip(), label, evidence)
 
 
 def _further_results(material: Material) -> list[Text]:

@@ -164,7 +164,7 @@ def test_the_direction_is_that_of_the_difference(tmp_path: Path, steadyhand: Ste
     shutil.copytree(CASES / "signed", tmp_path / "signed")
     ran = steadyhand("report", tmp_path / "signed")
     assert ran.code == 0
-    assert re.search(r"−0\.50 → 0\.39 +\+0\.89 \[.*\], higher ", ran.out)
+    assert re.search(r"−0\.50 → 0\.39 +−0\.89 \[.*\]; fusion higher ", ran.out)
     page = (steadyhand.out / "report.html").read_text(encoding="utf-8")
     assert "0.89 higher with fusion than with kinect" in page
     assert "176.7" not in page

@@ -11,6 +11,8 @@ import pytest
 from scipy import stats
 
 from pipeline.report.prose.answer import HEADER, Line, answer, lines_for_first_page
+from pipeline.words.comparison import test_label as label_of_test
+from pipeline.words.effect_sizes import effect_size
 from tests.pipeline.analysis.test_options import Values, study
 from tests.pipeline.helpers import Steadyhand, as_printed
 
@@ -35,21 +37,35 @@ def lines_of(steadyhand: Steadyhand, folder: Path) -> list[Line]:
 def test_of_three_conditions_the_baseline_is_compared_with_each_other(steadyhand: Steadyhand, tmp_path: Path) -> None:
     first, second = lines_of(steadyhand, study(tmp_path / "s", THREE, ["measure: time_s, test: t_paired"]))
     a, b = np.array(THREE["time_s"]["a"]), np.array(THREE["time_s"]["b"])
-    test = stats.ttest_rel(b, a)
+    test = stats.ttest_rel(a, b)
     bounds = test.confidence_interval()
-    assert (first.measure, first.pair, second.pair) == ("Time (s)", "b − a", "c − a")
+    assert (first.measure, first.pair, second.pair) == ("Time (s)", "a − b", "a − c")
     assert first.means == f"{a.mean():.2f} → {b.mean():.2f} s"
-    low, high = (f"−{abs(bound):.2f}" for bound in (bounds.low, bounds.high))
+    low, high = (f"{bound:.2f}" for bound in (bounds.low, bounds.high))
     share = f"{100 * (1 - b.mean() / a.mean()):.1f} %"
-    assert first.difference == f"−{abs(np.mean(b - a)):.2f} s [{low}, {high}], {share} lower"
-    assert first.effect_size.startswith(f"d_z = −{abs(np.mean(b - a) / np.std(b - a, ddof=1)):.2f} [")
+    assert first.difference == f"{np.mean(a - b):.2f} s [{low}, {high}]; b {share} lower"
+    assert first.effect_size.startswith(f"d_z = {np.mean(a - b) / np.std(a - b, ddof=1):.2f} [")
     assert first.p == f"{test.pvalue:.4f}".removeprefix("0")
 
 
+def test_a_line_has_the_signs_of_the_results(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    """The same pair has one difference and one effect size on the first page, in the table, in words and in JSON."""
+    folder = study(tmp_path / "s", THREE, ["measure: time_s, test: wilcoxon", "measure: time_s, test: t_paired"])
+    lines = {(line.measure, line.pair): line for line in lines_of(steadyhand, folder)}
+    rows = [
+        row for row in steadyhand.results()["comparisons"] if row["contrast"] and row["contrast"].startswith("a - ")
+    ]
+    assert len(rows) == len(lines) == 4
+    for row in rows:
+        line = lines[f"Time (s), {label_of_test(row)}", row["contrast"].replace("-", "−")]
+        assert line.difference.startswith(f"{row['mean_difference']:.2f} s".replace("-", "−"))
+        assert line.effect_size == effect_size(row)
+
+
 def test_study_yaml_may_name_the_pairs(steadyhand: Steadyhand, tmp_path: Path) -> None:
-    """In either order: a difference is the later condition minus the earlier."""
+    """In either order: a difference is the earlier condition minus the later, as in every table."""
     folder = study(tmp_path / "s", THREE, ["measure: time_s, test: t_paired"], "question: [[c, b]]\n")
-    assert [line.pair for line in lines_of(steadyhand, folder)] == ["c − b"]
+    assert [line.pair for line in lines_of(steadyhand, folder)] == ["b − c"]
 
 
 @pytest.mark.parametrize(
@@ -67,7 +83,7 @@ def test_a_pair_that_cannot_be_is_an_error(steadyhand: Steadyhand, tmp_path: Pat
 def test_pairs_after_an_analysis_of_all_conditions_answer(steadyhand: Steadyhand, tmp_path: Path) -> None:
     folder = study(tmp_path / "s", THREE, ["measure: time_s, test: rm_anova"])
     ran = steadyhand("compare", folder)
-    assert [line.pair for line in answer(steadyhand.results())] == ["b − a", "c − a"]
+    assert [line.pair for line in answer(steadyhand.results())] == ["a − b", "a − c"]
     assert "see the report" not in ran.out
     assert "F(2, 10)" in ran.out
 
@@ -106,7 +122,7 @@ def test_means_of_other_people_than_those_tested_are_not_shown(steadyhand: Stead
     """They could contradict the difference: here they rise by 1.25, while everybody who met both is faster by 1."""
     values = {"time_s": {"a": [10.0, 11, 12, 4], "b": [9.0, 10.1, 10.9]}}
     (line,) = lines_of(steadyhand, study(tmp_path / "s", values, ["measure: time_s, test: t_paired"]))
-    assert line.difference.startswith("−1.00 s")
+    assert line.difference.startswith("1.00 s")
     assert line.means == "–"
 
 
@@ -141,7 +157,7 @@ def test_the_first_page_has_the_lines_as_a_table(steadyhand: Steadyhand, tmp_pat
 
 
 def test_too_many_lines_are_cut_between_measures() -> None:
-    lines = [Line(name, pair, "", "", "", "", None) for name in ("m", "n", "o") for pair in ("b − a", "c − a")]
+    lines = [Line(name, pair, "", "", "", "", None) for name in ("m", "n", "o") for pair in ("a − b", "a − c")]
     assert [line.measure for line in lines_for_first_page(lines, most=5)] == ["m", "m", "n", "n"]
     assert [line.measure for line in lines_for_first_page(lines, most=1)] == ["m", "m"]
     assert lines_for_first_page(lines) == lines
