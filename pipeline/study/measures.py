@@ -57,6 +57,7 @@ class Questionnaire:
     cite: tuple[str, ...] = ()
     has_total: bool = False
     score_labels: Mapping[str, str] = field(default_factory=dict)
+    score_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 _FITTS = ("soukoreff2004", "iso9241411")
@@ -113,8 +114,16 @@ QUESTIONNAIRES: Mapping[str, Questionnaire] = {
                 "raw_tlx": "raw score (0–100)",
                 "weighted_tlx": "weighted score (0–100)",
             },
+            score_limits={"raw_tlx": (0, 100), "weighted_tlx": (0, 100)},
         ),
-        Questionnaire("sus", "SUS", better="higher", cite=("brooke1996",), score_labels={"score": "score (0–100)"}),
+        Questionnaire(
+            "sus",
+            "SUS",
+            better="higher",
+            cite=("brooke1996",),
+            score_labels={"score": "score (0–100)"},
+            score_limits={"score": (0, 100)},
+        ),
         Questionnaire(
             "ueq",
             "UEQ",
@@ -186,6 +195,13 @@ def _rating(name: str, questionnaire: str, scale: str) -> Measure:
 def has_total(questionnaire: str) -> bool:
     """Whether the plain sum of its scales is customarily reported."""
     return questionnaire in QUESTIONNAIRES and QUESTIONNAIRES[questionnaire].has_total
+
+
+def score_limits(name: str) -> tuple[float, float] | None:
+    """The lowest and the highest value that a questionnaire's score can have; None where that is not known."""
+    questionnaire, _, scale = name.partition("/")
+    known = QUESTIONNAIRES.get(questionnaire)
+    return known.score_limits.get(scale) if known else None
 
 
 def reported_scales(questionnaire: str) -> tuple[str, ...]:

@@ -20,8 +20,20 @@ from tests.browser.studies import written
 WIDTHS = {390: 844, 768: 1024, 1280: 900}
 _CHECKS = (Path(__file__).parent / "checks.js").read_text(encoding="utf-8")
 _FAULTY = """<!doctype html><html lang="en"><title>Faulty</title><main><h1>Faulty</h1><img src="http://127.0.0.1:9/a.png">
-<div style="width: 3000px">wide</div></main><script>console.error("faulty"); throw new Error("thrown")</script>"""
-_MUST_BE_FOUND = ("px wide", "a request leaves", "the console", "an exception")
+<div style="width: 3000px">wide</div><table><tr><td>loose</td></tr></table>
+<p>First words</p><p style="margin-top: -2.2rem">Second words</p>
+<details class="folded" open><summary>Fold</summary><figure id="f"></figure></details></main>
+<script>console.error("faulty"); throw new Error("thrown")</script>"""
+_MUST_BE_FOUND = (
+    "px wide",
+    "a request leaves",
+    "the console",
+    "an exception",
+    "in no part that scrolls",
+    "overprinted",
+    "open before anybody asked",
+    "not all are printed",
+)
 
 
 def check(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
@@ -48,6 +60,10 @@ def _at_width(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
         yield from opened.evaluate("tracesFaults()")
     else:
         yield from opened.evaluate("sortingFaults()")
+        yield from opened.evaluate("foldFaults()")
+        yield from opened.evaluate("copyFaults()")
+        yield from opened.evaluate("overprintFaults()")
+    yield from opened.evaluate("scrollFaults()")
     yield from opened.evaluate("overflowFaults()")
     if checker is not None:
         opened.evaluate(f"{checker};0")

@@ -15,6 +15,84 @@ function overflowFaults() {
   return [`the page is ${root.scrollWidth} px wide in a window of ${root.clientWidth}: ${wide.join(", ")}`];
 }
 
+// Every table stands in a part that scrolls; where it is wider, shadows at its edges and the keyboard lead to what is hidden.
+function scrollFaults() {
+  const faults = [], loose = [...document.querySelectorAll("main table")].filter((table) => !table.closest(".scroll"));
+  if (loose.length) faults.push(`${loose.length} tables in no part that scrolls`);
+  for (const part of document.querySelectorAll(".scroll")) {
+    if (!part.clientWidth || part.scrollWidth <= part.clientWidth) continue; // folded away, or whole
+    const style = getComputedStyle(part), name = part.getAttribute("aria-label");
+    if (style.overflowX !== "auto" || part.tabIndex !== 0 || !name) faults.push(`${name}: hidden columns without a way to them`);
+    if (!part.querySelector("img") && !style.backgroundImage.includes("gradient")) faults.push(`${name}: no edge says that it goes on`);
+    part.scrollLeft = part.scrollWidth;
+    const last = [...part.querySelectorAll("thead th")].pop(), edge = part.getBoundingClientRect().right;
+    if (last && last.getBoundingClientRect().right > edge + 1) faults.push(`${name}: its last column is never seen`);
+    part.scrollLeft = 0;
+  }
+  return faults;
+}
+
+// What is folded away opens by a link into it and for print, and is folded again afterwards.
+async function foldFaults() {
+  const folds = [...document.querySelectorAll("details.folded")], faults = [];
+  if (!folds.length) return faults;
+  if (folds.some((fold) => fold.open)) faults.push("folds: one is open before anybody asked");
+  const inside = folds[0].querySelector("figure[id]");
+  location.hash = inside.id;
+  if (!(await settled(() => folds[0].open))) faults.push(`folds: a link to ${inside.id} does not open it`);
+  folds[0].open = false;
+  dispatchEvent(new Event("beforeprint"));
+  if (!folds.every((fold) => fold.open)) faults.push("folds: not all are printed");
+  dispatchEvent(new Event("afterprint"));
+  if (folds.some((fold) => fold.open)) faults.push("folds: still open after print");
+  folds[0].querySelector("summary").click();
+  if (!folds[0].open) faults.push("folds: a click does not open one");
+  folds[0].open = false;
+  return faults;
+}
+
+// The button copies the words of its block without links to rows, and says so; where it may not, it says what to do.
+async function copyFaults() {
+  const faults = [], given = Object.getOwnPropertyDescriptor(navigator, "clipboard");
+  let copied = null, allowed = true;
+  const writeText = async (text) => { if (!allowed) throw new Error("not allowed"); copied = text; };
+  Object.defineProperty(navigator, "clipboard", { value: { writeText }, configurable: true });
+  for (const block of document.querySelectorAll(".paste")) {
+    const button = block.querySelector("button.copy"), name = block.getAttribute("aria-label");
+    if (button.hidden) { faults.push(`copy, ${name}: no button`); continue; }
+    [copied, allowed] = [null, true];
+    button.click();
+    if (!(await settled(() => button.textContent === "Copied"))) faults.push(`copy, ${name}: nothing is said`);
+    const bare = (text) => text.replace(/\s/g, ""), first = bare(block.querySelector(".words p").textContent).slice(0, 10);
+    if (!copied || !bare(copied).startsWith(first) || /\[row\]| [,.;]|  /.test(copied)) faults.push(`copy, ${name}: "${copied}"`);
+    if (copied && copied.split("\n\n").length !== block.querySelectorAll(".words p").length) faults.push(`copy, ${name}: paragraphs are lost`);
+    [allowed, button.textContent] = [false, "Copy"];
+    button.click();
+    if (!(await settled(() => button.textContent !== "Copy"))) faults.push(`copy, ${name}: a refusal is passed over`);
+    if (document.querySelector("body > textarea")) faults.push(`copy, ${name}: its field stays`);
+  }
+  if (given) Object.defineProperty(navigator, "clipboard", given); else delete navigator.clipboard;
+  return faults;
+}
+
+// Words of a page that lie over others: of each table's cells, and of headings and paragraphs beside one another.
+function overprintFaults() {
+  const faults = [], blocks = [...document.querySelectorAll("main h2, main p, main figcaption, main th, main td, main dt, main dd")];
+  const boxes = blocks.filter((one) => one.textContent.trim() && one.offsetParent).map((one) => {
+    const range = document.createRange();
+    range.selectNodeContents(one);
+    return [one, range.getBoundingClientRect()];
+  });
+  boxes.forEach(([one, box], at) => {
+    for (const [other, next] of boxes.slice(at + 1, at + 4)) {
+      if (one.contains(other) || getComputedStyle(one).position === "sticky" || one.closest("details") !== other.closest("details")) continue;
+      const [across, down] = [Math.min(box.right, next.right) - Math.max(box.left, next.left), Math.min(box.bottom, next.bottom) - Math.max(box.top, next.top)];
+      if (across > 2 && down > 4) faults.push(`overprinted: "${one.textContent.slice(0, 20)}" and "${other.textContent.slice(0, 20)}"`);
+    }
+  });
+  return faults.slice(0, 3);
+}
+
 function sortingFaults() {
   const table = [...document.querySelectorAll("main table")].find((one) => one.querySelector("thead .number button"));
   if (!table) return [];

@@ -2,7 +2,7 @@
 
 Words come as plain text ("t(11) = 2.52, p = .0286, d_z = 0.73"), the same that is said on the console. What is set
 otherwise is found here, by the few forms that statistics have (APA 7, 6.44), and by nothing that only looks like them:
-a letter counts where a value or degrees of freedom follow it.
+a letter counts where a value or degrees of freedom follow it, and p, W₊, "t test" and "n:" also in words.
 """
 
 from __future__ import annotations
@@ -23,10 +23,16 @@ _RELATION = re.compile(
 )
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|mm|cm|px|ms|s|Hz)(?!\w))")
 _INTERVAL = re.compile(r"\[[−+]?[\d.][^][, ]*, [−+]?[\d.][^][, ]*\]")  # both bounds stay on one line
+_P_IN_WORDS = (  # not every p, which may be somebody's name of something
+    r"p(?= values?\b| adjusted\b| corrected\b| made\b| \((?:Holm|[A-Z])|: (?:not )?adjusted)"
+    r"|(?<=adjusted )p(?!\w)|(?<=corrected )p(?!\w)|(?<=Geisser )p(?!\w)|(?<=small )p(?!\w)|(?<=Wilk's )p(?!\w)"
+    r"|(?<=The )p(?= below)|(?<=\. )p(?= is the probability)|(?<=: )p(?= of \d)"
+)
 _SYMBOL = re.compile(
     rf"(?<![\w-])(?P<letter>{_LETTER})(?=₊?{_FREEDOM}[ {_NO_BREAK}][=<>]|₊?{_NO_BREAK}[=<>≥≤])"
     r"|(?<![\w-])(?P<effect>[dr])_(?P<of>rb|rm|av|z|s)(?!\w)"
     r"|(?P<share>[ηω])(?P<squared>²)_?(?P<kind>[Gp])(?!\w)"
+    rf"|(?<![\w-])(?P<alone>{_P_IN_WORDS}|W₊|t(?= tests?\b| intervals?\b)|n(?=: \w))"
 )
 _HEADINGS = frozenset(("n", "p", "W", "SD", "df", "M"))
 
@@ -51,7 +57,10 @@ def _runs(text: str) -> Iterator[Run]:
     done = 0
     for match in _SYMBOL.finditer(text):
         yield Run(text[done : match.start()])
-        if match["letter"]:
+        if match["alone"]:
+            yield Run(match["alone"][0], "italic")
+            yield Run(match["alone"][1:])
+        elif match["letter"]:
             yield Run(match["letter"], "italic")
         elif match["effect"]:
             yield Run(match["effect"], "italic")

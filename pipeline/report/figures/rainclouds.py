@@ -29,6 +29,7 @@ from pipeline.report.figures.style import (
 from pipeline.report.figures.wording import complete_counts, listed, mean_with_interval, spaced
 from pipeline.statistics import T_OF_SHARES, WILSON, T
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.measures import score_limits
 from pipeline.words.names import measure_label, short_label, unit_of
 from pipeline.words.numbers import MINUS, number
 from pipeline.words.phrases import counted
@@ -144,7 +145,8 @@ def paired(wide: pd.DataFrame, measure: str, shares: bool = False) -> Figure:
 def _scales_words(wide: Mapping[str, pd.DataFrame]) -> Words:
     """How many participants there are, and in which scale the conditions differ most."""
     conditions = next(iter(wide.values())).columns
-    head = f"All scales by participant ({complete_counts(wide)}), drawn like the measures above."
+    what = "All scales" if len(wide) > 1 else short_label(next(iter(wide)))
+    head = f"{what} by participant ({complete_counts(wide)}), drawn like the measures above."
     alt = f"One panel of rainclouds per scale: {listed(short_label(name) for name in wide)}."
     if len(conditions) > 1:
         furthest = _furthest(wide)
@@ -164,8 +166,9 @@ def _furthest(wide: Mapping[str, pd.DataFrame]) -> str:
     measure, (apart, means) = max(spread.items(), key=lambda item: item[1][0])
     if apart == 0:
         return "The means are the same in every scale."
+    where = f"differ most in {short_label(measure).lower()}" if len(wide) > 1 else "are"
     return (
-        f"The means differ most in {short_label(measure).lower()}: {number(means.max())} under {means.idxmax()},"
+        f"The means {where}: {number(means.max())} under {means.idxmax()},"
         f" {number(means.min())} under {means.idxmin()}."
     )
 
@@ -180,7 +183,13 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
         axes.set_title(f"{as_label(short_label(measure), 24)} (n = {len(table.dropna())})")
         if index % across == 0:
             axes.set_ylabel("Rating")
-    _from_zero(every[0], wide.values())
+    limits = {score_limits(name) for name in wide}
+    known = limits.pop() if len(limits) == 1 else None
+    if known is None:
+        _from_zero(every[0], wide.values())
+    else:
+        low, high = known
+        every[0].set_ylim(low, high + 0.04 * (high - low))  # room for a mark at the highest score
     return figure
 
 

@@ -117,8 +117,8 @@ def multiples(
 
     Axes are labelled at the left and at the bottom, also in a panel above a place that stays empty.
     """
-    across = min(count, a_row)
-    down = -(-count // across)
+    down = -(-count // a_row)
+    across = -(-count // down)  # four by three a row are two and two, not three and one
     shared: dict[str, Any] = {"sharex": True, "sharey": True} | options
     figure, every = panels(down, across, 0.6 + row_height * down, **shared)
     for axes in every:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Folded, Paragraph, Section, Strong, Table, columns
-from pipeline.report.sections.cautions import contradicted
+from pipeline.report.sections.cautions import contradicted, not_ranked
 from pipeline.report.sections.material import Material
 from pipeline.sessions.checks.finding import of
 from pipeline.sessions.estimators import fusing
@@ -123,7 +123,7 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         else f"Distance of each estimator from {standard}"
     )
     reading_help = (
-        "Lower is better in all columns but the third, which should be near 95 %."
+        "Less RMSE and jitter is better, a lag near zero, and a share near 95 % in the interval."
         if has_reference
         else "No column says which estimator is best."
     )
@@ -182,9 +182,11 @@ def _session_table(rows: list[Row], alone: Mapping[str, Sequence[str]]) -> Table
 
 def _over_sessions(material: Material, rows: pd.DataFrame) -> list[Block]:
     """Error and lag by estimator, one against the other, and the stated SD against what happened."""
-    blocks: list[Block] = [material.drawn("accuracy", figures.errors, rows, contradicted(material))]
+    blocks: list[Block] = []
+    if material.rows("comparisons"):  # else it stands on the first page
+        blocks.append(material.drawn("accuracy", figures.errors, rows, not_ranked(material)))
     if rows["lag_s"].notna().any():
-        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, rows, contradicted(material)))
+        blocks.append(material.drawn("lag-and-error", figures.lag_and_error, rows, not_ranked(material)))
     counts = material.table("calibration")
     if len(counts):
         blocks.append(material.drawn("calibration", figures.calibration, counts))
@@ -199,7 +201,7 @@ def _session_figures(material: Material) -> list[Block]:
     if len(excerpts):
         blocks.append(material.drawn("streams", figures.streams, excerpts))
     if (excerpts["kind"] == "estimate").any():
-        blocks.append(material.drawn("estimates", figures.estimates, excerpts, contradicted(material)))
+        blocks.append(material.drawn("estimates", figures.estimates, excerpts, not_ranked(material)))
         blocks += _overlaid(material, excerpts)
     if len(curves):
         drawn = material.drawn("lead", figures.lead, curves, _lags_in(material, str(curves["session"].iloc[0])))

@@ -36,6 +36,11 @@ def contradicted(material: Material) -> str:
     )
 
 
+def not_ranked(material: Material) -> str:
+    """The same in a few words, for captions below the table that says why. Empty where estimators are ranked."""
+    return "Which is best is not said, for the reason above." if contradicted(material) else ""
+
+
 def cautions(material: Material) -> list[Text]:
     """All cautions, the gravest first: what contradicts the data, where they come from, assumptions, design, gaps."""
     return [

@@ -210,7 +210,8 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
     if tested:
         blocks.append(_tests_table(questionnaire, title, tested))
     called = f"ratings-{safe_name(questionnaire)}"
-    blocks.append(material.drawn(called, figures.workload, wide))
+    if len(wide) > 1:  # of a single score the figure of people has the same
+        blocks.append(material.drawn(called, figures.workload, wide))
     blocks.append(material.drawn(f"{called}-people", figures.scales, wide))
     return blocks
 
@@ -278,5 +279,5 @@ def _shown_at_selection(material: Material) -> Table:
         "aimed with what was displayed, so the displayed estimator has an advantage.",
         columns(titles, 2),
         cells,
-        '"recorded" is where the participants selected.',
+        "“recorded” is where the participants selected.",
     )

@@ -33,20 +33,20 @@ from pipeline.report.prose.answer import (
 )
 from pipeline.report.sections import overview_estimators, preregistration, traces
 from pipeline.report.sections.cautions import cautions
-from pipeline.report.sections.material import ORIGINS, Material
-from pipeline.study.measures import headlines
+from pipeline.report.sections.material import Material
+from pipeline.statistics import OK
+from pipeline.study.measures import headlines, measure
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.change import amount_of_change, difference_phrase, direction
-from pipeline.words.comparison import EFFECTS_OF_CONDITION, decisive_p
+from pipeline.words.comparison import EFFECTS_OF_CONDITION, decisive_p, test_label
 from pipeline.words.effect_sizes import ratio_to_first
 from pipeline.words.evidence import statistic
-from pipeline.words.names import adjustment_label, measure_label, short_label, unit_of, was
+from pipeline.words.names import adjustment_label, measure_as_subject, measure_label, short_label, unit_of, was
 from pipeline.words.numbers import NO_VALUE, interval, number, p_phrase
 from pipeline.words.phrases import counted, listing, participants_counted
 from pipeline.words.sentences import brief_sentence, verdict
 
-_KEY_FIGURES_MAX = 3
 _SENTENCES = 2
 _FURTHER_MAX = 8  # on the first page, below the table of pairs
 
@@ -62,7 +62,7 @@ def section(material: Material) -> Section:
         blocks.append(KeyFigures(tuple(keys)))
     blocks += _pairs(material)
     blocks += _figure(material)
-    blocks.append(Paragraph(_data(material)))
+    blocks += [Paragraph(text) for text in (_data(material),) if text]
     blocks += preregistration.notice(material)
     careful = cautions(material)
     if careful:
@@ -98,7 +98,7 @@ def _pairs(material: Material) -> list[Block]:
 
 def _answer(material: Material) -> Text:
     """Two sentences: on the two measures people look for first, or else on the ratings, or else on the estimators."""
-    rows = _headline_rows(material)[:_SENTENCES]
+    rows = _headline_rows(material)[:_SENTENCES] or _only_score(material)
     if rows:
         lead, *others = [_sentence(material, row) for row in rows]
         return (Strong(lead), *(f" {other}" for other in others))
@@ -108,9 +108,16 @@ def _answer(material: Material) -> Text:
     return overview_estimators.answer(material)
 
 
+def _only_score(material: Material) -> list[Row]:
+    """The comparison of a study that has one score of one questionnaire, such as that of SUS, and nothing else."""
+    rows = [row for row in _of_conditions(material) if TESTS[row["test"]].tests_difference]
+    return [with_difference(row, None) for row in rows] if len(rows) == 1 else []
+
+
 def _sentence(material: Material, row: Row) -> str:
     """The result of a comparison of the conditions, with the means and their intervals."""
-    label = short_label(row["measure"])
+    name = row["measure"]
+    label = measure_as_subject(name) if measure(name).questionnaire else short_label(name)
     if row["status"] != "ok":
         return f"{label}: {brief_sentence(row)}."
     study, p = material.study, decisive_p(row)
@@ -194,11 +201,14 @@ def _of_people(material: Material, measure: str, wide: pd.DataFrame) -> Figure:
 
 
 def _data(material: Material) -> Text:
-    """Where the data come from."""
-    logs = f" {counted(len(material.sessions), 'session')} of raw sensor logs." if material.sessions else ""
+    """How many logs there are, and the source; what kind of data it is stands above the title."""
     source = material.study.citation.strip()
-    kind, _, what = ORIGINS[material.study.data_origin].partition(": ")
-    return (Strong(f"{kind}: "), what, logs, f" Source: {source}" if source else "")
+    parts: list[str | Strong] = []
+    if material.sessions:
+        parts += [Strong("Data: "), f"{counted(len(material.sessions), 'session')} of raw sensor logs. "]
+    if source:
+        parts += [Strong("Source: "), source]
+    return tuple(parts)
 
 
 def _question(material: Material) -> Text:
@@ -242,14 +252,12 @@ def _key_figures(material: Material) -> list[KeyFigure]:
     """Up to three large figures; none of more than two conditions, where no single figure is the answer."""
     if len(material.study.conditions) > 2 and material.rows("comparisons"):
         return []
-    keys = [_key_figure(row) for row in _headline_rows(material)]
-    return (keys or overview_estimators.key_figures(material))[:_KEY_FIGURES_MAX]
+    keys = [_key_figure(row) for row in _headline_rows(material) if row["status"] == OK]
+    return (keys or overview_estimators.key_figures(material))[: overview_estimators.KEY_FIGURES_MAX]
 
 
 def _key_figure(row: Row) -> KeyFigure:
     label = measure_label(row["measure"])
-    if row["status"] != "ok":
-        return KeyFigure("undefined", label, row["status"])
     p = p_phrase(decisive_p(row))
     evidence = f"{statistic(row)}, {p}, n = {row['n']}"
     if ratio_to_first(row):
@@ -277,7 +285,8 @@ def _further_results(material: Material) -> list[Text]:
         if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
             text = f"{verdict(row, material.study.alpha)} ({brief_sentence(row, with_change=False)})"
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{text}."))
-    answers += _ratings(material)
+    if _headline_rows(material):  # else they are said at the top of the page
+        answers += _ratings(material)
     return [*answers, *overview_estimators.statement(material, stands_alone=not answers)]
 
 
@@ -291,12 +300,13 @@ def _ratings(material: Material) -> list[Text]:
             families.setdefault((row["measure"].partition("/")[0], row["test"]), []).append(row)
     for (questionnaire, _), rows in families.items():
         label = measure_label(f"{questionnaire}/x").partition(":")[0]
+        if sum(name == questionnaire for name, _ in families) > 1:
+            label += f", {test_label(rows[0])}"
         below = [row for row in rows if row["p"] is not None and row["p"] < alpha]
         differ = "differs" if len(rows) == 1 else "differ"
-        text = (
-            f"{len(below)} of {counted(len(rows), 'scale')} {differ} at the {100 * alpha:g} % level before adjustment"
-        )
+        text = f"{len(below)} of {counted(len(rows), 'scale')} {differ} at the {100 * alpha:g} % level"
         if any(row["p_adjusted"] is not None for row in rows):
+            text += " before adjustment"
             adjusted_below = [row for row in rows if row["p_adjusted"] is not None and row["p_adjusted"] < alpha]
             method = adjustment_label(rows[0]["adjust"])
             text += f", and {len(adjusted_below)} after adjustment for {counted(len(rows), 'test')} ({method})"

@@ -15,6 +15,7 @@ from pipeline.words.numbers import number
 from pipeline.words.phrases import counted, listing
 
 _NAMED = 2  # estimators in the answer; the table of accuracy has all
+KEY_FIGURES_MAX = 3
 
 
 def answer(material: Material) -> Text:
@@ -48,8 +49,8 @@ def _error_with_range(material: Material, estimator: str, mean_and_n: tuple[floa
 def statement(material: Material, stands_alone: bool) -> Iterator[Text]:
     """The sentence on accuracy below the answer, if there is one.
 
-    Where it `stands_alone`, the answer at the top of the page is about the estimators too, and has the same distances
-    already where none can be called best.
+    Where it `stands_alone`, the answer at the top of the page is about the estimators too: what that and the key
+    figures have said is not said again.
     """
     means = _mean_errors(material)
     if not means:
@@ -58,6 +59,11 @@ def statement(material: Material, stands_alone: bool) -> Iterator[Text]:
         if not stands_alone:
             unsure = contradicted(material)
             yield (Strong("Accuracy: "), *([f"{unsure} "] if unsure else []), _distances(material))
+        return
+    if stands_alone:
+        unnamed = [f"{name} {number(mean, 1)} mm" for name, (mean, _) in list(means.items())[KEY_FIGURES_MAX:]]
+        if unnamed:
+            yield (Strong("Other estimators: "), f"a mean RMSE of {listing(unnamed)}.")
         return
     (best, (lowest, n)), *rest = means.items()
     others = "; ".join(f"{name} {number(mean, 1)} mm" for name, (mean, _) in rest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pipeline.report.document.model import Block, Column, Notice, Paragraph, Section, Strong, Table
 from pipeline.report.sections.material import Material
+from pipeline.statistics.pairs import names_in
 from pipeline.study.simulation import SelectionSimulation, Trait
 from pipeline.tables.table import Row
 from pipeline.words.names import measure_label
@@ -70,7 +71,7 @@ def _gains(material: Material, settings: SelectionSimulation) -> list[Block]:
         " people each: their mean, and the range that holds 95 % of the studies. A negative reduction is a rise.",
         (
             Column("Measure", False),
-            Column("From – to", False),
+            Column("From … to", False),
             Column("Mean"),
             Column("95 % of studies"),
             Column("Published"),
@@ -79,7 +80,7 @@ def _gains(material: Material, settings: SelectionSimulation) -> list[Block]:
         tuple(
             (
                 measure_label(row["measure"]),
-                row["contrast"],
+                _from_to(row),
                 percent(row["reduction"]),
                 f"[{percent(row['ci_low'])}, {percent(row['ci_high'])}]",
                 percent(row["published_reduction"]),
@@ -102,8 +103,13 @@ def _beside(row: Row) -> str:
     label = measure_label(row["measure"])
     return (
         f"{label}: the published reduction of {percent(row['published_reduction'])} ({row['source']}) {verdict} "
-        f"({percent(row['reduction'])} on average, {row['contrast']})."
+        f"({percent(row['reduction'])} on average, from {_from_to(row)})."
     )
+
+
+def _from_to(row: Row) -> str:
+    """`kinect to fusion`."""
+    return " to ".join(names_in(row["contrast"]) or (row["contrast"],))
 
 
 def _care(settings: SelectionSimulation) -> Notice:

@@ -32,6 +32,11 @@ def marked(text: str) -> str:
         ("r_rb = .82, η²G = .10, η²p = .34", "*r*_[rb]~=~.82, *η*²_[G]~=~.10, *η*²_[p]~=~.34"),
         ("W₊ = 59, Greenhouse-Geisser ε = .662", "*W*₊~=~59, Greenhouse-Geisser ε~=~.662"),
         ("lower by 6.10 s, 26.7 %", "lower by 6.10~s, 26.7~%"),
+        ("use the Greenhouse-Geisser p.", "use the Greenhouse-Geisser *p*."),
+        ("n: participants; p: not adjusted; t tests", "*n*: participants; *p*: not adjusted; *t* tests"),
+        ("p adjusted", "*p* adjusted"),
+        ("p (Holm)", "*p* (Holm)"),
+        ("W₊ is a sum; a small p speaks against it", "*W*₊ is a sum; a small *p* speaks against it"),
     ],
 )
 def test_statistics_are_set_as_papers_print_them(text: str, printed: str) -> None:

@@ -63,9 +63,18 @@ def test_an_adjusted_p_is_recommended_only_where_there_is_one(page: Page) -> Non
     assert "some are significant by chance; these p values are not adjusted for it" in text
 
 
-def test_one_scale_differs_and_one_comparison_is_no_all(page: Page) -> None:
+def test_one_scale_differs(page: Page) -> None:
+    entries = "[{measure: joy/x, test: t_paired}, {measure: joy/x, test: wilcoxon}]"
+    text = page(f"conditions: [a, b]\ncomparisons: {entries}\n", "questionnaires", rated(["x"]))
+    for test in ("paired t", "Wilcoxon"):  # at the top of the page alone
+        assert len(re.findall(rf"Joy, {test}: [01] of 1 scale differs at the 5.% level\.", text)) == 1
+
+
+def test_a_single_score_is_answered_by_its_means_and_one_comparison_is_no_all(page: Page) -> None:
     text = page("conditions: [a, b]\ncomparisons: [{measure: joy/x, test: t_paired}]\n", "questionnaires", rated(["x"]))
-    assert "of 1 scale differs at" in text
+    assert re.search(r"Joy x was [\d.]+ (lower|higher) with b than with a", text)
+    assert "of 1 scale" not in text
+    assert "scales by participant" not in text
     assert "The 1 comparison of the study." in text
     assert "All 1" not in text
     assert all_of(3, "comparison") == "All 3 comparisons"
