@@ -32,7 +32,7 @@ def for_print(document: Document, names: Mapping[str, str]) -> Document:
     """The document without `Folded` and `Pages`; `names` has the number of every table and figure."""
     sections = [replace(section, blocks=tuple(_blocks(section.blocks, names))) for section in document.sections]
     folded = [block for section in document.sections for block in section.blocks if isinstance(block, Folded)]
-    tables = [block for fold in folded for block in fold.blocks if isinstance(block, Table) and block.rows]
+    tables = [table for fold in folded if fold.in_annex for table in _tables(fold)]
     if tables:
         sections.append(Section(_ANNEX, "Annex: the tables folded away above", tuple(_shortened(tables))))
     return replace(document, sections=tuple(sections))
@@ -70,12 +70,16 @@ def _without_links(text: Text) -> Text:
 
 def _folded(block: Folded, names: Mapping[str, str]) -> str:
     """What is folded and where it is to be found: `Each session's lights (Table 1 in the annex).`"""
-    tables = [names[one.id] for one in block.blocks if isinstance(one, Table) and one.rows]
+    tables = [names[table.id] for table in _tables(block)]
     figures = [f"figures/{one.file}" for one in block.blocks if isinstance(one, Figure)]
-    places = [f"{listing(tables)} in the annex"] if tables else []
+    places = [f"{listing(tables)} in {'the annex' if block.in_annex else 'report.html'}"] if tables else []
     places += [f"{listing(figures)} in report.html"] if figures else []
     where = f" ({'; '.join(places)})" if places else ""
     return f"{block.summary.rstrip('.')}{where}."
+
+
+def _tables(block: Folded) -> list[Table]:
+    return [one for one in block.blocks if isinstance(one, Table) and one.rows]
 
 
 def _shortened(tables: Sequence[Table]) -> Iterator[Table]:

@@ -87,7 +87,8 @@ def columns(titles: Sequence[str], texts: int) -> tuple[Column, ...]:
 class Table:
     """A caption that says what to see, columns, and rows of text; the first cell of a row is its heading.
 
-    `anchors` has an id for each row of a table that words link to; no two in a document may be equal.
+    `anchors` has an id for each row of a table that words link to; no two in a document may be equal. With `cards` a
+    phone shows each row as a card with all its cells, where other tables scroll.
     """
 
     id: str
@@ -96,6 +97,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     anchors: tuple[str, ...] = ()
+    cards: bool = False
 
 
 def repeats(table: Table) -> Iterator[bool]:
@@ -128,12 +130,13 @@ class Pages:
 class Folded:
     """Tables and figures that most readers pass over, under a line that says what they hold and what it comes to.
 
-    A page opens them at a click. In print the line stands alone: tables go to an annex, as far as it may grow, and
-    figures are left to the page.
+    A page opens them at a click. In print the line stands alone: tables go to an annex, as far as it may grow, unless
+    they are of no use on paper, and figures are left to the page.
     """
 
     summary: str
     blocks: tuple[Table | Figure, ...]
+    in_annex: bool = True
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ _LETTER = r"SD|[FtpnMNWHUQVzrR]"
 _FREEDOM = r"\(\d[\d., ]*\)"  # of a test, after its letter
 _NO_BREAK = "\u00a0"
 _RELATION = re.compile(
-    rf"(?<![\w-])((?:{_LETTER}|[χηωε]²?[Gp]?|df|BF₁₀|[dr]_[a-z]+)₊?(?:{_FREEDOM})?) ([=<>≥≤]) (?=[−.\d])"
+    rf"(?<![\w-])((?:{_LETTER}|[χηωε]²?[Gp]?|df|estimate|ratio|BF₁₀|[dr]_[a-z]+)₊?(?:{_FREEDOM})?) ([=<>≥≤]) (?=[−.\d])"
 )
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|mm|cm|px|ms|s|Hz)(?!\w))")
 _INTERVAL = re.compile(r"\[[−+]?[\d.][^][, ]*, [−+]?[\d.][^][, ]*\]")  # both bounds stay on one line

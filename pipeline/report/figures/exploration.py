@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
+from pipeline.report.figures.style import WIDTH, styled
 from pipeline.report.glyphs import showable
 from pipeline.simulation.what_pays import MEASURES, MOST, Tracker
 from pipeline.statistics.arrays import FloatArray
@@ -23,7 +24,7 @@ from pipeline.words.numbers import NO_VALUE, number
 
 _COLOURS = colormaps["cividis"]  # read alike by the colour-blind (Nuñez, Anderton and Renslow 2018)
 _EMPTY, _OWN = "#e3e6e8", "#D55E00"
-_WIDTH, _TITLE_LENGTH = 7.2, 24  # inches; characters
+_TITLE_LENGTH = 24  # characters
 _INK = (0.2126, 0.7152, 0.0722)  # weights of red, green and blue in a colour's brightness
 
 
@@ -52,6 +53,7 @@ def _outcome_words(table: pd.DataFrame, surface: Surface, own: Tracker) -> Words
 
 
 @drawing(_outcome_words)
+@styled
 def outcome(table: pd.DataFrame, surface: Surface, own: Tracker) -> Figure:
     """Error or time over trackers, a row of panels for each estimator; `table` has the columns of `explore`."""
     return _surfaces(table, "estimator", surface, own)
@@ -67,6 +69,7 @@ def _participants_words(differences: pd.DataFrame, own: Tracker) -> Words:
 
 
 @drawing(_participants_words)
+@styled
 def participants(differences: pd.DataFrame, own: Tracker) -> Figure:
     """Participants needed over trackers, a row of panels for each pair of estimators.
 
@@ -87,7 +90,7 @@ def _surfaces(table: pd.DataFrame, panels: str, surface: Surface, own: Tracker) 
     All share a scale. A cell without a value is grey; one whose row is true in `bracketed` is written in brackets.
     """
     names, rates = list(dict.fromkeys(table[panels])), sorted(table["rate_hz"].unique())
-    figure = Figure(figsize=(_WIDTH, 0.75 + 1.75 * len(names)))
+    figure = Figure(figsize=(WIDTH, 0.75 + 1.3 * len(names)))
     grid = figure.subplots(len(names), len(rates), squeeze=False, sharex=True, sharey=True)
     scale = _scale(table[surface.column].to_numpy(np.float64, na_value=np.nan), surface)
     for name, line in zip(names, grid, strict=True):

@@ -211,7 +211,8 @@ def _difference(row: Row, pair: tuple[str, str], significant: bool) -> str:
     if row["mean_difference"] is None:
         if row["effect_size_name"] != "estimate" or row["effect_size"] is None:
             return NO_VALUE
-        return _with_bounds(f"{number(row['effect_size'])} {unit}".strip(), (row["ci_low"], row["ci_high"]))
+        row = {**row, "mean_difference": row["effect_size"], "reduction": None}
+        details = {"ci_difference": (row["ci_low"], row["ci_high"])}
     amount = f"{number(row['mean_difference'])} {unit}".strip()
     amount = _with_bounds(amount, details.get("ci_difference") or (None, None))
     if row["mean_difference"] == 0:

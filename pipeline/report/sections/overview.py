@@ -92,6 +92,7 @@ def _pairs(material: Material) -> list[Block]:
         columns(HEADER, 5),
         tuple(line.cells for line in on_page),
         f"{notes(material.results)}{more}",
+        cards=True,
     )
     return [table]
 

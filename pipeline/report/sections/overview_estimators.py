@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report.document.model import Figure, KeyFigure, Strong, Text
 from pipeline.report.prose.accuracy_claims import without_reference
-from pipeline.report.sections.cautions import NO_REFERENCE, contradicted
+from pipeline.report.sections.cautions import NO_REFERENCE, contradicted, not_ranked
 from pipeline.report.sections.material import Material
 from pipeline.words.numbers import number
 from pipeline.words.phrases import counted, listing
@@ -89,9 +89,7 @@ def figure(material: Material) -> Figure | None:
     rows = pd.DataFrame(material.rows("accuracy"))
     if rows.empty:
         return None
-    return material.figure(
-        "answer", figures.errors, *_caption_and_description(material, rows["session"].nunique()), rows
-    )
+    return material.drawn("answer", figures.errors, rows, not_ranked(material))
 
 
 def _mean_errors(material: Material) -> dict[str, tuple[float, int]]:
@@ -108,18 +106,3 @@ def _distances(material: Material) -> str:
     if without_reference(material.results):
         return f"Root mean square distance from the smoothed readings, which is not an error: {by_estimator}."
     return f"Root mean square error, means over all sessions, those included: {by_estimator}."
-
-
-def _caption_and_description(material: Material, n: int) -> tuple[str, str]:
-    """Caption and alternative text of the figure; `n` sessions are in it."""
-    marks = f"small marks are sessions (n = {n}), large marks their means"
-    if without_reference(material.results):
-        return (
-            f"Distance from the smoothed readings (left) and lag behind them (right) of each estimator, {marks}.",
-            f"Dot plot of distance and lag from the smoothed readings by estimator over {counted(n, 'session')}.",
-        )
-    where = contradicted(material) or "An estimator that helps sits to the left in both."
-    return (
-        f"Error (left) and lag (right) of each estimator, {marks}. {where}",
-        f"Dot plot of RMSE and lag by estimator over {counted(n, 'session')}.",
-    )

@@ -51,7 +51,7 @@ def section(material: Material) -> Section:
         "Provenance",
         (
             Paragraph((text,)),
-            Folded("Digests of the files that were read", (_inputs(material),)),
+            Folded("Digests of the files that were read", (_inputs(material),), in_annex=False),
         ),
     )
 

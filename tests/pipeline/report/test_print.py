@@ -43,13 +43,15 @@ def test_a_fold_is_a_line_that_says_where_the_rest_is() -> None:
     (section, annex) = printed(
         Folded("Each session's lights", (a_table("lights", 3),)),
         Folded("What arrived when", (picture,)),
+        Folded("Digests", (a_table("digests", 3),), in_annex=False),
         Pages("Participants", (Link("P01", "p01.html"),)),
     )
     assert [block.text for block in section.blocks if isinstance(block, Paragraph)] == [
         ("Each session's lights (Table 1 in the annex).",),
         ("What arrived when (figures/a.svg in report.html).",),
+        ("Digests (Table 2 in report.html).",),
     ]
-    assert len(section.blocks) == 2
+    assert len(section.blocks) == 3
     assert annex.blocks == (a_table("lights", 3),)
 
 
