@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,6 +37,7 @@ _TEXT_MAX = 100  # characters that a column of text is wide: else its neighbours
 _PADDING = 2.5  # characters between columns
 _NARROW = frozenset(" .,;:'|!ijl[]()\u00a0\u2009\u202f_")
 _BOLD = 1.2  # the width of bold letters in that of numbers
+_FIGURES_PASSED = 2  # between a figure and the words that may go before it
 _HEAD = 70  # characters of the title that fit at the head of a page beside the section's
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
@@ -80,12 +80,22 @@ def _content(document: Document) -> dict[str, Any]:
 def _sections(sections: Sequence[Section], names: dict[str, str]) -> Iterator[dict[str, Any]]:
     for place, section in enumerate(sections):
         blocks = [_block(block, names) for block in section.blocks]
-        following = [*section.blocks[1:], *(one.blocks[0] for one in sections[place + 1 : place + 2])]
-        for data, block, after in zip_longest(blocks, section.blocks, following):
-            if isinstance(block, Figure):
-                # Words that follow fill the page where it does not fit; the summary keeps its order.
-                data["floats"] = place > 0 and isinstance(after, Paragraph | Table)
+        after = [block for one in sections[place + 1 : place + 2] for block in one.blocks]
+        for at, (data, block) in enumerate(zip(blocks, section.blocks, strict=True)):
+            if isinstance(block, Figure):  # the summary keeps its order
+                data["floats"] = place > 0 and _floats(section.blocks[at + 1 :], after, is_first=at == 0)
         yield {"id": section.id, "title": section.title, "blocks": blocks}
+
+
+def _floats(rest: Sequence[Block], after: Sequence[Block], is_first: bool) -> bool:
+    """Whether a figure may go to the foot of a page while words go on: those that follow it, or two more figures.
+
+    `rest` follows in its section and `after` in the next one. A section whose words are over does not go on without
+    its first figure.
+    """
+    following = rest[:1] if is_first else [*rest, *after][: _FIGURES_PASSED + 1]
+    words = next((block for block in following if not isinstance(block, Figure)), None)
+    return isinstance(words, Paragraph | Table)
 
 
 def _text(text: Text) -> list[dict[str, Any]]:

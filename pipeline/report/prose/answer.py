@@ -225,5 +225,6 @@ def _difference(row: Row, pair: tuple[str, str], significant: bool) -> str:
 
 def _with_bounds(text: str, bounds: Sequence[float | None]) -> str:
     """The text with its interval, where it has one."""
-    shown = interval(*bounds)
+    low, high = bounds
+    shown = interval(low, high)
     return text if shown == NO_VALUE else f"{text} {shown}"
