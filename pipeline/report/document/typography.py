@@ -16,8 +16,8 @@ from typing import Literal
 Style = Literal["", "italic", "subscript"]
 
 _LETTER = r"SD|[FtpnMNWHUQVzrR]"
-_FREEDOM = r"\(\d[\d., ]*\)"  # of a test, after its letter
 _NO_BREAK = "\u00a0"
+_FREEDOM = rf"\(\d[\d., {_NO_BREAK}]*\)"  # of a test, after its letter
 _RELATION = re.compile(
     rf"(?<![\w-])((?:{_LETTER}|[χηωε]²?[Gp]?|df|estimate|ratio|BF₁₀|[dr]_[a-z]+)₊?(?:{_FREEDOM})?) ([=<>≥≤]) (?=[−.\d])"
 )
@@ -48,7 +48,7 @@ class Run:
 @lru_cache(maxsize=4096)
 def typeset(text: str) -> tuple[Run, ...]:
     """A text in runs. Joined they are the text, but for the underscores of subscripts and for spaces of no break."""
-    kept_together = _UNIT.sub(_NO_BREAK, _RELATION.sub(rf"\1{_NO_BREAK}\2{_NO_BREAK}", text))
+    kept_together = _UNIT.sub(_NO_BREAK, _RELATION.sub(lambda said: said[0].replace(" ", _NO_BREAK), text))
     kept_together = _INTERVAL.sub(lambda bounds: bounds[0].replace(" ", _NO_BREAK), kept_together)
     return tuple(run for run in _runs(kept_together) if run.text)
 

@@ -88,7 +88,11 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         "Asks whether the mean of the participants' differences between two conditions differs from zero.",
     ),
     ("t", r"\bt\(|\bt = ", "A difference or an estimate divided by its standard error."),
-    ("df", r"^df$", "Degrees of freedom: how many independent pieces of data a statistic rests on."),
+    (
+        "df",
+        r"^df$|^(?:t|F|Q|χ²)\(\d",
+        "Degrees of freedom, in brackets behind a statistic: how many independent pieces of data it rests on.",
+    ),
     (
         "Wilcoxon signed-rank test",
         r"\bWilcoxon\b",
@@ -167,7 +171,7 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         r"[Gg]eometric mean",
         "The mean of the logarithms, taken back: for values that spread the more the larger they are, as times do.",
     ),
-    ("Mean difference", r"^Mean difference$", "The mean under the first condition minus that under the second."),
+    ("Mean difference", r"^Mean difference\b", "The mean under the first condition minus that under the second."),
     ("Reduction", r"^Reduction$", "By how much the mean is lower under the second condition, as a share of the first."),
     (
         "Permutation p",

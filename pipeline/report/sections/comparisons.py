@@ -14,7 +14,7 @@ from pipeline.tables.table import Row
 from pipeline.words.change import meaningful_reduction
 from pipeline.words.comparison import contrast, test_label, uses_logarithms
 from pipeline.words.effect_sizes import effect_size
-from pipeline.words.evidence import degrees_of_freedom, one_sided_factor, resampled, statistic_name, statistic_value
+from pipeline.words.evidence import one_sided_factor, resampled, statistic
 from pipeline.words.names import adjustment_label, measure_label
 from pipeline.words.numbers import NO_VALUE, fraction, interval, number, p_value, percent
 from pipeline.words.phrases import all_of, capitalized, listing
@@ -55,8 +55,8 @@ def section(material: Material) -> Section | None:
 def _note(rows: Sequence[Row], titles: Sequence[str]) -> str:
     """What n and the columns that the table has are of."""
     sentences = [_meaning_of_n(list(dict.fromkeys(row["test"] for row in rows)))]
-    if "Mean difference" in titles:
-        sentences.append("Mean difference: first minus second condition.")
+    if _MEAN_DIFFERENCE in titles:
+        sentences.append("Mean difference: first minus second condition, with the interval of a test of means.")
     if "Reduction" in titles:
         of_logarithms = (
             "; of tests of logarithms, that of the geometric mean" if any(map(uses_logarithms, rows)) else ""
@@ -140,7 +140,12 @@ def _outliers(details: Mapping[str, Any]) -> str:
 
 
 def _statistic(row: Row) -> str:
-    return f"{statistic_name(row)} = {statistic_value(row)}" if row["status"] == "ok" else str(row["status"])
+    return statistic(row) if row["status"] == "ok" else str(row["status"])
+
+
+def _mean_difference(row: Row) -> str:
+    bounds = interval(*((row["details"] or {}).get("ci_difference") or (None, None)))
+    return " ".join(part for part in (number(row["mean_difference"]), bounds) if part != NO_VALUE) or NO_VALUE
 
 
 def _columns(rows: Sequence[Row]) -> list[tuple[str, Callable[[Row], str]]]:
@@ -177,6 +182,7 @@ ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
 
 _EMPTY = (NO_VALUE, "")
 _ADJUSTED = "p adjusted"
+_MEAN_DIFFERENCE = "Mean difference [95 % interval]"
 
 _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Measure", lambda row: measure_label(row["measure"])),
@@ -184,12 +190,11 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Compared", contrast),
     ("n", lambda row: f"{row['n']}"),
     ("Statistic", _statistic),
-    ("df", degrees_of_freedom),
     ("p", lambda row: p_value(row["p"])),
     ("p corrected", _corrected_p),
     (_ADJUSTED, _adjusted_p),
     ("Effect size [95 % interval]", effect_size),
-    ("Mean difference", lambda row: number(row["mean_difference"])),
+    (_MEAN_DIFFERENCE, _mean_difference),
     *ESTIMATES,
     ("Reduction", lambda row: percent(meaningful_reduction(row))),
 )
