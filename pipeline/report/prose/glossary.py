@@ -79,7 +79,8 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     (
         "F",
         r"\bF\(|\bF = ",
-        "The statistic of an ANOVA: the variation between conditions divided by the variation by chance.",
+        "The statistic of an ANOVA: the variation between conditions divided by the variation by chance. In brackets"
+        " its degrees of freedom: how many independent pieces of data it rests on.",
     ),
     ("Follow-up", r"[Ff]ollow-up", "A test of two conditions after a test of all of them."),
     (
@@ -87,11 +88,11 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         r"[Pp]aired t\b",
         "Asks whether the mean of the participants' differences between two conditions differs from zero.",
     ),
-    ("t", r"\bt\(|\bt = ", "A difference or an estimate divided by its standard error."),
     (
-        "df",
-        r"^df$|^(?:t|F|Q|χ²)\(\d",
-        "Degrees of freedom, in brackets behind a statistic: how many independent pieces of data it rests on.",
+        "t",
+        r"\bt\(|\bt = ",
+        "A difference or an estimate divided by its standard error. In brackets its degrees of freedom: how many"
+        " independent pieces of data it rests on.",
     ),
     (
         "Wilcoxon signed-rank test",
