@@ -1,4 +1,4 @@
-"""MCAP logs with messages in CDR, protobuf or JSON: reads what is readable of a damaged one, and writes.
+"""MCAP logs with messages in CDR, protobuf, flatbuffers or JSON: reads what is readable of a damaged one, and writes.
 
 `container` walks through the file, `records` reads its records by the `mcap` package, `damage` says what is wrong with
 it. `payload` decodes messages: many at once where their shape is known, unusual ones by the stock decoders.

@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.logs.mcap.fields import Fields, Reading
-
-Bytes = npt.NDArray[np.uint8]
+from pipeline.sessions.logs.mcap.templates import Bytes
 
 NUMBERS: Mapping[str, int] = {"position": 3, "acceleration": 37}
 """How many float64 a message holds."""

@@ -30,6 +30,7 @@ _DECODERS: Mapping[str, str] = {
     "protobuf": "pipeline.sessions.logs.mcap.protobuf",
     "json": "pipeline.sessions.logs.mcap.json_payload",
     "ros1": "pipeline.sessions.logs.mcap.ros2",
+    "flatbuffer": "pipeline.sessions.logs.mcap.flatbuffer",
 }
 """The module that reads an encoding, loaded when a log has it."""
 

@@ -17,9 +17,8 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from pipeline.sessions.logs.log import USUAL, IntArray, Source
+from pipeline.sessions.logs.log import USUAL, BoolArray, IntArray, Source
 from pipeline.sessions.logs.mcap.fields import (
-    PAYLOAD_LIMIT,
     UNFIT,
     Decoder,
     Fields,
@@ -43,13 +42,13 @@ from pipeline.sessions.logs.mcap.layout import (
     find_layout,
 )
 from pipeline.sessions.logs.mcap.messages import Messages
-from pipeline.sessions.logs.mcap.protobuf_template import Declined, Template
+from pipeline.sessions.logs.mcap.protobuf_template import Template
+from pipeline.sessions.logs.mcap.templates import Bytes, read_by_templates
 from pipeline.sessions.logs.mcap.tree import leave_to_one, reading
 
 _DEPTH_LIMIT = 8
 _LEAVES_LIMIT = 2000
 _SCHEMA_LIMIT = 256 * 1024  # bytes; Foxglove's take up to ten thousand
-_TEMPLATES = 16  # tried for messages of one length; what fits none of them is left to the stock decoder
 _WHOLE_NUMBERS = frozenset(
     getattr(FieldDescriptor, f"TYPE_{name}")
     for name in ("INT32", "INT64", "UINT32", "UINT64", "SINT32", "SINT64", "FIXED32", "FIXED64", "SFIXED32", "SFIXED64")
@@ -108,26 +107,12 @@ def decoder(channel: Channel, schema: Schema | None, content: str, source: Sourc
         return Reading(seconds, nanoseconds, [float(_value(message, path)) for path in layout.figures])
 
     def many(messages: Messages, which: IntArray, fields: Fields) -> None:
-        for length in np.unique(messages.length[which]).tolist():
-            if length <= PAYLOAD_LIMIT:
-                _decode_equally_long(messages, which[messages.length[which] == length], fields)
+        def read_alike(rows: Bytes, own: IntArray) -> BoolArray:
+            read = Template.of(rows[0], descriptor, layout.leaves, one).read(rows)
+            fields.take(own[read.fits], read, np.flatnonzero(read.fits))
+            return read.fits
 
-    def _decode_equally_long(messages: Messages, which: IntArray, fields: Fields) -> None:
-        """Use the first message not read yet as a template for others; one that makes no template is left."""
-        rows = messages.rows(which)
-        left: IntArray = np.arange(len(which))
-        for _ in range(_TEMPLATES):
-            if not len(left):
-                return
-            try:
-                template = Template.of(rows[left[0]], descriptor, layout.leaves, one)
-            except (Declined, ValueError):
-                left = left[1:]
-                continue
-            part = rows if len(left) == len(rows) else rows[left]
-            read = template.read(part)
-            fields.take(which[left[read.fits]], read, np.flatnonzero(read.fits))
-            left = left[~read.fits]
+        read_by_templates(messages, which, read_alike)
 
     return Decoder(one, many)
 

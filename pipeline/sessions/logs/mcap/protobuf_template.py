@@ -14,9 +14,9 @@ import numpy as np
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
 from pipeline.sessions.logs.log import IntArray
-from pipeline.sessions.logs.mcap.cdr import Bytes
 from pipeline.sessions.logs.mcap.fields import Fields, Reading, holds_stamps
 from pipeline.sessions.logs.mcap.layout import NamePath
+from pipeline.sessions.logs.mcap.templates import Bytes, Declined
 from pipeline.statistics.arrays import FloatArray
 
 _VARINT, _FIXED64, _LENGTH, _FIXED32 = 0, 1, 2, 5
@@ -46,10 +46,6 @@ _WIRE = {
     ),
     **dict.fromkeys((FieldDescriptor.TYPE_STRING, FieldDescriptor.TYPE_BYTES, FieldDescriptor.TYPE_MESSAGE), _LENGTH),
 }
-
-
-class Declined(Exception):  # noqa: N818
-    """This message cannot serve as a template; it may be valid all the same."""
 
 
 @dataclass(frozen=True)

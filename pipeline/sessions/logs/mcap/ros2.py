@@ -1,7 +1,7 @@
 """ROS messages: which decoder a channel takes.
 
 The two commonest types in CDR have one of their own (`cdr`), and the stock decoder, which follows the log's definition,
-for what that declines. All others, and ROS 1, are read by `ros_message`.
+for what that declines. All others, and ROS 1, are read by `by_places`.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.sessions.logs.log import IntArray, Source
-from pipeline.sessions.logs.mcap import cdr, ros_message, well_known
+from pipeline.sessions.logs.mcap import by_places, cdr, well_known
 from pipeline.sessions.logs.mcap.definition import check_definition
 from pipeline.sessions.logs.mcap.definition_text import parse, short_name
 from pipeline.sessions.logs.mcap.fields import UNDECODABLE, UNFIT, Decoder, Fields, Reading, check_stamp
 from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.places import Places
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
-from pipeline.sessions.logs.mcap.wire import ROS1, wire_of
+from pipeline.sessions.logs.mcap.wire import ROS1, Wire, places, wire_of
 
 _PLAIN_CDR = (0, 1)  # big-endian, little-endian
 _DEFINITIONS_CACHED = 16
@@ -35,17 +36,28 @@ def decoder(channel: Channel, schema: Schema | None, content: str, source: Sourc
         raise ValueError(f"it holds no schema, and a stream of kind {content} needs {SCHEMAS[shape]}")
     text = _text_of(schema)
     if schema.encoding == "ros1msg" or channel.message_encoding == "ros1":
-        return ros_message.decoder(parse(schema.name, text), schema.name, content, source, lambda _: ROS1)
+        return _by_definition(schema.name, text, content, source, lambda _: ROS1)
 
     @cache
     def general() -> Decoder:
-        return ros_message.decoder(parse(schema.name, text), schema.name, content, source, wire_of)
+        return _by_definition(schema.name, text, content, source, wire_of)
 
     shape = "position" if content == "velocity" else content
     special = source.fields or source.child is not None or source.parent is not None
     if special or _full_name(schema.name) != SCHEMAS[shape]:
         return general()
     return _of_fixed_shape(channel, schema.name, text, shape, general)
+
+
+def _by_definition(
+    name: str, text: bytes, content: str, source: Source, wire_of_payload: Callable[[bytes], Wire]
+) -> Decoder:
+    definition = parse(name, text)
+
+    def walk_through(payload: bytes) -> Places:
+        return places(payload, definition, wire_of_payload(payload))
+
+    return by_places.decoder(definition.leaves(), name, content, source, walk_through)
 
 
 def _text_of(schema: Schema) -> bytes:

@@ -49,5 +49,5 @@ def content_of(encoding: str, schema: str) -> Content | None:
     if content == "events":
         return content if encoding == "json" and schema == "steadyhand.Event" else None
     is_foxglove = parts[0] in ("foxglove", "foxglove_msgs")
-    is_read = encoding in ("json", "protobuf") or (is_foxglove and encoding in ("cdr", "flatbuffer"))
+    is_read = encoding in ("json", "protobuf", "flatbuffer") or (is_foxglove and encoding == "cdr")
     return content if is_read else None

@@ -8,18 +8,18 @@ Four ways to write the same fields (OMG DDS-XTypes 1.3, 7.4; wiki.ros.org/msg):
     delimited CDR 2   the same, and before each message its bytes
 
 Messages in which every length and every text are the same have all their figures at the same places. So one message
-that was walked through is a template for all others like it, which `ros_message` reads at once.
+that was walked through is a template for all others like it, which `by_places` reads at once.
 """
 
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
 
 from pipeline.sessions.logs.mcap.definition_text import SIZES, Definition, Field
 from pipeline.sessions.logs.mcap.fields import UNFIT
 from pipeline.sessions.logs.mcap.layout import Path
+from pipeline.sessions.logs.mcap.places import Places
 
 _STEPS_LIMIT = 20_000  # fields walked through: a message of so many holds no sensor's reading
 _CDR2, _DELIMITED = (6, 7), (8, 9)
@@ -52,19 +52,6 @@ def wire_of(payload: bytes) -> Wire:
     raise ValueError(f"it is written in a representation of CDR that is not read ({payload[0]:02x} {payload[1]:02x})")
 
 
-@dataclass
-class Places:
-    """Where a message's figures are, by path: byte and code in `struct`; its texts; how long its arrays are.
-
-    `fixed` are the spans that must be the same in a message like it: lengths and texts.
-    """
-
-    figures: dict[Path, tuple[int, str]] = field(default_factory=dict)
-    texts: dict[Path, str] = field(default_factory=dict)
-    counts: dict[Path, int] = field(default_factory=dict)
-    fixed: list[tuple[int, int]] = field(default_factory=list)
-
-
 def places(payload: bytes, definition: Definition, wire: Wire) -> Places:
     """Walk through a message. ValueError where its bytes do not fit the definition."""
     walk = _Walk(payload, definition, wire)
@@ -80,7 +67,7 @@ class _Walk:
 
     def __init__(self, payload: bytes, definition: Definition, wire: Wire) -> None:
         self.payload, self.messages, self.wire = payload, definition.messages, wire
-        self.places, self.at, self.steps = Places(), wire.header, 0
+        self.places, self.at, self.steps = Places(fixed=[(0, min(2, wire.header))]), wire.header, 0
 
     def message(self, name: str, path: Path) -> None:
         if self.wire.sized_messages:
@@ -112,7 +99,7 @@ class _Walk:
         if kind in SIZES:
             code, size = SIZES[kind]
             self._align(size)
-            self.places.figures[path] = self._take(size), code
+            self.places.figures[path] = self._take(size), self.wire.order + code
         elif kind in self.messages:
             self.message(kind, path)
         elif kind == "string":
@@ -127,7 +114,7 @@ class _Walk:
             self._align(size)
         first = self._take(size * count)
         for index in range(min(count, 64)):
-            self.places.figures[*path, index] = first + size * index, code
+            self.places.figures[*path, index] = first + size * index, self.wire.order + code
 
     def _text(self, path: Path) -> None:
         size = self._number_of_bytes()
@@ -153,15 +140,3 @@ class _Walk:
         if self.at > len(self.payload):
             raise ValueError(UNFIT)
         return begin
-
-
-def figure(payload: bytes, place: tuple[int, str], wire: Wire) -> float:
-    """One figure of a message."""
-    begin, code = place
-    value: float = _struct(wire.order + code).unpack_from(payload, begin)[0]
-    return value
-
-
-@lru_cache(maxsize=64)
-def _struct(code: str) -> struct.Struct:
-    return struct.Struct(code)

@@ -13,6 +13,7 @@ from mcap.writer import Writer
 
 from pipeline.sessions.logs.log import USUAL, Source
 from pipeline.statistics.arrays import FloatArray
+from tests.pipeline.sessions.logs import flatbuffer_messages
 from tests.pipeline.sessions.logs.ros_messages import IN_ROS1, IN_ROS2, POSITIONS, write_messages
 
 COUNT, RATE_HZ = 40, 100.0
@@ -191,6 +192,15 @@ def _ros(name: str, ros1: bool) -> Callable[[Path, Motion], None]:
     return write
 
 
+def _flatbuffer(name: str) -> Callable[[Path, Motion], None]:
+    def write(path: Path, of: Motion) -> None:
+        stamped = zip(_stamps_ns(of), of.place_m.tolist(), strict=True)
+        payloads = [flatbuffer_messages.message(name, stamp, place) for stamp, place in stamped]
+        flatbuffer_messages.write_log(path, name, payloads)
+
+    return write
+
+
 def xdf_chunk(tag: int, content: bytes) -> bytes:
     """A chunk of an XDF file: its length, its tag, its content (github.com/sccn/xdf/wiki/Specifications)."""
     return b"\x04" + struct.pack("<IH", len(content) + 2, tag) + content
@@ -225,11 +235,21 @@ def _xdf(path: Path, of: Motion) -> None:
     path.write_bytes(XDF_HEADER + xdf_stream(1, "hand", "MoCap", ("x", "y", "z"), of.time_s + 5000.0, of.place_m))
 
 
+OF_SEVERAL = {
+    "PosesInFrame": Source(fields={"position": ("poses[1].position",)}),
+    "FrameTransforms": Source(child="hand"),
+}
+"""Which of several places in one message is the hand's."""
+
 FORMATS = (
     *(Format(f"{name.split('/')[-1]}.mcap", _ros(name, False), "/t") for name in POSITIONS),
     *(Format(f"ros1_{name.split('/')[-1]}.mcap", _ros(name, True), "/t") for name in POSITIONS),
-    Format("frame_transforms.mcap", _frame_transforms, "hand", Source(child="hand")),
-    Format("poses_in_frame.mcap", _poses_in_frame, "hand", Source(fields={"position": ("poses[1].position",)})),
+    *(
+        Format(f"flat_{name}.mcap", _flatbuffer(name), "/t", OF_SEVERAL.get(name, USUAL))
+        for name in flatbuffer_messages.POSITIONS
+    ),
+    Format("frame_transforms.mcap", _frame_transforms, "hand", OF_SEVERAL["FrameTransforms"]),
+    Format("poses_in_frame.mcap", _poses_in_frame, "hand", OF_SEVERAL["PosesInFrame"]),
     Format("iso_times.mcap", _iso_times, "hand"),
     Format(
         "generic.csv",

@@ -22,7 +22,8 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Content, Readings, Wanted
 from pipeline.sessions.logs.mcap import protobuf
-from pipeline.sessions.logs.mcap.protobuf_template import Declined, Template
+from pipeline.sessions.logs.mcap.protobuf_template import Template
+from pipeline.sessions.logs.mcap.templates import Declined
 from tests.pipeline.protobuf_types import FOXGLOVE, ROS, changed, message_class, schema_of
 from tests.pipeline.sessions.logs.test_mcap_fast import assert_same, figures, payloads_decoded_by
 

@@ -15,7 +15,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Content, Readings, Source, Wanted
-from pipeline.sessions.logs.mcap import ros_message, well_known, wire
+from pipeline.sessions.logs.mcap import ros2, templates, well_known, wire
+from pipeline.sessions.logs.mcap.places import Places
 from tests.pipeline.sessions.logs.ros_messages import (
     IN_ROS1,
     IN_ROS2,
@@ -224,7 +225,7 @@ def test_random_messages_as_the_stock_decoders_read_them(
     path = write_messages(tmp_path_factory.getbasetemp() / "random.mcap", sent, maker)
     fast = read_topic(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ros_message, "_TEMPLATES", 0)
+        patch.setattr(templates, "_TEMPLATES", 0)
         slow = read_topic(path)
     for readings in (fast, slow):
         assert readings.stamp_ns.tolist() == [stamp for stamp, _, _ in drawn]
@@ -266,7 +267,7 @@ def test_damaged_messages_are_read_or_named_and_nothing_else(
     )
     fast = read_topic(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ros_message, "_TEMPLATES", 0)
+        patch.setattr(templates, "_TEMPLATES", 0)
         slow = read_topic(path)
     np.testing.assert_array_equal(fast.values, slow.values)
     assert (fast.stamp_ns.tolist(), fast.lost, fast.notes) == (slow.stamp_ns.tolist(), slow.lost, slow.notes)
@@ -276,11 +277,11 @@ def test_damaged_messages_are_read_or_named_and_nothing_else(
 def test_messages_are_not_walked_through_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     walked: list[bytes] = []
 
-    def counting(payload: bytes, *rest: Any) -> wire.Places:
+    def counting(payload: bytes, *rest: Any) -> Places:
         walked.append(payload)
         return wire.places(payload, *rest)
 
-    monkeypatch.setattr(ros_message, "places", counting)
+    monkeypatch.setattr(ros2, "places", counting)
     sent = [
         IN_ROS2.position("tf2_msgs/msg/TFMessage", at, (at, 2, 3), frame) for at in range(300) for frame in ("a", "bc")
     ]
