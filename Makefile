@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf lint docs bench lock clean
+.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -57,6 +57,10 @@ test-browser: .venv/installed ## the pages in Chromium at three widths, with axe
 
 test-pdf: .venv/installed ## the PDFs against PDF/UA-1 and PDF/A-2a by veraPDF (needs maven and a JDK)
 	@$(python) -m tests.browser.pdf
+
+test-exports: .venv/installed ## what export writes, by the validator of BIDS and by Rerun (250 MB, installed once)
+	@sh tools/make-outside
+	@$(python) -m pytest -q -rs tests/pipeline/commands/test_export_bids.py tests/pipeline/commands/test_export.py $(ARGS)
 
 lint: .venv/installed ## ruff, mypy strict, import-linter
 	@$(python) -m ruff check .

@@ -161,7 +161,8 @@ def export(
             "--to",
             metavar="FORMAT",
             help="csv or parquet: every table, with a dictionary of the columns; r: the tables and a script that"
-            " computes the comparisons anew; mcap: each session's log with every track, and a layout for Foxglove.",
+            " computes the comparisons anew; mcap: each session's log with every track, and a layout for Foxglove;"
+            " bids: the recordings as a dataset of Motion-BIDS.",
         ),
     ],
     out: Out = None,

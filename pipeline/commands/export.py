@@ -1,4 +1,4 @@
-"""`export`: a study's data for other programs, as tables with a data dictionary, for R, or as logs with the tracks."""
+"""`export`: a study's data for other programs: tables with a dictionary, a script for R, logs with the tracks, BIDS."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ FORMATS: Mapping[str, str] = {
     "parquet": "pipeline.commands.export_tables:as_parquet",
     "r": "pipeline.commands.export_r:for_r",
     "mcap": "pipeline.commands.export_mcap:as_mcap",
+    "bids": "pipeline.commands.export_bids:as_bids",
 }
 """What `--to` takes, and the function that writes it: of a result and a folder, the number of files."""
 

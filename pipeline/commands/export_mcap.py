@@ -1,4 +1,8 @@
-"""A study's sessions as logs for Foxglove, Lichtblick, Rerun and PlotJuggler: readings, events and every track."""
+"""A study's sessions as logs for Foxglove, Lichtblick, Rerun and PlotJuggler: readings, events and every track.
+
+Positions are written as poses, which all of these draw in space; their orientation is that of the frame and says
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +47,7 @@ def _readings(study: Study, ingest: Path) -> Iterator[Message]:
     """Readings as ingest has them: in SI units again, with their stamps and times of arrival."""
     for row in tables.read_arrow("positions", ingest).to_pylist():
         values = np.array([row[f"{axis}_mm"] for axis in _AXES]) * _M_PER_MM
-        yield Message(_topic(study, row), "position", row["time_ns"], row["arrival_ns"], values)
+        yield Message(_topic(study, row), "pose", row["time_ns"], row["arrival_ns"], values)
     for row in tables.read_arrow("imu", ingest).to_pylist():
         force = [row[f"a{axis}_mm_s2"] * _M_PER_MM for axis in _AXES]
         rest = [row[f"g{axis}_rad_s"] for axis in _AXES] + [row[f"q{axis}"] for axis in "xyzw"]
@@ -63,7 +67,7 @@ def _tracks(fuse: Path) -> Iterator[Message]:
     """What each estimator showed, and when."""
     for row in tables.read_arrow("tracks", fuse).to_pylist():
         values = np.array([0.0 if row[f"{axis}_mm"] is None else row[f"{axis}_mm"] for axis in _AXES]) * _M_PER_MM
-        yield Message(f"{TRACKS}{row['estimator']}", "position", row["time_ns"], row["time_ns"], values)
+        yield Message(f"{TRACKS}{row['estimator']}", "pose", row["time_ns"], row["time_ns"], values)
 
 
 def _events(study: Study, ingest: Path) -> Iterator[Message]:
@@ -87,7 +91,8 @@ def _layout(study: Study) -> dict[str, Any]:
         f"Plot!{axis}": {
             "title": f"{axis} in m",
             "paths": [
-                {"value": f"{topic}.point.{axis}", "enabled": True, "timestampMethod": "headerStamp"} for topic in shown
+                {"value": f"{topic}.pose.position.{axis}", "enabled": True, "timestampMethod": "headerStamp"}
+                for topic in shown
             ],
             "showLegend": True,
             "isSynced": True,

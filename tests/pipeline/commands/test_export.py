@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +24,7 @@ from pipeline.tables.catalogue import TABLES
 from tests.conftest import CLONE, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
+NO_ANALYTICS = {**os.environ, "RERUN_ANALYTICS": "0", "DO_NOT_TRACK": "1"}
 FENG = CLONE / "studies" / "feng2016"
 STREAMS = """conditions: [a]
 sessions: '{participant}_{condition}.mcap'
@@ -84,8 +88,26 @@ def test_logs_with_every_track(folder: Callable[..., Path], steadyhand: Steadyha
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         track = [decoded for *_, decoded in reader.iter_decoded_messages(topics=["/steadyhand/raw"])]
     assert len(track) > 100
+    assert track[0].pose.orientation.w == 1.0
     layout = json.loads((steadyhand.out / "layout.json").read_text())
-    assert "/steadyhand/raw.point.x" in json.dumps(layout["configById"])
+    assert "/steadyhand/raw.pose.position.x" in json.dumps(layout["configById"])
+
+
+def test_rerun_draws_every_track_in_space(folder: Callable[..., Path], steadyhand: Steadyhand) -> None:
+    rerun = Path(sys.executable).with_name("rerun")
+    if not rerun.exists():
+        pytest.skip("rerun-sdk is not installed; `make test-exports` installs it")
+    study = folder(STREAMS)
+    write_session(study / "P1_a.mcap", session_messages(3.0))
+    assert steadyhand("export", study, "--to", "mcap").code == 0
+    log, recording = steadyhand.out / "P1_a.mcap", steadyhand.out / "P1_a.rrd"
+    commands: list[list[str | Path]] = [["mcap", "convert", log, "-o", recording], ["rrd", "print", recording]]
+    for command in commands:
+        done = subprocess.run([rerun, *command], capture_output=True, text=True, check=True, env=NO_ANALYTICS)
+    wanted = [Wanted("/tracker/position", "position"), Wanted("/steadyhand/raw", "position")]
+    for topic, readings in read_log(log, wanted).topics.items():
+        rows = re.findall(rf"with (\d+) rows .* - {topic} - .*InstancePoses3D:translations", done.stdout)
+        assert sum(map(int, rows)) == readings.read > 80
 
 
 def test_what_cannot_be_exported_is_said(steadyhand: Steadyhand, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 import numpy as np
 
@@ -32,6 +32,14 @@ uint32 nanosec
 """
 _THREE = "=" * 80 + "\nMSG: {name}\nfloat64 x\nfloat64 y\nfloat64 z\n"
 _POINT_STAMPED = _HEADER.format(body="geometry_msgs/Point point") + _THREE.format(name="geometry_msgs/Point")
+_POSE_STAMPED = (
+    _HEADER.format(body="geometry_msgs/Pose pose")
+    + "=" * 80
+    + "\nMSG: geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"
+    + _THREE.format(name="geometry_msgs/Point")
+    + _THREE.format(name="geometry_msgs/Quaternion")
+    + "float64 w\n"
+)
 _IMU = (
     _HEADER.format(
         body="geometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
@@ -52,15 +60,23 @@ _EVENT_SCHEMA = {
     },
     "required": ["type"],
 }
+_FURTHER = {
+    "anything": ("steadyhand.Record", "jsonschema", '{"type": "object"}'),
+    "pose": ("geometry_msgs/msg/PoseStamped", "ros2msg", _POSE_STAMPED),
+}
+"""Schemas that a log has only where it needs them."""
 _CHUNK_BYTES = 64 * 1024  # so that a crash loses seconds, not the session
 
 
 @dataclass(frozen=True)
 class Message:
-    """One message to write: `values` as in `Readings.values`, or an event, or with `anything` any object of JSON."""
+    """One message to write: `values` as in `Readings.values`, or an event, or with `anything` any object of JSON.
+
+    A position as a `pose` has no orientation either: it is written as the type that viewers draw in space.
+    """
 
     topic: str
-    content: Content
+    content: Content | Literal["pose"]
     stamp_ns: int
     arrival_ns: int
     values: FloatArray | None = None
@@ -91,8 +107,8 @@ class LogWriter:
         """One more message. `ValueError` as `encoded` raises it."""
         payload = encoded(message)
         if message.topic not in self._channels:
-            if message.content == "anything" and message.content not in self._schemas:
-                self._schemas["anything"] = self._schema("steadyhand.Record", "jsonschema", '{"type": "object"}')
+            if message.content in _FURTHER and message.content not in self._schemas:
+                self._schemas[message.content] = self._schema(*_FURTHER[message.content])
             encoding = "cdr" if message.event is None else "json"
             schema = self._schemas[message.content]
             self._channels[message.topic] = self._writer.register_channel(message.topic, encoding, schema)
@@ -123,6 +139,7 @@ def write(path: Path, facts: Mapping[str, str], messages: Iterable[Message]) -> 
 # CDR aligns doubles to eight bytes counted from after its own header, little-endian and plain (OMG DDS-XTypes 7.4).
 _CDR_HEADER = b"\x00\x01\x00\x00"
 _POSITION = struct.Struct("<4siII8s4x3d")  # header, stamp, frame_id "tracker", point
+_POSE = struct.Struct("<4siII8s4x7d")
 _PHONE = struct.Struct(
     "<4siII6s6x37d"
 )  # ..., frame_id "phone", orientation, angular velocity, acceleration; covariances
@@ -137,6 +154,8 @@ def encoded(message: Message) -> bytes:
     values = [float(value) for value in message.values]
     if message.content == "position":
         return _POSITION.pack(_CDR_HEADER, seconds, nanoseconds, 8, b"tracker\0", *values)
+    if message.content == "pose":
+        return _POSE.pack(_CDR_HEADER, seconds, nanoseconds, 8, b"tracker\0", *values, 0.0, 0.0, 0.0, 1.0)
     known = bool(np.isfinite(values[6:]).all())
     orientation = values[6:10] if known else [0.0, 0.0, 0.0, 1.0]
     # sensor_msgs/Imu: "if you have no estimate for one of the data elements", its covariance begins with -1.
