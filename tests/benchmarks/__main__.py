@@ -16,6 +16,7 @@ from tests.benchmarks import archive, coverage, peers
 from tests.benchmarks.error_rates import error_rates
 from tests.benchmarks.people import people
 from tests.benchmarks.reading import reading
+from tests.benchmarks.recorders import recorders
 from tests.benchmarks.stress import stress
 from tests.benchmarks.timing import fastest
 from tests.conftest import CLONE
@@ -145,6 +146,7 @@ if __name__ == "__main__":
     many_sessions()
     streaming()
     reading(SESSION_S)
+    recorders()
     starting()
     people()
     coverage.rank_biserial()

@@ -17,7 +17,8 @@ from pathlib import Path
 
 from pipeline.errors import SessionError
 from pipeline.sessions.logs.tables.sheet import LENGTHS, Sheet
-from pipeline.sessions.logs.tables.text import Text, split_line, table_of
+from pipeline.sessions.logs.tables.table import table_of
+from pipeline.sessions.logs.tables.text import Text, split_line
 
 _MARK = "Format Version"
 _AXES = {"Position": "xyz", "Rotation": "xyzw"}
@@ -47,7 +48,7 @@ def sheets(path: Path, text: Text) -> list[Sheet]:
     quantities = above[-1] if above else []
     columns = [f"{_cell(names, place)}|{_cell(quantities, place)}|{axis}" for place, axis in enumerate(axes)]
     columns[0], columns[1] = "Frame", "Time"
-    table = table_of("\n".join(text.whole.splitlines()[at + 1 :]), columns, ",")
+    table = table_of(text.below(at + 1), columns, ",")
     bodies = []
     for body in dict.fromkeys(_cell(names, place) for place in range(2, len(axes))):
         vectors = {

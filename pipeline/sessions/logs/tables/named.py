@@ -13,7 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from pipeline.sessions.logs.tables.sheet import LENGTHS, TIMES, Sheet, Vector
-from pipeline.sessions.logs.tables.text import Text, separator_of, split_line, table_of
+from pipeline.sessions.logs.tables.table import table_of
+from pipeline.sessions.logs.tables.text import Text, separator_of, split_line
 from pipeline.study.units import G_M_S2, RAD_PER_DEG
 
 _WITH_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^)\]]*)[)\]]$")
@@ -51,7 +52,7 @@ def sheets(path: Path, text: Text) -> list[Sheet]:
     """The one sheet of a table with a line of names."""
     separator = separator_of(text.head[0])
     header = [cell.lstrip("#").strip() for cell in split_line(text.head[0], separator)]
-    table = table_of(text.whole.partition("\n")[2], header, separator)
+    table = table_of(text.below(1), header, separator)
     plain = {name: _without_unit(name) for name in table.columns}
     stamp = next((name for key in _STAMPS for name, (bare, _) in plain.items() if bare == key), None)
     kind = "Sensor Logger" if {"time", "seconds_elapsed"} <= set(header) else "table"

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from pipeline.errors import SessionError
 from pipeline.sessions.logs.tables.sheet import Sheet
-from pipeline.sessions.logs.tables.text import Text, split_line, table_of
+from pipeline.sessions.logs.tables.table import table_of
+from pipeline.sessions.logs.tables.text import Text, split_line
 
 _MARK = "NO_OF_FRAMES"
 _NAMES = ("MARKER_NAMES", "BODY_NAMES")
@@ -44,7 +45,7 @@ def sheets(path: Path, text: Text) -> list[Sheet]:
         *(f"{body}|{place}" for body in bodies for place in range(_WIDTHS[key])),
         *([""] if len(lines[at]) > width else []),
     ]
-    table = table_of("\n".join(text.whole.splitlines()[at:]), columns, "\t")
+    table = table_of(text.below(at), columns, "\t")
     stamp = "Time" if leading else None
     period_s = None if leading else _period_s(facts)
     return [

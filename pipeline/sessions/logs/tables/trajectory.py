@@ -9,11 +9,12 @@ import re
 from pathlib import Path
 
 from pipeline.sessions.logs.tables.sheet import Sheet
-from pipeline.sessions.logs.tables.text import Text, separator_of, table_of
+from pipeline.sessions.logs.tables.table import table_of
+from pipeline.sessions.logs.tables.text import Text, separator_of
 
 NAMES = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 _EUROC = "#timestamp [ns]"
-_COMMENT = re.compile(r"^\s*#.*$\n?", re.MULTILINE)
+_COMMENT = re.compile(rb"^[ \t]*#.*$\n?", re.MULTILINE)
 
 
 def recognised(text: Text) -> bool:
@@ -27,13 +28,31 @@ def recognised(text: Text) -> bool:
 
 def sheets(path: Path, text: Text) -> list[Sheet]:
     """The one body of a trajectory."""
-    lines = _COMMENT.sub("", text.whole)
-    separator = separator_of(lines.partition("\n")[0])
-    if separator == " ":
-        lines = re.sub(r"[ \t]+", " ", re.sub(r"^[ \t]+|[ \t]+$", "", lines, flags=re.MULTILINE))
-    table = table_of(lines, NAMES, separator)
+    leading = next(index for index, line in enumerate(text.head) if not line.lstrip().startswith("#"))
+    lines = bytes(text.below(leading))
+    if b"#" in lines:
+        lines = _COMMENT.sub(b"", lines)
+    separator = separator_of(lines[: lines.find(b"\n")].decode())
+    if separator == " " and any(_is_aligned(line) for line in text.head[leading:]):
+        lines = _with_single_spaces(lines)
+    table = table_of(lines, NAMES, separator, stamp=NAMES[0])
+    if separator == " " and table.lost:  # lines of which some are aligned, far below
+        table = table_of(_with_single_spaces(lines), NAMES, separator, stamp=NAMES[0])
     vectors = {"position": NAMES[1:4], "orientation": NAMES[4:]}
     return [Sheet(path.stem, "trajectory", table, "timestamp", {"timestamp": 1.0}, vectors, {"position": 1.0})]
+
+
+def _is_aligned(line: str) -> bool:
+    return line != " ".join(line.split())
+
+
+def _with_single_spaces(lines: bytes) -> bytes:
+    """Lines with one space between their cells, and none before or behind them."""
+    for mark, single in ((b"\t", b" "), (b"  ", b" "), (b"\n ", b"\n"), (b" \n", b"\n")):
+        before = -1
+        while before != len(lines):
+            before, lines = len(lines), lines.replace(mark, single)
+    return lines.strip(b" ")
 
 
 def _is_number(cell: str) -> bool:

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from pipeline.errors import SessionError
 from pipeline.sessions.logs.tables.sheet import LENGTHS, Sheet
-from pipeline.sessions.logs.tables.text import Text, split_line, table_of
+from pipeline.sessions.logs.tables.table import table_of
+from pipeline.sessions.logs.tables.text import Text, split_line
 
 _SECTIONS = ("Trajectories", "Segments", "Objects")
 _HEADER_LINES = 5
@@ -39,7 +40,7 @@ def sheets(path: Path, text: Text) -> list[Sheet]:
         name = names[place] if place < len(names) else ""
         bodies += [name] if name else []
         columns.append(f"{bodies[-1] if bodies else ''}|{axes[place]}")
-    section = "\n".join(text.whole.splitlines()[_HEADER_LINES:]).split("\n\n")[0]
+    section = bytes(text.below(_HEADER_LINES)).split(b"\n\n", 1)[0]
     table = table_of(section, columns, ",")
     found = []
     for body in dict.fromkeys(bodies):

@@ -28,8 +28,8 @@ class Motion:
     place_m: FloatArray
 
 
-def motion() -> Motion:
-    time_s = np.arange(COUNT) / RATE_HZ
+def motion(count: int = COUNT) -> Motion:
+    time_s = np.arange(count) / RATE_HZ
     place = np.column_stack([0.3 * np.sin(5 * time_s), 0.2 * np.cos(3 * time_s) + 1.1, 2.0 - 0.5 * time_s])
     return Motion(time_s, place)
 

@@ -205,3 +205,25 @@ def test_markers_of_lab_streaming_layer_are_events(tmp_path: Path) -> None:
     assert readings.arrival_ns.tolist() == [10 * 10**9, 11 * 10**9]
     assert readings.lost == 1
     assert "1 markers cannot be read: it is not an event" in readings.notes[0]
+
+
+def test_a_trajectory_aligned_with_spaces_from_some_line_on(tmp_path: Path) -> None:
+    rows = [f"170000000{at // 10}.{at % 10}00000001 {at} 2 3 0 0 0 1" for at in range(90)]
+    rows[80:] = [f"  {row.replace(' 2 ', '    2	 ')} " for row in rows[80:]]
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(["# timestamp tx ty tz qx qy qz qw", *rows]) + "\n")
+    readings = read_log(path, [Wanted("a", "position")]).topics["a"]
+    assert readings.values.tolist() == [[at, 2, 3] for at in range(90)]
+    assert readings.stamp_ns[-1] == 1_700_000_008_900_000_001
+
+
+def test_cells_of_another_kind_far_below(tmp_path: Path) -> None:
+    """A figure that is written otherwise costs itself alone, wherever it stands."""
+    rows = [f"{at},{at},2,3" for at in range(5000)]
+    rows[4000] = "4000,n/a,2.5,3"
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time_ms,x,y,z", *rows]))
+    readings = read_log(path, [Wanted("a", "position")]).topics["a"]
+    assert np.flatnonzero(np.isnan(readings.values[:, 0])).tolist() == [4000]
+    assert readings.values[4000:4002, 1].tolist() == [2.5, 2.0]
+    assert readings.stamp_ns[-1] == 4_999_000_000
