@@ -16,6 +16,7 @@ from pipeline.study.folder import PREREGISTERED, SETTINGS_FILE, load_study
 from pipeline.study.preregistration import frozen_text, registered_of
 from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import TESTS
+from pipeline.study.table_parts import files_of
 from pipeline.words.numbers import number
 
 PAGE = "preregistration.md"
@@ -75,7 +76,7 @@ def _existing_data(folder: Path, study: Study) -> Iterator[str]:
     """The tables and logs of the study that exist already; a participants table holds a plan, not data."""
     for field, name in study.files.items():
         is_plan = field in ("participants", "printed") or field.startswith("pictures.")
-        if not is_plan and (folder / name).is_file():
+        if not is_plan and any(file.is_file() for file in files_of(folder, name)):
             yield name
     if study.sessions is not None:
         parent = (folder / study.sessions).parent

@@ -14,6 +14,7 @@ from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage, Work
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
+from pipeline.study.table_parts import of_table
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def _inputs(stage: Stage, result: Result, sessions: Sequence[Session]) -> dict[s
     if stage.names_inputs:
         return dict(result.inputs)
     names = [getattr(result.study, field_name) for field_name in stage.files]
-    paths = [Path(name).as_posix() for name in names if name is not None]
+    paths = [path for name in names if name is not None for path in of_table(name, result.inputs)]
     paths += [name for name in stage.fixed_files if name in result.inputs]
     if stage.reads_log:
         paths += [file.relative_to(result.folder).as_posix() for file in sessions[0].files]

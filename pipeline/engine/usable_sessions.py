@@ -16,6 +16,7 @@ from pipeline.study.folder import SETTINGS_FILE, files_by_fixed_name, load_study
 from pipeline.study.session import Session
 from pipeline.study.session_files import find_sessions
 from pipeline.study.settings import Study
+from pipeline.study.table_parts import files_of
 from pipeline.words.phrases import one_line
 
 
@@ -39,7 +40,7 @@ def open_study(folder: Path, cache: Cache) -> tuple[Result, list[Session]]:
 def _input_digests(root: Path, study: Study, sessions: Sequence[Session], cache: Cache) -> dict[str, str]:
     """SHA-256 of every file of the study that is read, by its path in the study."""
     paths = [root / SETTINGS_FILE, *(file for session in sessions for file in session.files)]
-    paths += [root / name for name in study.files.values()]
+    paths += [path for name in study.files.values() for path in files_of(root, name)]
     paths += [root / name for name in files_by_fixed_name(root)]
     files = {path.relative_to(root).as_posix(): path for path in paths}
     return file_digests(files, root, cache.inputs)

@@ -17,7 +17,8 @@ from pipeline.sessions.checks.noise import noise_sd
 from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.checks.recorded import Imu, Recorded
 from pipeline.sessions.logs import read_log
-from pipeline.sessions.logs.log import Content, Log, MessageType, Readings, Wanted
+from pipeline.sessions.logs.log import Content, Log, MessageType, Readings, Source, Wanted
+from pipeline.sessions.logs.tables.named import SENSOR_LOGGER, SINCE_START, TOTAL_ACCELERATION
 from pipeline.sessions.stream_quality import quality_row
 from pipeline.study.settings import Study
 from pipeline.study.units import G_MM_S2
@@ -30,6 +31,7 @@ _NEEDS: Mapping[Content, str] = {
 }
 _USABLE_SHARE = 0.5  # of a topic's messages: if fewer can be read, the topic holds something else
 _LATE_MIN_S = 0.03
+_DAY_NS = 86_400 * 10**9
 _ALONG_DEG = 5.0  # gravity this close to an axis is taken to be along it
 
 
@@ -68,6 +70,8 @@ class Inspection:
 def inspected(path: Path, counted: Log) -> Inspection:
     """Reads a log again, now with its topics decoded; `counted` is the log as read without decoding."""
     decoded = _decoded(path, counted)
+    by_seconds = _by_seconds_since_start(path, counted, decoded)
+    decoded |= by_seconds
     topics = tuple(_topic(name, counted, decoded.get(name)) for name in sorted(counted.types))
     streams = _streams(topics)
     events = next((topic.name for topic in topics if topic.content == "events"), None)
@@ -78,6 +82,9 @@ def inspected(path: Path, counted: Log) -> Inspection:
         guessed = frozenset(imu.name for imu in recorded.imus if not _tells_gravity(imu))
         streams = _measured(streams, recorded)
     findings = checked(of_log(log, _study(streams, events))) if streams else ()
+    for stream in streams.values():
+        if stream["topic"] in by_seconds:
+            stream["fields"] = {"stamp": SINCE_START}
     return Inspection(topics, streams, events, findings, guessed)
 
 
@@ -98,6 +105,20 @@ def _decoded(path: Path, counted: Log) -> dict[str, tuple[Content, Readings]]:
     return found
 
 
+def _by_seconds_since_start(
+    path: Path, counted: Log, decoded: dict[str, tuple[Content, Readings]]
+) -> dict[str, tuple[Content, Readings]]:
+    """Topics of Sensor Logger by the seconds since its start, where others do not count since 1970 as it does."""
+    begins = {name: int(readings.stamp_ns.min()) for name, (_, readings) in decoded.items() if readings.read}
+    of_app = {name for name in begins if counted.types[name].name == SENSOR_LOGGER}
+    others = [begin for name, begin in begins.items() if name not in of_app]
+    if not of_app or not others or min(begins[name] for name in of_app) - max(others) < _DAY_NS:
+        return {}
+    wanted = [Wanted(name, decoded[name][0], Source(fields={"stamp": (SINCE_START,)})) for name in of_app]
+    read = read_log(path, wanted).topics
+    return {one.topic: (one.content, read[one.key]) for one in wanted}
+
+
 def _topic(name: str, counted: Log, decoded: tuple[Content, Readings] | None) -> Topic:
     kind, every = counted.types[name], counted.topics.get(name)
     if decoded is not None:
@@ -115,8 +136,12 @@ def _topic(name: str, counted: Log, decoded: tuple[Content, Readings] | None) ->
 def _streams(topics: Iterable[Topic]) -> dict[str, dict[str, Any]]:
     """Streams by the topics' names: a reference or display if the name says so, otherwise the tracker and the phone."""
     found: dict[str, dict[str, Any]] = {}
-    for topic in topics:
+    listed = list(topics)
+    with_gravity = any(topic.name == TOTAL_ACCELERATION and topic.content == "acceleration" for topic in listed)
+    for topic in listed:
         if topic.content not in ("position", "acceleration"):
+            continue
+        if with_gravity and topic.type.name == SENSOR_LOGGER and topic.name != TOTAL_ACCELERATION:
             continue
         kind: str = topic.content
         for other in ("reference", "display") if kind == "position" else ():

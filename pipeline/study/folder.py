@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pipeline.errors import PipelineError
 from pipeline.study.settings import Study
+from pipeline.study.table_parts import files_of, is_split
 from pipeline.study.yaml_text import parse, read_yaml
 
 SETTINGS_FILE = "study.yaml"
@@ -29,7 +30,9 @@ def load_study(folder: Path, *, to_be_made: bool = False) -> Study:
     study = parse(Study, content, path)
     for field, name in study.files.items():
         file = inside(folder, name, f"{path}: {field}", must_exist=False)
-        if not file.is_file() and not to_be_made:
+        if is_split(name) and not to_be_made and not files_of(folder, name):
+            raise PipelineError(f'{path}: {field}: no file in the study folder fits "{name}"')
+        if not is_split(name) and not file.is_file() and not to_be_made:
             made = f"; it is made by: steadyhand simulate {folder}" if study.simulation is not None else ""
             raise PipelineError(f'{path}: {field}: there is no file "{name}" in the study folder{made}')
     if study.sessions is not None:

@@ -35,6 +35,18 @@ def check_pattern(pattern: str, conditions: tuple[str, ...]) -> None:
             )
 
 
+def expression(pattern: str) -> re.Pattern[str]:
+    """The regular expression of a pattern of names, in which a placeholder may stand more than once."""
+    text, seen = "", set[str]()
+    for index, piece in enumerate(PLACEHOLDER.split(pattern)):
+        if index % 2 == 0:
+            text += re.escape(piece).replace(re.escape(ANY), "[^/]*")
+        else:
+            text += f"(?P={piece})" if piece in seen else f"(?P<{piece}>[^_/]+)"
+            seen.add(piece)
+    return re.compile(text)
+
+
 @dataclass(frozen=True)
 class Session:
     """One participant in one condition, which is one log. `participant` and `condition` are None if not yet known.

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from pipeline.errors import PipelineError
 from pipeline.study.folder import SETTINGS_FILE, inside
-from pipeline.study.session import ANY, PLACEHOLDER, Session
+from pipeline.study.session import ANY, PLACEHOLDER, Session, expression
 from pipeline.study.settings import Study
 
 PACKED = (".zst", ".zstd")
@@ -92,7 +92,7 @@ class _Pattern:
         is_folder = not whole.suffix and ANY not in whole.name
         joins = ANY in whole.name or not in_file
         return _Pattern(
-            _expression(pieces),
+            expression(whole.as_posix()),
             Path(pieces[0]).parent if not pieces[0].endswith("/") else Path(pieces[0]),
             whole.suffix,
             len(whole.parts),
@@ -116,18 +116,6 @@ class _Pattern:
         beside = (path,) if ANY in match.re.pattern or PLACEHOLDER.search(path.name) else _files_of(path.parent)
         alike = tuple(file for file in beside if file.suffix.casefold() == path.suffix.casefold())
         return replace(found, path=path.parent, parts=alike)
-
-
-def _expression(pieces: list[str]) -> re.Pattern[str]:
-    """The regular expression of a pattern's pieces, every other one a placeholder, which may stand more than once."""
-    text, seen = "", set[str]()
-    for index, piece in enumerate(pieces):
-        if index % 2 == 0:
-            text += re.escape(piece).replace(re.escape(ANY), "[^/]*")
-        else:
-            text += f"(?P={piece})" if piece in seen else f"(?P<{piece}>[^_/]+)"
-            seen.add(piece)
-    return re.compile(text)
 
 
 def _files_of(folder: Path) -> Iterator[Path]:

@@ -16,6 +16,7 @@ from pipeline.study.scoring_settings import Scoring
 from pipeline.study.session import Session, check_pattern
 from pipeline.study.simulation import Simulation, Task
 from pipeline.study.streams import AccelerationStream, PositionStream, Sensing, Stream
+from pipeline.study.table_parts import check_name, is_split
 from pipeline.study.table_settings import Columns, Factor, Formats, Practice, Wide
 
 
@@ -179,6 +180,7 @@ class Study(Frozen):
         self._question_fits()
         self._families_fit()
         self._sensors_fit()
+        self._names_of_tables_fit()
         for name in self.recording.senders if self.recording is not None else ():
             known("recording: senders", name, self.streams)
         for kind in ("reference", "display"):
@@ -222,6 +224,15 @@ class Study(Frozen):
             ):
                 ways_named = f"{ways[comparison.family]} and {comparison.adjust}"
                 raise ValueError(f'comparisons: family "{comparison.family}" is adjusted by {ways_named}; keep one')
+
+    def _names_of_tables_fit(self) -> None:
+        made = self.simulation is not None or self.recording is not None
+        for key in TABLE_FIELDS:
+            name = getattr(self, key)
+            if name is not None:
+                check_name(key, name)
+                if is_split(name) and (key in ("printed", "repeats") or made):
+                    raise ValueError(f'{key}: "{name}" has a placeholder, and is one file here')
 
     @property
     def files(self) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pandas as pd
@@ -12,6 +12,7 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.fields import identifier
 from pipeline.study.guessing.headers import UNITS
 from pipeline.study.settings import Study
+from pipeline.study.table_parts import Part, check_told_apart, named_identifiers, parts_of
 from pipeline.study.table_settings import TableFormat, WideEntry
 from pipeline.study.table_text import read_rows
 
@@ -29,7 +30,8 @@ class TableFile:
     """A table's path, and what study.yaml says of it.
 
     `table` is its key in study.yaml, such as "trials"; `headers` what its own headers mean, `missing` the codes for
-    values that are not there, `px_per_mm` how long a pixel is (None where study.yaml does not say).
+    values that are not there, `px_per_mm` how long a pixel is (None where study.yaml does not say). `parts` are the
+    files of a table that is split, of which `path` is the pattern.
     """
 
     path: Path
@@ -40,6 +42,7 @@ class TableFile:
     headers: Mapping[str, str] = field(default_factory=dict)
     wide: tuple[WideEntry, ...] = ()
     px_per_mm: float | None = None
+    parts: tuple[Part, ...] = ()
 
     @property
     def decimal(self) -> str:
@@ -61,6 +64,7 @@ def table_file(study: Study, folder: Path, table: str) -> TableFile | None:
         getattr(study.columns, table, {}),
         getattr(study.wide, table, ()),
         study.display.px_per_mm if study.display is not None else None,
+        tuple(parts_of(folder, name)),
     )
 
 
@@ -70,6 +74,33 @@ def read_table(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame, 
     The columns have our names: those that `columns` in study.yaml gives them, and `start_s` for `start_ms`. Raises
     PipelineError, naming what to write into study.yaml, where the file cannot be read or lacks a required column.
     """
+    if not file.parts:
+        return _read_one(file, required, {})
+    tables: list[pd.DataFrame] = []
+    said: dict[str, list[tuple[str, frozenset[str]]]] = {}
+    factors: dict[str, float] = {}
+    for part in file.parts:
+        named = named_identifiers(part)
+        table, factors = _read_one(replace(file, path=part.path, parts=()), required, named)
+        if tables and set(table) != set(tables[0]):
+            other = ", ".join(sorted(map(str, set(table) ^ set(tables[0]))))
+            raise PipelineError(
+                f"{file.path}: {part.name} and {file.parts[0].name} have different columns ({other}); the files of one "
+                "table need the same"
+            )
+        for key, value in named.items():
+            said.setdefault(key, []).append((value, frozenset(table[key])))
+        table.index = pd.Index([f"{line} of {part.name}" for line in table.index])
+        tables.append(table)
+    for key, each in said.items():
+        check_told_apart(str(file.path), key, each)
+    return pd.concat(tables), factors
+
+
+def _read_one(
+    file: TableFile, required: Sequence[str], named: Mapping[str, str]
+) -> tuple[pd.DataFrame, dict[str, float]]:
+    """One file. What its name says is a column, unless it has that column itself."""
     path = file.path
     rows = read_rows(path, file.form)
     if not rows:
@@ -77,17 +108,22 @@ def read_table(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame, 
     rows = _without_empty_ends(rows)
     header = [str(identifier(name.strip())) for name in rows[0][1]]
     _check_names(path, header)
-    named, factors = _ours(file, _renamed(file, header))
+    ours, factors = _ours(file, _renamed(file, header))
     cells = [[cell.strip() for cell in row] for _, row in rows[1:]]
-    _require(file, named, required, [row for row in cells if len(row) == len(header)])
+    _require(
+        file, ours, [name for name in required if name not in named], [row for row in cells if len(row) == len(header)]
+    )
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise PipelineError(f"{path}, row {line}: has {len(row)} cells, the first line {len(header)}")
     if not cells:
         raise PipelineError(f"{path}: holds no rows below its header")
-    table = pd.DataFrame(cells, columns=named, dtype=object)
-    for name in named:
+    table = pd.DataFrame(cells, columns=ours, dtype=object)
+    for name in ours:
         table[name] = table[name].map(identifier)
+    for key, value in named.items():
+        if key not in table:
+            table[key] = value
     table.index = pd.Index([line for line, _ in rows[1:]])  # the file's own line numbers
     return table, factors
 

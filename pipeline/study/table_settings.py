@@ -18,13 +18,17 @@ _SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
 
 class TableFormat(Frozen):
-    """How one table is written. What is not stated is as in a plain CSV file: commas, points, UTF-8, header first."""
+    """How one table is written. What is not stated is as in a plain CSV file: commas, points, UTF-8, header first.
+
+    Of `header_rows`, the first names the columns and the others only describe them, as in exports of Qualtrics.
+    """
 
     separator: str | None = None
     decimal: Literal[".", ","] | None = None
     encoding: str | None = None
     sheet: Id | None = None
     header_row: Annotated[int, Field(ge=1, le=1000)] | None = None
+    header_rows: Annotated[int, Field(ge=1, le=10)] | None = None
 
     @model_validator(mode="before")
     @classmethod

@@ -26,7 +26,8 @@ def read_rows(path: Path, form: TableFormat) -> Numbered:
     """The rows of a file from its header on. Raises PipelineError, naming the remedy, where it cannot be read."""
     rows = _workbook_rows(path, form) if is_workbook(path) else _csv_rows(path, form)
     first = form.header_row or 1
-    return [(line, cells) for line, cells in rows if line >= first and any(cell.strip() for cell in cells)]
+    kept = [(line, cells) for line, cells in rows if line >= first and any(cell.strip() for cell in cells)]
+    return kept[:1] + kept[form.header_rows or 1 :]
 
 
 # CSV ----------------------------------------------------------------------------------------------------------------

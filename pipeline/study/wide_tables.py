@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
 import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
@@ -77,7 +78,8 @@ def lengthened(
                 f' "{twice[0]}" too; keep one of them'
             )
         parts.append(kept.assign(**facts, **{value: table[header]}))
-    long: pd.DataFrame = pd.concat(parts).sort_index(kind="stable")
+    order = np.argsort(np.tile(np.arange(len(table)), len(parts)), kind="stable")  # row by row of the file
+    long: pd.DataFrame = pd.concat(parts).iloc[order]
     for name in required:
         if name != value and name not in long:
             named = {"measure": "measure: time_s", "questionnaire": "questionnaire: nasa_tlx"}.get(name, f"{name}: …")

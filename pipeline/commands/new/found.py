@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pipeline.commands.new.questions import Questions
 from pipeline.commands.new.session_logs import logs_among, sessions_of
+from pipeline.commands.new.split_tables import joined
 from pipeline.engine.progress import show_progress
 from pipeline.errors import PipelineError
 from pipeline.sessions.guessed_streams import StreamsGuess, guess_streams
@@ -64,7 +65,9 @@ def look(folder: Path, stated: Stated, questions: Questions) -> Found:
         if path not in recorded
         for one in tables_of
     ]
-    tables, not_used = _kinds(written, known, stated, questions)
+    whole = joined([one for one in written if isinstance(one, Written)], known)
+    unreadable = [one for one in written if isinstance(one, NotUsed)]
+    tables, not_used = _kinds([*whole, *unreadable], known, stated, questions)
     if not logs and not tables:
         said = "".join(f"\n  {name}: {reason}" for name, reason in _named(folder, not_used))
         raise PipelineError(
@@ -146,7 +149,8 @@ def _refuse_one_each(table: TableGuess, other: TableGuess) -> None:
     if table.written.header == other.written.header:
         raise PipelineError(
             f"{table.written.name} and {other.written.name} have the same columns: a study has one table of"
-            f" {table.kind} for everybody, so join such files into one, with a column for what tells them apart"
+            f" {table.kind} for everybody. Name such files alike, as P01_{table.kind}.csv and P02_{table.kind}.csv,"
+            " and they are read as one; or join them, with a column for what tells them apart"
         )
 
 

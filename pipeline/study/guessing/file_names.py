@@ -17,6 +17,7 @@ class NamePattern:
     pattern: str
     participants: tuple[str, ...]
     every_condition: tuple[str, ...]
+    sessions: tuple[str, ...] = ()
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -24,12 +25,15 @@ class NamePattern:
         return tuple(dict.fromkeys(self.every_condition))
 
 
-def guess_pattern(names: Sequence[str], conditions: Sequence[str], suffix: str) -> NamePattern | None:
+def guess_pattern(
+    names: Sequence[str], conditions: Sequence[str], suffix: str, every_part: bool = True
+) -> NamePattern | None:
     """The pattern of paths in a study folder, of one suffix; None where the names are not built alike.
 
     Parts between "_" and "/" that differ are placeholders: the condition is the part with the fewest different words
     of those that every participant has, or the one that has the `conditions` known already; the participant is the part
-    that looks like an id. One more part that differs is the session.
+    that looks like an id. One more part that differs is the session. With `every_part`, a part that is the same in all
+    names may be the participant or condition too, of logs that are all of one.
     """
     tokens = [_TOKEN.findall(name.removesuffix(suffix)) for name in names]
     if len({len(one) for one in tokens}) != 1:
@@ -41,13 +45,15 @@ def guess_pattern(names: Sequence[str], conditions: Sequence[str], suffix: str) 
     roles = _roles(columns, differing, conditions)
     if roles is None:
         return None
-    roles |= _same_everywhere(columns, roles)
+    if every_part:
+        roles |= _same_everywhere(columns, roles)
     pieces = [f"{{{roles[place]}}}" if place in roles else column[0] for place, column in enumerate(columns)]
     by_role = {role: columns[place] for place, role in roles.items()}
     return NamePattern(
         "".join(pieces) + suffix,
         tuple(by_role.get("participant", ())),
         tuple(by_role.get("condition", ())),
+        tuple(by_role.get("session", ())),
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.study.guessing.codes import missing_words
 from pipeline.study.guessing.headers import EVERY, meaning, plain, split_unit
+from pipeline.study.guessing.qualtrics import is_own, person_of
 from pipeline.study.guessing.shapes import (
     Entry,
     crossed_headers,
@@ -87,6 +88,9 @@ def _ours(header: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
     for name in header:  # what is called so may be anything's id, so a better name goes first
         if plain(name) in _ANY_ID and name not in ours.values():
             ours.setdefault("participant", name)
+    person = person_of(header)
+    if person is not None:
+        ours.setdefault("participant", person)
     return ours
 
 
@@ -117,7 +121,7 @@ def _with_values(written: Written, ours: Mapping[str, str], conditions: Sequence
     """A table of people, or one with several values in a row: of a questionnaire, of measures, or of conditions."""
     table = _long(written, "measures", ours, _IDS)
     numbers = numeric_columns(table.header, [list(row) for row in written.cells], written.decimal)
-    free = [name for name in numbers if name in table.further and meaning(name) not in _OF_PEOPLE]
+    free = [name for name in numbers if name in table.further and meaning(name) not in _OF_PEOPLE and not is_own(name)]
     if "condition" not in ours:
         return _without_conditions(table, free, conditions, ours)
     in_other_words = {name: scale for name, scale in tlx_names(free).items() if name != scale}

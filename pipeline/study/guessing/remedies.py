@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.errors import PipelineError
 from pipeline.study.guessing.headers import meaning, meanings
+from pipeline.study.guessing.qualtrics import looks_like_header
 from pipeline.study.guessing.shapes import wide_entry
 from pipeline.study.guessing.text import decimal_of, separator_of
 from pipeline.study.table_text import is_workbook, read_text
@@ -81,6 +82,8 @@ def _wanted(required: Sequence[str]) -> list[str]:
 def number_remedy(file: TableFile, found: Iterable[str]) -> str:
     """What to write where a column has text in the place of numbers."""
     texts = list(found)
+    if looks_like_header(texts):
+        return f"; the file is an export of Qualtrics: write {_keys({'format': {file.table: {'header_rows': 3}}})}"
     if any("," in text for text in texts) and file.decimal == ".":
         return ' (a decimal comma? use a point), or write format: {decimal: ","} in study.yaml'
     if any("." in text for text in texts) and file.decimal == ",":

@@ -9,6 +9,7 @@ from pathlib import Path
 from pipeline.errors import PipelineError
 from pipeline.study.fields import identifier
 from pipeline.study.guessing.headers import meaning
+from pipeline.study.guessing.qualtrics import header_rows
 from pipeline.study.guessing.text import decimal_of, encoding_of, separator_of
 from pipeline.study.table_settings import TableFormat
 from pipeline.study.table_text import WORKBOOKS, is_workbook, read_rows, sheets_of
@@ -89,7 +90,8 @@ def _table(path: Path, form: Form, participant: Sequence[str]) -> Written | NotU
     header = [str(identifier(cell.strip())) for cell in rows[start][1]]
     while header and not header[-1]:
         header.pop()
-    cells = tuple(tuple(str(identifier(cell.strip())) for cell in row) for _, row in rows[start + 1 :])
+    described = header_rows([row for _, row in rows[start:]])
+    cells = tuple(tuple(str(identifier(cell.strip())) for cell in row) for _, row in rows[start + described :])
     if any(len(row) < len(header) or any(row[len(header) :]) for row in cells):
         return NotUsed(path, "its rows are not all as long as its header")
     if not all(header) or len(set(header)) < len(header):
@@ -97,6 +99,8 @@ def _table(path: Path, form: Form, participant: Sequence[str]) -> Written | NotU
     if not cells:
         return NotUsed(path, "it has no rows below its header")
     row_of_header: Form = {"header_row": rows[start][0]} if start else {}
+    if described > 1:
+        row_of_header["header_rows"] = described
     return Written(path, {**form, **row_of_header}, tuple(header), tuple(row[: len(header)] for row in cells))
 
 

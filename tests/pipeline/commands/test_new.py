@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import openpyxl  # type: ignore[import-untyped]
+import pandas as pd
 import pytest
 import yaml
 
@@ -20,6 +21,7 @@ from pipeline.study.folder import load_study
 from tests.conftest import real, write_session
 from tests.pipeline.helpers import Ran, Steadyhand, exit_code, run
 
+TLX_HEADER = "participant,condition,mental,physical,temporal,performance,effort,frustration"
 CASES = Path(__file__).resolve().parents[2] / "data" / "cases_in"
 New = Callable[..., Ran]
 
@@ -275,6 +277,34 @@ def test_text_logs_of_a_session_are_no_tables_of_the_study(tmp_path: Path, new: 
     assert settings(study)["streams"]["tracker"]["topic"] == "tracker"
 
 
+def test_sensor_logger_beside_a_tracker_of_another_clock(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
+    """It counts since 1970, the tracker since its start: then the app's seconds since its own start are taken.
+
+    Its TotalAcceleration is the one with gravity, and its Gravity is no position.
+    """
+    study = tmp_path / "study"
+    times = [0.01 * at for at in range(400)]
+    places = "Time (s),x (m),y (m),z (m)\n" + "".join(f"{t:.3f},{(t % 1) ** 2:.4f},0.1,1\n" for t in times[::3])
+    rows = "".join(f"{1_700_000_000_000_000_000 + round(1e9 * t)},{t:.3f},0.2,9.8,0.1\n" for t in times)
+    for name in ("P01_a", "P01_b", "P02_a", "P02_b"):
+        written(study / "data" / name, "tracker.csv", places)
+        for sensor in ("Accelerometer", "Gravity", "Gyroscope", "Magnetometer", "TotalAcceleration"):
+            written(study / "data" / name, f"{sensor}.csv", "time,seconds_elapsed,z,y,x\n" + rows)
+    made = new(study)
+    assert made.code == 0, made.err
+    streams = settings(study)["streams"]
+    assert {name: stream["topic"] for name, stream in streams.items()} == {
+        "imu": "TotalAcceleration",
+        "tracker": "tracker",
+    }
+    assert streams["imu"]["fields"] == {"stamp": "seconds_elapsed"}
+    assert steadyhand("compare", study).code == 0
+    steadyhand.out = tmp_path / "tables"
+    assert steadyhand("export", study, "--to", "parquet").code == 0
+    imu = pd.read_parquet(steadyhand.out / "imu.parquet")
+    assert len(imu) == 4 * 400 and imu["time_ns"].max() == 3_990_000_000
+
+
 def test_a_folder_of_ros_2_is_a_session(tmp_path: Path, new: New) -> None:
     study = tmp_path / "study"
     for person in ("P01", "P02"):
@@ -288,12 +318,67 @@ def test_a_folder_of_ros_2_is_a_session(tmp_path: Path, new: New) -> None:
     assert "which would read 4 sessions" in made.out
 
 
-def test_tables_of_one_person_each_are_to_be_joined(tmp_path: Path, new: New) -> None:
-    for person in ("P01", "P02"):
+def test_tables_of_one_person_each_are_one(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
+    """What the names of the files say is not repeated in them; one that says it too must agree."""
+    study = tmp_path / "study"
+    for place, person in enumerate(("P01", "P02", "P03", "P04")):
+        rows = f"a,{3 + place / 3}\nb,{4 + place / 2}\n"
+        written(study / "times", f"{person}.csv", f"condition,time\n{rows}")
+        written(study, f"tlx_{person}.csv", f"{TLX_HEADER}\n{person},a,1,2,3,4,5,6\n{person},b,2,3,4,5,6,{place}\n")
+    made = new(study)
+    assert made.code == 0, made.err
+    assert settings(study)["measures"] == "times/{participant}.csv"
+    assert settings(study)["questionnaires"] == "tlx_{participant}.csv"
+    assert "describe 4 participants" in made.out
+    assert_commented(study)
+    assert steadyhand("compare", study).code == 0
+    assert {row["n"] for row in steadyhand.results()["comparisons"]} == {4}
+    (study / "times" / "P05.csv").write_text("condition,time\na,3\nb,5\n")
+    assert steadyhand("compare", study).code == 0
+    assert max(row["n"] for row in steadyhand.results()["comparisons"]) == 5
+    (study / "tlx_P04.csv").write_text(f"{TLX_HEADER}\nP03,a,1,2,3,4,5,6\nP03,b,2,3,4,5,6,1\n")
+    assert 'the rows of participant "P03" are in the file of "P04"' in steadyhand("compare", study).err
+    (study / "tlx_P04.csv").write_text(f"{TLX_HEADER}\nP04,a,1,2,3,4,5,6\nP04,b,2,3,4,five,6,1\n")
+    assert 'row 3 of tlx_P04.csv: "performance" should be a number' in steadyhand("compare", study).err
+    (study / "times" / "P04.csv").write_text("condition,duration\na,3\nb,5\n")
+    assert "have different columns (duration, time)" in steadyhand("compare", study).err
+
+
+def test_tables_of_the_same_columns_and_other_names_are_to_be_joined(tmp_path: Path, new: New) -> None:
+    for person in ("first_try", "second"):
         written(tmp_path / "study", f"{person}.csv", f"participant,condition,time\n{person},a,3\n{person},b,4\n")
     ran = new(tmp_path / "study")
     assert ran.code == 2
-    assert "P01.csv and P02.csv have the same columns" in ran.err
+    assert "Name such files alike, as P01_measures.csv" in ran.err
+
+
+QUALTRICS = """StartDate,EndDate,Status,Progress,Duration (in seconds),ResponseId,PID,kinect_Q1,fusion_Q1
+Start Date,End Date,Response Type,Progress,Duration (in seconds),Response ID,Your number,"Rate it
+from 1 to 7","Rate it
+from 1 to 7"
+"{""ImportId"":""startDate""}","{""ImportId"":""endDate""}","{""ImportId"":""status""}","{""ImportId"":""progress""}",\
+"{""ImportId"":""duration""}","{""ImportId"":""_recordId""}","{""ImportId"":""QID1""}","{""ImportId"":""QID2""}",\
+"{""ImportId"":""QID3""}"
+""".replace("\\\n", "")
+
+
+@pytest.mark.parametrize("rows", [3, 2])
+def test_an_export_of_qualtrics(tmp_path: Path, new: New, steadyhand: Steadyhand, rows: int) -> None:
+    """Names, questions and ImportIds stand above the answers; older exports lack the last of these."""
+    header = QUALTRICS if rows == 3 else QUALTRICS[: QUALTRICS.index('"{')]
+    answers = [f"2024-05-0{at},2024-05-0{at},0,100,{300 + at},R_{at},P{at},{at % 4},{at % 3 + 3}" for at in range(1, 7)]
+    study = written(tmp_path / "study", "Survey_May.csv", header + "\n".join(answers) + "\n")
+    made = new(study)
+    assert made.code == 0, made.err
+    assert settings(study)["format"] == {"header_rows": rows}
+    assert settings(study)["conditions"] == ["kinect", "fusion"]
+    assert steadyhand("compare", study).code == 0
+    assert [row["n"] for row in steadyhand.results()["comparisons"]] == [6]
+    text = (study / "study.yaml").read_text()
+    if rows == 3:
+        lines = [line for line in text.splitlines() if not line.startswith("format:")]
+        (study / "study.yaml").write_text("\n".join(lines))
+        assert "write format: {measures: {header_rows: 3}} in study.yaml" in steadyhand("compare", study).err
 
 
 def test_names_that_are_not_built_alike_are_asked_to_be(tmp_path: Path, new: New) -> None:

@@ -37,7 +37,11 @@ _OF_FILE: Mapping[str, str] = {
     "gyroscopeuncalibrated": "angular_velocity",
     "orientation": "orientation",
 }
-_SENSOR_LOGGER = {"time": 1e-9, "seconds_elapsed": 1.0}
+SENSOR_LOGGER, SINCE_START = "Sensor Logger", "seconds_elapsed"
+TOTAL_ACCELERATION = "TotalAcceleration"
+"""Sensor Logger's acceleration with gravity; its Accelerometer is without."""
+
+_SENSOR_LOGGER_S = {"time": 1e-9, SINCE_START: 1.0}
 _ACCELERATIONS = {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "m s^-2": 1.0, "g": G_M_S2}
 _TURNINGS = {"rad/s": 1.0, "rad s^-1": 1.0, "deg/s": RAD_PER_DEG, "°/s": RAD_PER_DEG}
 _UNITS: Mapping[str, Mapping[str, float]] = {
@@ -55,9 +59,11 @@ def sheets(path: Path, text: Text) -> list[Sheet]:
     table = table_of(text.below(1), header, separator)
     plain = {name: _without_unit(name) for name in table.columns}
     stamp = next((name for key in _STAMPS for name, (bare, _) in plain.items() if bare == key), None)
-    kind = "Sensor Logger" if {"time", "seconds_elapsed"} <= set(header) else "table"
+    kind = SENSOR_LOGGER if set(_SENSOR_LOGGER_S) <= set(header) else "table"
     times = {name: _time_unit_s(bare, unit, kind) for name, (bare, unit) in plain.items()}
     vectors, units = vectors_of(table.columns, path.stem)
+    if kind == SENSOR_LOGGER:  # x, y, z of its Gravity or Magnetometer are no position
+        vectors = {name: columns for name, columns in vectors.items() if name != "position"}
     known = {name: unit_s for name, unit_s in times.items() if unit_s is not None}
     return [Sheet(path.stem, kind, table, stamp, known, vectors, units)]
 
@@ -87,8 +93,8 @@ def _letters(name: str) -> str:
 
 
 def _time_unit_s(bare: str, unit: str, kind: str) -> float | None:
-    if kind == "Sensor Logger" and bare in _SENSOR_LOGGER:
-        return _SENSOR_LOGGER[bare]
+    if kind == SENSOR_LOGGER and bare in _SENSOR_LOGGER_S:
+        return _SENSOR_LOGGER_S[bare]
     return TIMES.get(unit) or TIMES.get(bare.rpartition("_")[2])
 
 
