@@ -63,14 +63,30 @@ def _logs(found: Found) -> Iterator[Line]:
         yield Line(f"  {name}: {flow(dict(stream))}", found.streams.remarks[name])
     if found.streams.events is not None:
         yield Line(f"events: {flow({'topic': found.streams.events})}", "trials and selections")
-    kinds = {str(stream["kind"]) for stream in found.streams.streams.values()}
-    if "position" in kinds:
+    yield from _estimators(found.streams.streams)
+
+
+def _estimators(streams: Mapping[str, Mapping[str, object]]) -> Iterator[Line]:
+    """Estimators of the tracker, and of it and the phone; of the first ones, where there are several."""
+    of_kind = {
+        kind: [name for name, stream in streams.items() if stream["kind"] == kind]
+        for kind in ("position", "acceleration")
+    }
+    first = [names[0] for names in of_kind.values() if names]
+    several = any(len(names) > 1 for names in of_kind.values())
+
+    def line(name: str, kind: str, use: list[str], about: str) -> Line:
+        chosen: dict[str, object] = {"use": use} if several else {}
+        return Line(f"  {name}: {flow({'type': kind, **chosen})}", about)
+
+    if of_kind["position"]:
         yield Line("estimators:", "what each would have shown is computed; rename them as you like")
-        yield Line("  raw: {type: raw}", "the newest reading of the tracker, held")
-        yield Line("  kalman: {type: position_kalman}", "a Kalman filter of the tracker alone")
-    if {"position", "acceleration"} <= kinds:
-        yield Line("  kalman_fusion: {type: fusion_kalman}", "tracker and phone, by the noise and latency stated above")
-        yield Line("  adaptive: {type: fusion_adaptive}", "the same, which finds noise, clock and mounting itself")
+        yield line("raw", "raw", first[:1], "the newest reading of the tracker, held")
+        yield line("kalman", "position_kalman", first[:1], "a Kalman filter of the tracker alone")
+    if all(of_kind.values()):
+        about = "tracker and phone, by the noise and latency stated above"
+        yield line("kalman_fusion", "fusion_kalman", first, about)
+        yield line("adaptive", "fusion_adaptive", first, "the same, which finds noise, clock and mounting itself")
 
 
 _HOLDS = {
@@ -93,7 +109,7 @@ def _columns(tables: Mapping[str, TableGuess]) -> Iterator[Line]:
     if renamed:
         yield Line("columns:", "your headers, and the column that each means")
     for kind, columns in renamed.items():
-        yield Line(f"  {kind}:", f"of {tables[kind].written.path.name}")
+        yield Line(f"  {kind}:", f"of {tables[kind].written.name}")
         for header, column in columns.items():
             yield Line(f"    {flow(header)}: {flow(column)}", _about(column))
 
@@ -133,7 +149,7 @@ def _formats(tables: Mapping[str, TableGuess]) -> Iterator[Line]:
     yield Line("format:", "how the tables are written")
     for kind, form in forms.items():
         if form:
-            yield Line(f"  {kind}: {flow(form)}", f"of {tables[kind].written.path.name}")
+            yield Line(f"  {kind}: {flow(form)}", f"of {tables[kind].written.name}")
 
 
 def _wide(tables: Mapping[str, TableGuess]) -> Iterator[Line]:

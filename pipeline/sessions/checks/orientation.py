@@ -264,16 +264,18 @@ def covariances(recorded: Recorded) -> Iterator[Finding]:
             if not disclaimed.any():
                 continue
             empty = bool(np.all(values[disclaimed] == 0))
-            cause = (
-                "the values are all zero: this topic does not carry them (gyroscope and accelerometer may be on two "
-                "topics); join them into one message when logging"
+            message = (
+                f'"{imu.name}" has no {what}: its values are all zero and to be disregarded, by '
+                f"{what}_covariance[0] = -1 or because the log has none (gyroscope and accelerometer may be on two "
+                "topics, or in files apart); log them together"
                 if empty
-                else "the values do vary, and they are used; correct the covariance in the driver if they are good"
+                else f'"{imu.name}" says by {what}_covariance[0] = -1 that its {what} is to be disregarded; the values '
+                "do vary, and they are used; correct the covariance in the driver if they are good"
             )
             yield Finding(
                 of(DISCLAIMED, f"{imu.name} {what}"),
                 "red" if empty else "amber",
-                f"{what}_covariance[0] is -1 in {int(disclaimed.sum())} messages",
-                "not -1",
-                f'"{imu.name}" says by {what}_covariance[0] = -1 that its {what} is to be disregarded; {cause}',
+                f"{'none' if empty else f'{what}_covariance[0] is -1'} in {int(disclaimed.sum())} messages",
+                "values" if empty else "not -1",
+                message,
             )

@@ -124,7 +124,7 @@ def _with_values(written: Written, ours: Mapping[str, str], conditions: Sequence
     free = [name for name in numbers if name in table.further and meaning(name) not in _OF_PEOPLE and not is_own(name)]
     if "condition" not in ours:
         return _without_conditions(table, free, conditions, ours)
-    in_other_words = {name: scale for name, scale in tlx_names(free).items() if name != scale}
+    in_other_words = {name: scale for name, scale in _scales_of_tlx(table, free).items() if name != scale}
     table, free = _with_names(table, in_other_words), [in_other_words.get(name, name) for name in free]
     items = questionnaire_of(free)
     if items is not None and 2 * len(items[1]) >= len(free):
@@ -137,6 +137,12 @@ def _with_values(written: Written, ours: Mapping[str, str], conditions: Sequence
     renamed = {name: _with_unit(name) for name in free}
     values = list(renamed.values())
     return _wide(_with_names(table, renamed), "measures", values, {"measure": values})
+
+
+def _scales_of_tlx(table: TableGuess, free: Sequence[str]) -> Mapping[str, str]:
+    """The columns of a NASA-TLX by their headers, or by what a further row of the header says of them."""
+    words = {table.written.described[table.header.index(name)]: name for name in free if table.written.described}
+    return tlx_names(free) or {words[text]: scale for text, scale in tlx_names(list(words)).items()}
 
 
 def _with_names(table: TableGuess, renamed: Mapping[str, str]) -> TableGuess:

@@ -33,6 +33,9 @@ class Written:
     name: str = ""
     """Its path in the study folder."""
 
+    described: tuple[str, ...] = ()
+    """What each column holds, in words, where a further row of the header says it."""
+
     @property
     def decimal(self) -> str:
         """The mark before the decimals."""
@@ -101,7 +104,9 @@ def _table(path: Path, form: Form, participant: Sequence[str]) -> Written | NotU
     row_of_header: Form = {"header_row": rows[start][0]} if start else {}
     if described > 1:
         row_of_header["header_rows"] = described
-    return Written(path, {**form, **row_of_header}, tuple(header), tuple(row[: len(header)] for row in cells))
+    words = tuple(cell.strip() for cell in rows[start + 1][1][: len(header)]) if described > 1 else ()
+    whole = tuple(row[: len(header)] for row in cells)
+    return Written(path, {**form, **row_of_header}, tuple(header), whole, described=words)
 
 
 def _names_people(cell: str, participant: Sequence[str]) -> bool:

@@ -21,6 +21,7 @@ from pipeline.study.folder import load_study
 from tests.conftest import real, write_session
 from tests.pipeline.helpers import Ran, Steadyhand, exit_code, run
 
+AXES = {"Rotation": "XYZW", "Position": "XYZ"}
 TLX_HEADER = "participant,condition,mental,physical,temporal,performance,effort,frustration"
 CASES = Path(__file__).resolve().parents[2] / "data" / "cases_in"
 New = Callable[..., Ran]
@@ -277,6 +278,38 @@ def test_text_logs_of_a_session_are_no_tables_of_the_study(tmp_path: Path, new: 
     assert settings(study)["streams"]["tracker"]["topic"] == "tracker"
 
 
+def test_phyphox_beside_motive_with_several_bodies(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
+    """A take is known by its bodies' names alone; estimators are told which body, as they take one tracker."""
+    phone = '"Time (s)","Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)"\n'
+    phone += "".join(f"{0.01 * at:.6E},{0.1 * (at % 7)},9.8,0.1\n" for at in range(300))
+    for bodies in (("Hand",), ("Hand", "Head")):
+        study = tmp_path / f"{len(bodies)}"
+        columns = [
+            (body, quantity, axis)
+            for body in bodies
+            for quantity in ("Rotation", "Position")
+            for axis in AXES[quantity]
+        ]
+        head = [
+            "Format Version,1.23,Take Name,T,Length Units,Millimeters",
+            ",".join(["", "Name", *(column[0] for column in columns)]),
+            ",".join(["", "", *(column[1] for column in columns)]),
+            ",".join(["Frame", "Time (Seconds)", *(column[2] for column in columns)]),
+        ]
+        figures = ",".join(["0,0,0,1,{0:.3f},200,300"] * len(bodies))
+        take = "\n".join([*head, *(f"{at},{at / 60:.4f},{figures.format(3.0 * (at % 50))}" for at in range(180))])
+        for name in ("P01_a", "P01_b", "P02_a", "P02_b"):
+            written(study / name, "Take 1.csv", take + "\n")
+            written(study / name, "Raw Data.csv", phone)
+        made = new(study)
+        assert made.code == 0, made.err
+        streams = settings(study)["streams"]
+        assert sorted(stream["topic"] for stream in streams.values()) == sorted([*bodies, "Raw Data"])
+        chosen = settings(study)["estimators"]["adaptive"].get("use")
+        assert chosen == (None if len(bodies) == 1 else [next(iter(streams)), "imu"])
+        assert steadyhand("compare", study).code == 0
+
+
 def test_sensor_logger_beside_a_tracker_of_another_clock(tmp_path: Path, new: New, steadyhand: Steadyhand) -> None:
     """It counts since 1970, the tracker since its start: then the app's seconds since its own start are taken.
 
@@ -379,6 +412,30 @@ def test_an_export_of_qualtrics(tmp_path: Path, new: New, steadyhand: Steadyhand
         lines = [line for line in text.splitlines() if not line.startswith("format:")]
         (study / "study.yaml").write_text("\n".join(lines))
         assert "write format: {measures: {header_rows: 3}} in study.yaml" in steadyhand("compare", study).err
+
+
+def test_the_questions_of_qualtrics_name_the_scales_of_the_tlx(tmp_path: Path, new: New) -> None:
+    texts = ("Mental Demand", "Physical Demand", "Temporal Demand", "Performance", "Effort", "Frustration")
+    header = ["StartDate", "EndDate", "Progress", "ResponseId", "PID", "System", *(f"Q7_{at}" for at in range(1, 7))]
+    rows = [
+        header,
+        [
+            "Start Date",
+            "End Date",
+            "Progress",
+            "Response ID",
+            "Number",
+            "Which?",
+            *(f"How much? - {one}" for one in texts),
+        ],
+        [f'"{{""ImportId"":""{name}""}}"' for name in header],
+        *(["2024-05-01", "2024-05-01", "100", f"R{p}{c}", str(p), c, *"123456"] for p in range(1, 7) for c in "ab"),
+    ]
+    study = written(tmp_path / "study", "export.csv", "\n".join(map(",".join, rows)) + "\n")
+    made = new(study)
+    assert made.code == 0, made.err
+    assert settings(study)["columns"]["questionnaires"]["Q7_1"] == "mental"
+    assert settings(study)["scoring"]["nasa_tlx"]["rule"] == "raw_tlx"
 
 
 def test_names_that_are_not_built_alike_are_asked_to_be(tmp_path: Path, new: New) -> None:

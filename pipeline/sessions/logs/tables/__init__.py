@@ -29,7 +29,8 @@ def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) 
 
 def read_all(paths: Sequence[Path], wanted: Sequence[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
     """The wanted topics of a session's tables: sheets by their bodies' names, or by the file's where it holds one."""
-    sheets: dict[str, Sheet] = {}
+    listed: dict[str, Sheet] = {}
+    by_file: dict[str, Sheet] = {}
     faults: list[str] = []
     for path in paths:
         try:
@@ -39,11 +40,12 @@ def read_all(paths: Sequence[Path], wanted: Sequence[Wanted], limits: Limits = D
                 raise
             faults.append(f"{path.name}: {error}")
             continue
-        sheets |= {sheet.topic: sheet for sheet in own}
+        listed |= {sheet.topic: sheet for sheet in own}
         if len(own) == 1:
-            sheets.setdefault(path.stem, own[0])
-    types = {name: MessageType(sheet.kind, "table", None) for name, sheet in sheets.items()}
-    wants = wanted or tuple(Wanted(name, "anything") for name in sheets)
+            by_file[path.stem] = own[0]
+    sheets = by_file | listed
+    types = {name: MessageType(sheet.kind, "table", None) for name, sheet in listed.items()}
+    wants = wanted or tuple(Wanted(name, "anything") for name in listed)
     topics = {want.key: readings_of(sheets[want.topic], want, sheets) for want in wants if want.topic in sheets}
     _one_clock({want.topic: topics[want.key] for want in wants if want.key in topics and want.content != "anything"})
     return Log({}, topics, tuple(faults), types)
