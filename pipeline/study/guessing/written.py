@@ -58,9 +58,13 @@ class NotUsed:
 def tables_in(path: Path, participant: Sequence[str] = ()) -> list[Written | NotUsed]:
     """The tables of a file, one for each sheet of a workbook. `participant` are further headers of participants."""
     try:
-        return [_table(path, form, participant) for form in _forms(path)]
+        found = [(form, _table(path, form, participant)) for form in _forms(path)]
     except PipelineError as error:
         return [NotUsed(path, str(error).removeprefix(f"{path}: "))]
+    return [
+        NotUsed(path, f'sheet "{form["sheet"]}": {one.reason}') if isinstance(one, NotUsed) and "sheet" in form else one
+        for form, one in found
+    ]
 
 
 def _forms(path: Path) -> Iterator[Form]:
