@@ -25,7 +25,6 @@ _OURS = ("pipeline", "fusion_core")
 _MODULE_TEXT = re.compile(rf"(?:{'|'.join(_OURS)})(?:\.\w+)+")
 _DISTRIBUTIONS = {
     "yaml": "PyYAML",
-    "mcap_ros2": "mcap-ros2-support",
     "mcap_protobuf": "mcap-protobuf-support",
     "google": "protobuf",
 }

@@ -10,7 +10,6 @@ LIBRARIES = (
     "pyarrow",
     "pydantic",
     "mcap",
-    "mcap_ros2",
     "mcap_protobuf",
     "orjson",
     "matplotlib",

@@ -1,7 +1,7 @@
 """MCAP logs with messages in CDR, protobuf, flatbuffers or JSON: reads what is readable of a damaged one, and writes.
 
 `container` walks through the file, `records` reads its records by the `mcap` package, `damage` says what is wrong with
-it. `payload` decodes messages: many at once where their shape is known, unusual ones by the stock decoders.
+it. `payload` decodes messages: many at once where one shows how the others are laid out, unusual ones one by one.
 """
 
 from __future__ import annotations

@@ -9,11 +9,13 @@ import numpy as np
 from mcap.records import Channel
 
 from pipeline.sessions.logs.log import Claims, IntArray
-from pipeline.sessions.logs.mcap.cdr import NUMBERS
 from pipeline.sessions.logs.mcap.fields import Fields
 from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 from pipeline.sessions.logs.mcap.walk import Walk
+
+_NUMBERS = {"position": 3, "acceleration": 37}
+"""How many float64 stand at the end of the two commonest types, a PointStamped and an Imu."""
 
 _NAME_BYTES, _NAME = 12, 16  # where the length of the frame's name stands, and its first byte
 _ORIENTATION, _RATE_COVARIANCE, _FORCE_COVARIANCE = 0, 16, 28  # of the 37 numbers of an Imu
@@ -22,22 +24,21 @@ _UNKNOWN = -1.0
 
 def claimed(walk: Walk, messages: Messages, fields: Fields, which: IntArray, content: str) -> Claims:
     """The claims of some decoded messages, in their order."""
-    if fields.parents:
-        return _by_fields(fields, which, content)
     encoded = {number for number, channel in walk.channels.items() if _of_fixed_shape(walk, channel)}
     if not len(which) or not set(np.unique(messages.channel[which]).tolist()) <= encoded:
-        return Claims()
+        return _by_fields(fields, which, content) if fields.parents else Claims()
     if content == "velocity":
         content = "position"
     names: dict[bytes, int] = {}
     frame = np.zeros(len(which), np.int64)
-    numbers = np.zeros((len(which), NUMBERS[content]))
+    numbers = np.zeros((len(which), _NUMBERS[content]))
     length = messages.length[which]
     for size in np.unique(length).tolist():
         own = np.flatnonzero(length == size)
         rows = messages.rows(which[own])
         frame[own] = _frames(rows, names)
-        tail = np.ascontiguousarray(rows[:, size - (size - 4) % 8 - 8 * NUMBERS[content] :][:, : 8 * NUMBERS[content]])
+        width = 8 * _NUMBERS[content]
+        tail = np.ascontiguousarray(rows[:, size - (size - 4) % 8 - width :][:, :width])
         little = rows[:, 1] == 1
         numbers[own] = np.where(little[:, None], tail.view("<f8"), tail.view(">f8"))
     texts = tuple(name.decode("utf-8", "replace") for name in names)

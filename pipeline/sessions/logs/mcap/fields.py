@@ -95,7 +95,7 @@ class Fields:
 class Decoder:
     """A channel's decoder, slow and fast.
 
-    `one` decodes a message with the stock packages, and raises for one that cannot be read. `many` decodes as many as
+    `one` decodes a message by itself, and raises for one that cannot be read. `many` decodes as many as
     it can of the messages at some indices, with the same result as `one`, and leaves the others to `one`.
     """
 

@@ -1,4 +1,4 @@
-"""Decodes a topic's messages by the encoding of each channel: many at once, unusual ones by the stock decoder.
+"""Decodes a topic's messages by the encoding of each channel: many at once, unusual ones one by one.
 
 A message that cannot be decoded is counted as lost, with the reason in the notes.
 """
