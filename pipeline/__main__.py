@@ -29,6 +29,15 @@ Out = Annotated[
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to compute in. Default: one a processor.")]
 CacheFolder = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")]
 
+Anonymise = Annotated[
+    bool,
+    typer.Option(
+        "--anonymise",
+        help="Write P01, P02 … for participants' ids, everywhere, into a folder of its own; docs/privacy.md says what"
+        " this does not hide.",
+    ),
+]
+
 ExecutorName = Annotated[
     str,
     typer.Option(
@@ -74,21 +83,27 @@ def report(
             " (the others in one file). Default: all.",
         ),
     ] = None,
+    anonymise: Anonymise = False,
 ) -> None:
     """Write each study's report: HTML, PDF, results.json, tables and figures, and all of it as a ZIP."""
     from pipeline.commands import run
 
-    run.report(studies, out, jobs, cache, executor, formats)
+    run.report(studies, out, jobs, cache, executor, formats, anonymise=anonymise)
 
 
 @app.command()
 def compare(
-    studies: Studies, out: Out = None, jobs: Jobs = None, cache: CacheFolder = None, executor: ExecutorName = "process"
+    studies: Studies,
+    out: Out = None,
+    jobs: Jobs = None,
+    cache: CacheFolder = None,
+    executor: ExecutorName = "process",
+    anonymise: Anonymise = False,
 ) -> None:
     """Everything but figures and pages: print the comparisons and write results.json."""
     from pipeline.commands import run
 
-    run.compare(studies, out, jobs, cache, executor)
+    run.compare(studies, out, jobs, cache, executor, anonymise=anonymise)
 
 
 @app.command()
@@ -169,11 +184,12 @@ def export(
     jobs: Jobs = None,
     cache: CacheFolder = None,
     executor: ExecutorName = "process",
+    anonymise: Anonymise = False,
 ) -> None:
     """Write a study's data for other programs."""
     from pipeline.commands import export as command
 
-    command.export(studies, to, out, jobs, cache, executor)
+    command.export(studies, to, out, jobs, cache, executor, anonymise=anonymise)
 
 
 @app.command()

@@ -14,7 +14,14 @@ class PipelineError(Exception):
 
 
 class SessionError(PipelineError):
-    """One session cannot be used; the others go on. Its text is the reason in the exclusions."""
+    """One session cannot be used; the others go on. Its text is the reason in the exclusions.
+
+    `people` are ids of participants that its text quotes from the log.
+    """
+
+    def __init__(self, text: str, people: tuple[str, ...] = ()) -> None:
+        super().__init__(text)
+        self.people = people
 
 
 class WorkerLostError(Exception):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from pipeline.sessions.estimators import build_estimator
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.measures import measure_order
 from pipeline.study.preregistration import read_preregistered
+from pipeline.study.pseudonyms import exclusions_under
 from pipeline.study.settings import Study
 from pipeline.study.simulation import SelectionSimulation
 from pipeline.study.table_file import TableFile, table_file
@@ -44,7 +46,7 @@ def run(work: Work) -> Outcome:
     for name in study.estimators:
         build_estimator(study, name)  # so that a misspelt estimator is an error even where there is no log to run it on
     measured = work.entry("measure")
-    values = read_values(measured, people_of(study, work.folder))
+    values = read_values(measured, people_of(study, work.folder, work.pseudonyms))
     measures, observations = values.measures, values.observations
     frames: dict[str, pd.DataFrame] = {
         "trials": tables.read("trials", measured),
@@ -110,6 +112,9 @@ def _beside_plan(work: Work, frames: Mapping[str, pd.DataFrame]) -> list[Row]:
     frozen = read_preregistered(work.folder)
     if frozen is None:
         return []
+    if work.pseudonyms is not None:
+        exclusions = exclusions_under(work.pseudonyms, frozen.registered.exclusions)
+        frozen = replace(frozen, registered=frozen.registered.model_copy(update={"exclusions": exclusions}))
     comparisons = list(tables.records("comparisons", frames["comparisons"]))
     details = [json.loads(row["details"]) if row["details"] else None for row in comparisons]
     rows = [{**row, "details": detail} for row, detail in zip(comparisons, details, strict=True)]
@@ -161,7 +166,7 @@ def _participant_facts(work: Work, measures: pd.DataFrame, exclusions: pd.DataFr
     """
     counting = (session for session in work.sessions if not work.study.exclusion_of(session))
     people = set(measures["participant"]) | {str(session.participant) for session in counting}
-    file = table_file(work.study, work.folder, "participants")
+    file = table_file(work.study, work.folder, "participants", work.pseudonyms)
     if file is None:
         unscored = exclusions.loc[exclusions["what"] == UNDEFINED, "participant"].dropna()
         everybody = people | set(unscored)

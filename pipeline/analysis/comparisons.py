@@ -24,14 +24,15 @@ from pipeline.statistics.wilcoxon import wilcoxon
 from pipeline.study.comparison import Comparison, matching_measures
 from pipeline.study.csv_tables import read_participants
 from pipeline.study.measures import has_total, measure_order
+from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.settings import Study
 from pipeline.study.table_file import table_file
 from pipeline.tables.table import Row
 
 
-def people_of(study: Study, folder: Path) -> People:
-    """participants.csv of a study folder by column; empty without that file."""
-    file = table_file(study, folder, "participants")
+def people_of(study: Study, folder: Path, pseudonyms: Pseudonyms | None = None) -> People:
+    """participants.csv of a study folder by column, under pseudonyms where there are any; empty without that file."""
+    file = table_file(study, folder, "participants", pseudonyms)
     if file is None:
         return {}
     table = read_participants(file).set_index("participant")

@@ -122,7 +122,8 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
     if file is not None:
         named = study_tables.read_participants(file)["participant"]
         for participant in sorted(listed - set(named)):
-            hint = did_you_mean(participant, sorted(named)) if len(named) else ""
+            guess = len(named) and work.pseudonyms is None  # P03 is no misspelt P02
+            hint = did_you_mean(participant, sorted(named)) if guess else ""
             reason = f"kept; check its spelling{hint}"
             rows.append({"participant": participant, "what": "not in participants", "reason": reason})
         without = sorted(set(named) - listed)

@@ -25,7 +25,7 @@ CELL = ["participant", "condition"]
 
 def given_table(work: Work, table: str) -> TableFile | None:
     """A table that study.yaml names, such as `participants`; None where it names none."""
-    return table_file(work.study, work.folder, table)
+    return table_file(work.study, work.folder, table, work.pseudonyms)
 
 
 def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:

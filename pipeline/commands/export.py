@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pipeline.commands import console
 from pipeline.commands.publish import refuse_study
-from pipeline.commands.studies import for_each_study, refuse_same_names
+from pipeline.commands.studies import ANONYMISED, for_each_study, refuse_same_names
 from pipeline.engine.messages import session_messages
 from pipeline.engine.result import Result
 from pipeline.errors import PipelineError, did_you_mean
@@ -26,7 +26,14 @@ FORMATS: Mapping[str, str] = {
 
 
 def export(
-    studies: Sequence[Path], to: str, out: Path | None, jobs: int | None, cache: Path | None, executor: str
+    studies: Sequence[Path],
+    to: str,
+    out: Path | None,
+    jobs: int | None,
+    cache: Path | None,
+    executor: str,
+    *,
+    anonymise: bool = False,
 ) -> None:
     """Write each study into a folder; exit with 1 where some session was set aside or read in part.
 
@@ -34,7 +41,7 @@ def export(
     """
     if to not in FORMATS:
         raise PipelineError(f'--to: there is no "{to}"{did_you_mean(to, FORMATS)}')
-    folders = _folders(studies, to, out)
+    folders = _folders(studies, f"{to}{ANONYMISED}" if anonymise else to, out)
     for folder in folders.values():
         refuse_study(folder)
 
@@ -48,15 +55,15 @@ def export(
         console.say(f"{result.name}: {count} files in {console.short_path(folder)}")
         return result.exit_code
 
-    sys.exit(for_each_study(studies, COMPARE, jobs, cache, write, executor_name=executor))
+    sys.exit(for_each_study(studies, COMPARE, jobs, cache, write, executor_name=executor, anonymise=anonymise))
 
 
-def _folders(studies: Sequence[Path], to: str, out: Path | None) -> dict[Path, Path]:
+def _folders(studies: Sequence[Path], what: str, out: Path | None) -> dict[Path, Path]:
     """A folder for each study; `--out` itself for a single one."""
     if out is not None and len(studies) == 1:
         return {studies[0]: out}
     names = refuse_same_names(studies)
-    return {study: (out or Path("exports")) / f"{name}-{to}" for study, name in zip(studies, names, strict=True)}
+    return {study: (out or Path("exports")) / f"{name}-{what}" for study, name in zip(studies, names, strict=True)}
 
 
 def _refuse_within(folder: Path, study: Path) -> None:

@@ -35,7 +35,7 @@ def for_r(result: Result, folder: Path) -> int:
 
 
 def _problems(result: Result) -> list[Problem]:
-    values = read_values(result.entry("measure"), people_of(result.study, result.folder))
+    values = read_values(result.entry("measure"), people_of(result.study, result.folder, result.pseudonyms))
     return all_problems(answered(result.study, values))
 
 

@@ -115,7 +115,7 @@ def _program(command: Sequence[str], stages: Iterable[Stage]) -> dict[str, Any]:
 def _settings_and_inputs(result: Result) -> dict[str, Any]:
     """What was read: the settings that study.yaml states, and the digests of the input files."""
     settings = json.loads(result.study.model_dump_json(exclude_defaults=True))
-    return {"settings": settings, "inputs_sha256": result.inputs}
+    return {"settings": settings, "inputs_sha256": result.named_inputs}
 
 
 def _write_provenance(provenance: dict[str, Any], results: Path, folder: Path) -> bool:

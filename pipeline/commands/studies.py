@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from pipeline.commands import console
@@ -16,6 +17,9 @@ from pipeline.engine.run import bring_up_to_date
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
 
+ANONYMISED = "-anonymised"
+"""What the name of a folder ends with that holds nobody's id, so that it is never one that holds them."""
+
 
 def for_each_study(
     studies: Sequence[Path],
@@ -25,14 +29,16 @@ def for_each_study(
     then: Callable[[Path, Result], int],
     *,
     failed: Callable[[Path, PipelineError], None] = lambda _folder, _error: None,
-    bring: Callable[[Path, Sequence[Stage], Resources], Result] = bring_up_to_date,
+    bring: Callable[[Path, Sequence[Stage], Resources], Result] | None = None,
     executor_name: str = PROCESS,
+    anonymise: bool = False,
 ) -> int:
     """Bring each study up to date and call `then` with it; the highest of the exit codes that `then` returns.
 
     The error of a study with which either cannot be done is printed and handed to `failed`; the others go on.
     """
     code = 0
+    bring = bring or partial(bring_up_to_date, anonymise=anonymise)
     with executor_of(jobs, executor_name, console.warn) as executor:
         for folder in studies:
             try:

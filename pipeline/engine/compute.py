@@ -62,7 +62,7 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
             reason = _internal_error(stage, error)
             for folder in (work.folder, cache_root):  # the reason is part of the results, which name no folder
                 reason = reason.replace(f"{folder}/", "")
-            return keep_unusable(cache, stage, key, reason)
+            return keep_unusable(cache, stage, key, _under(work, reason))
     except OSError as error:
         if not _cannot_write(error):
             raise
@@ -76,11 +76,17 @@ def _outcome(stage: Stage, work: Work) -> tuple[Outcome, Exception | None]:
     """What the stage's function reports, or the error that it raised."""
     module, name = stage.function.split(":")
     try:
-        return getattr(import_module(module), name)(work), None
+        outcome: Outcome = getattr(import_module(module), name)(work)
+        return replace(outcome, in_part=outcome.in_part and _under(work, outcome.in_part)), None
     except SessionError as error:
-        return Outcome(set_aside=str(error)), None
+        return Outcome(set_aside=_under(work, str(error), error.people)), None
     except Exception as error:  # noqa: BLE001 - raised by the caller
         return Outcome(), error
+
+
+def _under(work: Work, text: str, people: Sequence[str] = ()) -> str:
+    """A text under the study's pseudonyms, where it has any."""
+    return text if work.pseudonyms is None else work.pseudonyms.in_text(text, people)
 
 
 def _internal_error(stage: Stage, error: Exception) -> str:

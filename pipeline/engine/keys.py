@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from pipeline.engine.cache import LAYOUT, Entry, digest_of
 from pipeline.engine.code_digest import code_digest
 from pipeline.engine.result import Result
 from pipeline.engine.stage import Stage, Work
+from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.study.table_parts import of_table
@@ -52,6 +53,7 @@ def work_and_key(declared: Declared, result: Result, sessions: Sequence[Session]
         tuple(result.in_part) if whole else (),
         tuple(result.unused) if whole else (),
         _inputs(stage, result, sessions),
+        _pseudonyms(stage, result, sessions),
     )
     key = digest_of(
         [
@@ -63,6 +65,7 @@ def work_and_key(declared: Declared, result: Result, sessions: Sequence[Session]
             {name: [entry.digest for entry in entries] for name, entries in read.items()},
             [[session.id, reason] for session, reason in (*work.set_aside, *work.in_part)],
             work.unused,
+            None if work.pseudonyms is None else asdict(work.pseudonyms),
         ]
     )
     return work, key
@@ -71,13 +74,20 @@ def work_and_key(declared: Declared, result: Result, sessions: Sequence[Session]
 def _inputs(stage: Stage, result: Result, sessions: Sequence[Session]) -> dict[str, str]:
     """SHA-256 of the study's own files that the stage reads, by their paths in the study."""
     if stage.names_inputs:
-        return dict(result.inputs)
+        return result.named_inputs
     names = [getattr(result.study, field_name) for field_name in stage.files]
     paths = [path for name in names if name is not None for path in of_table(name, result.inputs)]
     paths += [name for name in stage.fixed_files if name in result.inputs]
     if stage.reads_log:
         paths += [file.relative_to(result.folder).as_posix() for file in sessions[0].files]
     return {path: result.inputs[path] for path in paths}
+
+
+def _pseudonyms(stage: Stage, result: Result, sessions: Sequence[Session]) -> Pseudonyms | None:
+    """Those that a stage needs for the study's own files that it reads."""
+    if result.pseudonyms is None or not (stage.reads_log or stage.files):
+        return None
+    return result.pseudonyms.of_session(sessions[0], result.folder) if stage.reads_log else result.pseudonyms
 
 
 def _settings(study: Study, stage: Stage) -> Any:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from pipeline.engine.cache import Entry
+from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
@@ -25,7 +26,8 @@ class Result:
 
     `sessions` are those that went through every stage. The entry of a stage of scope "study" has the session id "".
     `computed` counts, by stage, the pieces that the cache did not have. `set_aside`, `in_part` and `unused` (files)
-    give the reason for each; `inputs` holds the SHA-256 of each of the study's files.
+    give the reason for each; `inputs` holds the SHA-256 of each of the study's files. `pseudonyms` are those under
+    which the study was opened; None where it is shown as it is.
     """
 
     folder: Path
@@ -39,11 +41,18 @@ class Result:
     damaged: list[Damaged] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
+    pseudonyms: Pseudonyms | None = None
 
     @property
     def name(self) -> str:
         """The study's name, which is its folder's."""
         return self.folder.name
+
+    @property
+    def named_inputs(self) -> dict[str, str]:
+        """`inputs` by the names under which they are shown."""
+        names = {} if self.pseudonyms is None else self.pseudonyms.files
+        return {names.get(path, path): digest for path, digest in self.inputs.items()}
 
     @property
     def exit_code(self) -> int:

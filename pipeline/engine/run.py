@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from pipeline.engine.anonymous import anonymised
 from pipeline.engine.cache import Cache, Entry, file_digest
 from pipeline.engine.entries import entries_of, entry_of_study
 from pipeline.engine.input_files import CHANGED, InputChangedError
@@ -22,8 +23,8 @@ from pipeline.study.settings import Study
 from pipeline.words.phrases import one_line
 
 
-def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources) -> Result:
-    """Run the stages over a study; what the cache holds is not computed again.
+def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources, *, anonymise: bool = False) -> Result:
+    """Run the stages over a study; what the cache holds is not computed again. `anonymise` has pseudonyms for ids.
 
     Where a table or study.yaml changes while it is read, the run begins once more. It does so too where a stage finds
     an entry damaged, since that must be computed first. What was finished is in the cache. Raises PipelineError for a
@@ -35,7 +36,7 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources
     times_changed = times_damaged = 0
     while True:
         try:
-            result = _run_stages(folder, stages, resources, computed, damaged)
+            result = _run_stages(folder, stages, resources, computed, damaged, anonymise)
         except InputChangedError:
             times_changed += 1
             if times_changed > 1:
@@ -50,11 +51,18 @@ def bring_up_to_date(folder: Path, stages: Sequence[Stage], resources: Resources
 
 
 def _run_stages(
-    folder: Path, stages: Sequence[Stage], resources: Resources, computed: dict[str, int], damaged: list[Damaged]
+    folder: Path,
+    stages: Sequence[Stage],
+    resources: Resources,
+    computed: dict[str, int],
+    damaged: list[Damaged],
+    anonymise: bool,
 ) -> Result:
     """Add to what earlier attempts have `computed` and found `damaged`."""
     result, sessions = open_study(folder, resources.cache)
     result.computed, result.damaged = computed, damaged
+    if anonymise:
+        result, sessions = _under_pseudonyms(stages, result, sessions, resources)
     for stage in stages:
         try:
             if stage.scope == "session":
@@ -70,6 +78,16 @@ def _run_stages(
             raise PipelineError(_with_context(folder, result, str(error))) from None
     result.sessions = sessions
     return result
+
+
+def _under_pseudonyms(
+    stages: Sequence[Stage], result: Result, sessions: Sequence[Session], resources: Resources
+) -> tuple[Result, list[Session]]:
+    """The study under pseudonyms. Its logs are read as they are first, for they may say of whom they are."""
+    as_it_is = replace(result, set_aside=[], in_part=[])
+    reads_logs = next(stage for stage in stages if stage.reads_log)
+    usable = usable_after(as_it_is, sessions, _run_sessions(reads_logs, as_it_is, sessions, resources))
+    return anonymised(result, sessions, [*usable, *(session for session, _ in as_it_is.set_aside)])
 
 
 def _run_sessions(stage: Stage, result: Result, sessions: Sequence[Session], resources: Resources) -> dict[str, Entry]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 
@@ -62,6 +63,9 @@ class Work:
     stage read, and one folder for each study stage read. `unused` are files among the sessions that are not logs, with
     the reason. The result is written into the folder `out`.
 
+    `pseudonyms` are handed to stages that read the study's own files, whose ids they replace at once; all else that a
+    stage is given is under them already.
+
     `executor` may take small jobs of a stage of scope "study" (pipeline.engine.jobs); None if they are to be done in
     this process. No result may depend on it, so it is in no key.
     """
@@ -76,6 +80,7 @@ class Work:
     in_part: tuple[tuple[Session, str], ...] = ()
     unused: tuple[tuple[str, str], ...] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
+    pseudonyms: Pseudonyms | None = None
     executor: Executor | None = None
 
     @property

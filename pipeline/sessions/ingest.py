@@ -17,6 +17,7 @@ from pipeline.sessions.logs import read_logs
 from pipeline.sessions.logs.log import Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
 from pipeline.sessions.wanted import of_events, of_stream, wanted_by
+from pipeline.study.pseudonyms import SOMEONE_ELSE, Pseudonyms
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.study.streams import Stream
@@ -37,7 +38,7 @@ def run(work: Work) -> Outcome:
     study, session = work.study, work.session
     limits = Limits(study.log_limits.unpacked_mib * 2**20, study.log_limits.messages)
     log = read_logs(session.files, wanted_by(study), limits)
-    participant, condition = _participant_and_condition(session, log, study)
+    participant, condition = _participant_and_condition(session, log, study, work.pseudonyms)
     in_part = list(log.faults)
     quality: list[Row] = []
     left_out: list[Row] = []
@@ -79,7 +80,9 @@ def run(work: Work) -> Outcome:
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
 
-def _participant_and_condition(session: Session, log: Log, study: Study) -> tuple[str, str]:
+def _participant_and_condition(
+    session: Session, log: Log, study: Study, pseudonyms: Pseudonyms | None
+) -> tuple[str, str]:
     """Participant and condition, by the file's name and the log's metadata, which must agree.
 
     Raises SessionError where they do not, or where neither says.
@@ -88,6 +91,8 @@ def _participant_and_condition(session: Session, log: Log, study: Study) -> tupl
     for what, by_name in (("participant", session.participant), ("condition", session.condition)):
         fact = log.facts.get(what)
         by_fact = unicodedata.normalize("NFC", fact) if fact else None
+        if by_fact and what == "participant" and pseudonyms is not None:
+            by_fact = pseudonyms.participants.get(by_fact, SOMEONE_ELSE)
         if by_name and by_fact and by_name != by_fact:
             raise SessionError(f'its name says {what} "{by_name}", its metadata "{by_fact}"; correct one of them')
         known = by_name or by_fact

@@ -35,6 +35,12 @@ class SessionFiles:
     unused: list[tuple[str, str]]
 
 
+def begins_in(pattern: str) -> Path:
+    """The folder, within the study, in which all logs of a pattern are."""
+    before = PLACEHOLDER.split(Path(pattern).as_posix())[0]
+    return Path(before) if before.endswith("/") else Path(before).parent
+
+
 def find_sessions(folder: Path, study: Study) -> SessionFiles:
     """The logs that match the study's pattern, and the files that are not used.
 
@@ -93,7 +99,7 @@ class _Pattern:
         joins = ANY in whole.name or not in_file
         return _Pattern(
             expression(whole.as_posix()),
-            Path(pieces[0]).parent if not pieces[0].endswith("/") else Path(pieces[0]),
+            begins_in(text),
             whole.suffix,
             len(whole.parts),
             is_folder,

@@ -11,6 +11,7 @@ import pandas as pd
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.fields import identifier
 from pipeline.study.guessing.headers import UNITS
+from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.settings import Study
 from pipeline.study.table_parts import Part, check_told_apart, named_identifiers, parts_of
 from pipeline.study.table_settings import TableFormat, WideEntry
@@ -31,7 +32,8 @@ class TableFile:
 
     `table` is its key in study.yaml, such as "trials"; `headers` what its own headers mean, `missing` the codes for
     values that are not there, `px_per_mm` how long a pixel is (None where study.yaml does not say). `parts` are the
-    files of a table that is split, of which `path` is the pattern.
+    files of a table that is split, of which `path` is the pattern. `pseudonyms` replace the ids in it; None leaves
+    them.
     """
 
     path: Path
@@ -43,6 +45,7 @@ class TableFile:
     wide: tuple[WideEntry, ...] = ()
     px_per_mm: float | None = None
     parts: tuple[Part, ...] = ()
+    pseudonyms: Pseudonyms | None = None
 
     @property
     def decimal(self) -> str:
@@ -50,7 +53,7 @@ class TableFile:
         return self.form.decimal or "."
 
 
-def table_file(study: Study, folder: Path, table: str) -> TableFile | None:
+def table_file(study: Study, folder: Path, table: str, pseudonyms: Pseudonyms | None = None) -> TableFile | None:
     """A table that study.yaml names, such as `participants`; None where it names none."""
     name = getattr(study, table)
     if name is None:
@@ -65,6 +68,7 @@ def table_file(study: Study, folder: Path, table: str) -> TableFile | None:
         getattr(study.wide, table, ()),
         study.display.px_per_mm if study.display is not None else None,
         tuple(parts_of(folder, name)),
+        pseudonyms,
     )
 
 
@@ -74,8 +78,15 @@ def read_table(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame, 
     The columns have our names: those that `columns` in study.yaml gives them, and `start_s` for `start_ms`. Raises
     PipelineError, naming what to write into study.yaml, where the file cannot be read or lacks a required column.
     """
-    if not file.parts:
-        return _read_one(file, required, {})
+    table, factors = _read_parts(file, required) if file.parts else _read_one(file, required, {})
+    if file.pseudonyms is not None:
+        file.pseudonyms.in_table(table, file.path)
+    return table, factors
+
+
+def _read_parts(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame, dict[str, float]]:
+    """A split table: its files one below the other, whose rows are named after them."""
+    shown = {} if file.pseudonyms is None else file.pseudonyms.files
     tables: list[pd.DataFrame] = []
     said: dict[str, list[tuple[str, frozenset[str]]]] = {}
     factors: dict[str, float] = {}
@@ -90,7 +101,7 @@ def read_table(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame, 
             )
         for key, value in named.items():
             said.setdefault(key, []).append((value, frozenset(table[key])))
-        table.index = pd.Index([f"{line} of {part.name}" for line in table.index])
+        table.index = pd.Index([f"{line} of {shown.get(part.name, part.name)}" for line in table.index])
         tables.append(table)
     for key, each in said.items():
         check_told_apart(str(file.path), key, each)

@@ -33,7 +33,10 @@ def joined(parts: Sequence[Part]) -> Log:
     for path, log in in_time:
         for key, value in log.facts.items():
             if facts.setdefault(key, value) != value:
-                raise SessionError(f'its parts disagree: {key} is "{facts[key]}" and, in {path.name}, "{value}"')
+                people = (facts[key], value) if key == "participant" else ()
+                raise SessionError(
+                    f'its parts disagree: {key} is "{facts[key]}" and, in {path.name}, "{value}"', people
+                )
     keys = dict.fromkeys(key for _, log in in_time for key in log.topics)
     topics = {key: _readings([log.topics[key] for _, log in in_time if key in log.topics]) for key in keys}
     faults = [f"{path.name}: {fault}" for path, log in in_time for fault in log.faults]
