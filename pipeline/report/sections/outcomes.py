@@ -201,7 +201,7 @@ def _statements(rows: Sequence[Row]) -> Iterator[Text]:
 
 
 def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> list[Block]:
-    scales = [name for name in names if not name.endswith("/total")]
+    scales = [name for name in names if not name.endswith("/total")] or names  # a table may hold the totals alone
     title = measure_label(f"{questionnaire}/x").partition(":")[0]
     wide = {name: material.participant_means(name) for name in scales}
     blocks: list[Block] = [_ratings_table(material, questionnaire, title, names)]
@@ -230,7 +230,8 @@ def _ratings_table(material: Material, questionnaire: str, title: str, names: li
             row = described.get((name, condition))
             cells += ["–", "–", "0"] if row is None else [number(row["mean"]), number(row["sd"]), f"{row['n']}"]
         rows.append(tuple(cells))
-    note = "Total: a participant's sum over the scales." if any(name.endswith("/total") for name in names) else ""
+    with_total = len(names) > 1 and any(name.endswith("/total") for name in names)
+    note = "Total: a participant's sum over the scales." if with_total else ""
     return Table(f"table-{safe_name(questionnaire)}", f"{title} ratings by scale.", tuple(columns), tuple(rows), note)
 
 

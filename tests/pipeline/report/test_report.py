@@ -452,3 +452,18 @@ def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Fol
     assert "Bonferroni-adjusted p" in text
     assert "Singular fit of the mixed model for M: it finds no variance between participants" in text
     assert "singular fit: no variance between participants is found" in text
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_a_questionnaire_of_which_only_the_total_was_kept_is_shown(folder: Folder, steadyhand: Steadyhand) -> None:
+    rows = "".join(
+        f"P{person},{each},nasa_tlx,total,{person}{ord(each) - 96}\n" for person in range(3) for each in "ab"
+    )
+    study = folder(
+        "conditions: [a, b]\nquestionnaires: q.csv\n",
+        **{"q.csv": f"participant,condition,questionnaire,scale,rating\n{rows}"},
+    )
+    assert steadyhand("report", study).code == 0
+    text = " ".join("".join(checked((steadyhand.out / "report.html").read_text(encoding="utf-8")).text).split())
+    assert "Ratings by scale and condition" in text
+    assert "a participant's sum over the scales" not in text
