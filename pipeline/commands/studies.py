@@ -9,6 +9,7 @@ from pathlib import Path
 from pipeline.commands import console
 from pipeline.engine.executors import PROCESS, executor_of
 from pipeline.engine.folders import cache_in
+from pipeline.engine.machine_code import keep_machine_code_in
 from pipeline.engine.messages import damage_messages
 from pipeline.engine.progress import show_progress
 from pipeline.engine.resources import Resources
@@ -39,6 +40,7 @@ def for_each_study(
     """
     code = 0
     bring = bring or partial(bring_up_to_date, anonymise=anonymise)
+    keep_machine_code_in(cache_in(cache).root)
     with executor_of(jobs, executor_name, console.warn) as executor:
         for folder in studies:
             try:
