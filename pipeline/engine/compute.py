@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
+from typing import TypeGuard
 
 from pipeline.engine.cache import Cache, Entry, digest_of, distrust
 from pipeline.engine.input_files import CHANGED, InputChangedError, InputFiles
@@ -15,6 +16,8 @@ from pipeline.engine.processes import Processes
 from pipeline.engine.stage import Outcome, Stage, Work
 from pipeline.errors import RUN_AGAIN, DamagedTableError, PipelineError, SessionError
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What a full disk answers, and one on which the user may have no more."""
 Piece = tuple[Work, str]
 """A piece of work, and the key of its result."""
 
@@ -57,18 +60,19 @@ def compute(stage: Stage, work: Work, key: str, cache_root: Path) -> Entry:
                 distrust(error.path.parent)
             if error is None:
                 return cache.keep(stage.name, key, out, asdict(outcome))
-            if isinstance(error, PipelineError) or stage.scope != "session" or _cannot_write(error):
+            if isinstance(error, PipelineError) or stage.scope != "session" or _cannot_write(error, work):
                 raise error
-            reason = _internal_error(stage, error)
+            reason = _unreadable(error) if _is_of_a_log(error, work) else _internal_error(stage, error)
             for folder in (work.folder, cache_root):  # the reason is part of the results, which name no folder
                 reason = reason.replace(f"{folder}/", "")
             return keep_unusable(cache, stage, key, _under(work, reason))
     except OSError as error:
-        if not _cannot_write(error):
+        if not _cannot_write(error, work):
             raise
+        space = "free some space (perhaps with `steadyhand cache prune`) or " if error.errno in _FULL else ""
         raise PipelineError(
-            f"{cache_root}: cannot be written: {os.strerror(error.errno or 0)}; free some space (perhaps with"
-            f" `steadyhand cache prune`) or choose another folder with --cache. {RUN_AGAIN}"
+            f"{cache_root}: cannot be written: {os.strerror(error.errno or 0)}; {space}choose another folder with"
+            f" --cache. {RUN_AGAIN}"
         ) from None
 
 
@@ -99,6 +103,19 @@ def keep_unusable(cache: Cache, stage: Stage, key: str, reason: str) -> Entry:
         return cache.keep(stage.name, digest_of([key, reason]), out, asdict(Outcome(set_aside=reason)))
 
 
-def _cannot_write(error: Exception) -> bool:
-    """Whether the disk is full or read-only; then no session is at fault, and the run cannot go on."""
-    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+def _cannot_write(error: Exception, work: Work) -> TypeGuard[OSError]:
+    """Whether the disk is full or read-only, or fails; then no session is at fault, and the run cannot go on."""
+    if not isinstance(error, OSError) or _is_of_a_log(error, work):
+        return False
+    return error.errno in (*_FULL, errno.EROFS, errno.EIO)
+
+
+def _is_of_a_log(error: Exception, work: Work) -> TypeGuard[OSError]:
+    """Whether a file of the study's logs cannot be read."""
+    if not isinstance(error, OSError) or not isinstance(error.filename, str | bytes):
+        return False
+    return any(Path(os.fsdecode(error.filename)) in session.files for session in work.sessions)
+
+
+def _unreadable(error: OSError) -> str:
+    return f"cannot be read: {error.strerror}"
