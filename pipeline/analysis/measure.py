@@ -25,6 +25,7 @@ from pipeline.analysis.values import (
     rated_values,
     selection_values,
     tabled_values,
+    typed_trials,
 )
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
@@ -42,7 +43,9 @@ ALL_DATA = "all_data"
 def run(work: Work) -> Outcome:
     """Write the study's trials, measures and exclusions; raises PipelineError for a table that cannot be used."""
     study = work.study
-    (trials, selections), movements = all_trials(work), all_movements(work)
+    typed = typed_trials(work)
+    (trials, selections), movements = all_trials(work, typed), all_movements(work, typed)
+    del typed
     every_trial = trials
     given, exclusions = without_practice(study, Tables(trials, selections, movements, measures_table(work)))
     trials, selections, movements, tabled = given.trials, given.selections, given.movements, given.measures
@@ -149,7 +152,8 @@ def _write_values(
     tables.write("measures", measures, folder)
     tables.write("observations", _with_totals(study, _cells(values, observed), observed, scores), folder)
     by_target = values[values["target"].notna()]
-    by_target = by_target.assign(factors=[json.dumps({"target": place}) for place in by_target["target"]])
+    factors = {place: json.dumps({"target": place}) for place in by_target["target"].unique()}
+    by_target = by_target.assign(factors=by_target["target"].map(factors))
     tables.write("target_observations", _cells(by_target, observed), folder)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -28,21 +29,25 @@ def given_table(work: Work, table: str) -> TableFile | None:
     return table_file(work.study, work.folder, table, work.pseudonyms)
 
 
-def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The trials of all sessions, or of trials.csv, as recorded and as each estimator would have shown; selections.
+def typed_trials(work: Work) -> pd.DataFrame | None:
+    """The rows of trials.csv; None where study.yaml names none."""
+    file = given_table(work, "trials")
+    return None if file is None else study_tables.read_trials(file)
 
-    Those of trials.csv have further columns: `factors`, and those of the study's own.
+
+def all_trials(work: Work, table: pd.DataFrame | None) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The trials of all sessions as recorded and as each estimator would have shown, or `table`, those of trials.csv.
+
+    Beside them their selections. Those of trials.csv have further columns: `factors`, and those of the study's own.
     """
     trials = tables.read("trials", work.entries["assess"])
-    file = given_table(work, "trials")
-    if file is None:
+    if table is None:
         return trials, tables.read("selections", work.entries["assess"])
     if len(trials):
         raise PipelineError(
-            f"{file.path.name}: the logs hold trials too, and would be mixed with these; take `trials:` or `events:`"
-            " out of study.yaml"
+            f"{Path(str(work.study.trials)).name}: the logs hold trials too, and would be mixed with these; take"
+            " `trials:` or `events:` out of study.yaml"
         )
-    table = study_tables.read_trials(file)
     squared = np.zeros(len(table))
     for axis in "xyz":
         # A trial counts over the axes its target has; a selection that lacks one of them cannot be measured.
@@ -68,16 +73,17 @@ def all_trials(work: Work) -> tuple[pd.DataFrame, pd.DataFrame]:
 def factors_of_rows(study: Study, table: pd.DataFrame) -> pd.Series:
     """The levels of the factors that are columns of a table, as JSON text; None for a row without any."""
     names = [name for name in study.factors if name in table and name not in CELL]
+    if not names:
+        return pd.Series(None, index=table.index, dtype="object")
     levels = [{k: v for k, v in zip(names, row, strict=True) if v} for row in table[names].to_numpy()]
     return pd.Series([json.dumps(facts) if facts else None for facts in levels], index=table.index, dtype="object")
 
 
-def all_movements(work: Work) -> pd.DataFrame:
-    """The movements of all sessions, or of trials.csv in the order of their starts."""
-    file = given_table(work, "trials")
-    if file is None:
+def all_movements(work: Work, table: pd.DataFrame | None) -> pd.DataFrame:
+    """The movements of all sessions, or of `table`, the trials of trials.csv, in the order of their starts."""
+    if table is None:
         return tables.read("movements", work.entries["assess"])
-    table = study_tables.read_trials(file).sort_values("start_s", kind="stable")
+    table = table.sort_values("start_s", kind="stable")
     table["factors"] = factors_of_rows(work.study, table)
     table["left_s"] = table["selection_s"]
     for axis in "xyz":

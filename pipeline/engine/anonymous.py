@@ -85,9 +85,10 @@ def _rows_of_tables(study: Study, folder: Path) -> Iterator[_Row]:
 def _files_of_tables(study: Study, folder: Path) -> dict[str, str]:
     """Other names for the files of a table that is split: the ids are in their names."""
     return {
-        part.name: PurePosixPath(part.name).with_name(f"{table}_{number}{part.path.suffix}").as_posix()
+        part.name: (begins_in(pattern) / f"{table}_{number}{part.path.suffix}").as_posix()
         for table in _OF_PEOPLE
-        for number, part in enumerate(parts_of(folder, getattr(study, table) or ""), 1)
+        for pattern in [getattr(study, table) or ""]
+        for number, part in enumerate(parts_of(folder, pattern), 1)
     }
 
 

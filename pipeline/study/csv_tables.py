@@ -13,6 +13,7 @@ import pandas as pd
 
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.guessing.remedies import misnamed_column, number_remedy
+from pipeline.study.large_tables import numbers as numbers_of
 from pipeline.study.table_file import TableFile, read_table
 from pipeline.study.wide_tables import lengthened, value_columns
 
@@ -64,6 +65,12 @@ def _numbers(
 
     With `finite`, for infinity too: a measure may be infinite and is listed then, a place or a time cannot be.
     """
+    if isinstance(table[column].dtype, pd.StringDtype) and file.decimal == ".":
+        words = [*MISSING, *(code for code in file.missing if isinstance(code, str))]
+        read = numbers_of(table[column], words)
+        if read is not None:  # else one of them is at fault, or is written in another way
+            coded = np.isin(read, [code for code in file.missing if not isinstance(code, str)])
+            return pd.Series(np.where(coded, np.nan, read * factor), index=table.index)
     values, faults, texts = [], [], []
     for line, text in table[column].items():
         try:
@@ -84,9 +91,9 @@ def _numbers(
 
 def _whole_numbers(file: TableFile, table: pd.DataFrame, column: str) -> pd.Series:
     values = _numbers(file, table, column)
-    for line, value, given in zip(table.index, values, table[column], strict=True):
-        if not (np.isfinite(value) and abs(value) < 2**53 and value == round(value)):
-            raise PipelineError(f'{file.path}, row {line}: "{column}" should be a whole number, found "{given}"')
+    whole = np.isfinite(values) & (values.abs() < 2**53) & (values == values.round())
+    for line, given in table[column][~whole].items():
+        raise PipelineError(f'{file.path}, row {line}: "{column}" should be a whole number, found "{given}"')
     return values.astype(np.int64)
 
 
@@ -103,10 +110,9 @@ def _periods(file: TableFile, table: pd.DataFrame) -> pd.Series:
 
 
 def _check_conditions(file: TableFile, table: pd.DataFrame) -> None:
-    for line, condition in table["condition"].items():
-        if condition not in file.conditions:
-            hint = did_you_mean(condition, file.conditions)
-            raise PipelineError(f'{file.path}, row {line}: condition "{condition}" is not in study.yaml{hint}')
+    for line, condition in table["condition"][~table["condition"].isin(file.conditions)].items():
+        hint = did_you_mean(condition, file.conditions)
+        raise PipelineError(f'{file.path}, row {line}: condition "{condition}" is not in study.yaml{hint}')
 
 
 def _check_unique(file: TableFile, table: pd.DataFrame, columns: Sequence[str]) -> None:
@@ -147,20 +153,21 @@ def read_trials(file: TableFile) -> pd.DataFrame:
 
     Columns of the study's own are kept as text.
     """
-    table, factors = read_table(file, TRIAL_REQUIRED)
+    table, factors = read_table(file, TRIAL_REQUIRED, (*TRIAL_REQUIRED[2:], *TRIAL_OPTIONAL[1:]))
     _own_columns(file, table, (*TRIAL_REQUIRED, *TRIAL_OPTIONAL))
+    given = [str(name) for name in table]
     for column in TRIAL_OPTIONAL:
         if column not in table:
-            table[column] = ""
+            table[column] = "" if column == "session" else np.nan
     _required_text(file, table, ["participant", "condition"])
     _check_conditions(file, table)
     table["trial"] = _whole_numbers(file, table, "trial")
     _check_unique(file, table, ["participant", "condition", "session", "trial"])
-    for column in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]):
+    for column in (name for name in (*TRIAL_REQUIRED[3:], *TRIAL_OPTIONAL[1:]) if name in given):
         table[column] = _numbers(file, table, column, factor=factors.get(column, 1.0), finite=True)
-    for line, width in table["target_width_mm"].items():
-        if width <= 0:
-            raise PipelineError(f'{file.path}, row {line}: "target_width_mm" should be above 0, found {width:g}')
+    widths = table["target_width_mm"]
+    for line, width in widths[widths <= 0].items():
+        raise PipelineError(f'{file.path}, row {line}: "target_width_mm" should be above 0, found {width:g}')
     return table
 
 
@@ -200,7 +207,7 @@ def _with_values(file: TableFile, required: Sequence[str]) -> pd.DataFrame:
     """A table with a value a row in the last of its required columns, as it is or made of a wide one."""
     value = required[-1]
     if not file.wide:
-        table, _ = read_table(file, required)
+        table, _ = read_table(file, required, (value,))
         table[value] = _numbers(file, table, value)
         return table
     table, _ = read_table(file, required[:1])

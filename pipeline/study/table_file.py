@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,11 +11,12 @@ import pandas as pd
 from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.fields import identifier
 from pipeline.study.guessing.headers import UNITS
+from pipeline.study.large_tables import by_column
 from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.settings import Study
 from pipeline.study.table_parts import Part, check_told_apart, named_identifiers, parts_of
 from pipeline.study.table_settings import TableFormat, WideEntry
-from pipeline.study.table_text import read_rows
+from pipeline.study.table_text import is_workbook, read_rows
 
 Codes = Sequence[float | str]
 """What study.yaml lists under `missing`: numbers or words that stand for a value that is not there."""
@@ -72,13 +73,16 @@ def table_file(study: Study, folder: Path, table: str, pseudonyms: Pseudonyms | 
     )
 
 
-def read_table(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame, dict[str, float]]:
+def read_table(
+    file: TableFile, required: Sequence[str], numbers: Collection[str] = ()
+) -> tuple[pd.DataFrame, dict[str, float]]:
     """The table as text, ids in NFC, by its file's row numbers; and by how much columns in other units are multiplied.
 
-    The columns have our names: those that `columns` in study.yaml gives them, and `start_s` for `start_ms`. Raises
-    PipelineError, naming what to write into study.yaml, where the file cannot be read or lacks a required column.
+    The columns have our names: those that `columns` in study.yaml gives them, and `start_s` for `start_ms`. Those named
+    in `numbers`, which the caller turns into numbers at once, may be Arrow's text. Raises PipelineError, naming what to
+    write into study.yaml, where the file cannot be read or lacks a required column.
     """
-    table, factors = _read_parts(file, required) if file.parts else _read_one(file, required, {})
+    table, factors = _read_parts(file, required) if file.parts else _read_one(file, required, {}, numbers)
     if file.pseudonyms is not None:
         file.pseudonyms.in_table(table, file.path)
     return table, factors
@@ -109,10 +113,17 @@ def _read_parts(file: TableFile, required: Sequence[str]) -> tuple[pd.DataFrame,
 
 
 def _read_one(
-    file: TableFile, required: Sequence[str], named: Mapping[str, str]
+    file: TableFile, required: Sequence[str], named: Mapping[str, str], numbers: Collection[str] = ()
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """One file. What its name says is a column, unless it has that column itself."""
     path = file.path
+    large = None if named or is_workbook(path) else by_column(path, file.form)
+    if large is not None:
+        _check_names(path, large.header)
+        ours, factors = _ours(file, _renamed(file, large.header))
+        if set(required) <= set(ours):  # else the message needs the rows
+            return large.frame(ours, numbers), factors
+        del large
     rows = read_rows(path, file.form)
     if not rows:
         raise PipelineError(f"{path}: is empty; its first line must name the columns {', '.join(required)}")

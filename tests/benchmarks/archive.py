@@ -90,6 +90,11 @@ def measured(*words: str) -> Ran:
     return Ran(took, main, max(most.values(), default=0.0))
 
 
+def held_mb(pid: int) -> float:
+    """What a process and all those that it started hold at this moment, in MB."""
+    return _status_mb(pid, "VmRSS:") + sum(held_mb(child) for child in _children(pid))
+
+
 def _children(pid: int) -> list[int]:
     """The processes a process started, from whichever of its threads."""
     found = []
@@ -101,9 +106,13 @@ def _children(pid: int) -> list[int]:
 
 def _most_held_mb(pid: int) -> float:
     """The peak of a process's resident memory so far; 0 of one that has ended."""
+    return _status_mb(pid, "VmHWM:")
+
+
+def _status_mb(pid: int, key: str) -> float:
     with suppress(OSError):
         for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):
+            if line.startswith(key):
                 return int(line.split()[1]) / 1024
     return 0.0
 
