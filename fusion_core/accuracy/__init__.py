@@ -18,6 +18,7 @@ LAG_RANGE_S = 0.5
 _LAG_STEP_S = 0.005
 _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
+_BLOCKS_MAX = 200_000  # to draw from: 2 kB each, and those a few ms apart are nearly the same
 _FLAT = 1e-6  # costs that differ by less than this share say nothing: while the reference is still, any shift fits
 
 
@@ -70,10 +71,10 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
 
     `time` (n,) rises, `estimate` is (n, d) in mm. The lag is refined below the step of 5 ms by a parabola through the
     smallest squared distance and its neighbours. The 95 % interval is the 2.5 and 97.5 percentile over 1000 resamples
-    of moving blocks of 0.5 s. NaN with less than 1 s of usable track, or where the smallest distance is at the edge of
-    the range. A resample whose smallest distance is at the edge counts with the edge, so an interval that reaches
-    ±0.5 s means that the data do not determine the lag. A resample in which the hand never moves says nothing about the
-    lag and is left out.
+    of moving blocks of 0.5 s; of a long recording, of those that begin at every k-th instant. NaN with less than 1 s of
+    usable track, or where the smallest distance is at the edge of the range. A resample whose smallest distance is at
+    the edge counts with the edge, so an interval that reaches ±0.5 s means that the data do not determine the lag. A
+    resample in which the hand never moves says nothing about the lag and is left out.
     """
     order = np.argsort(reference.time, kind="stable")
     known, value = reference.time[order], reference.value[order]
@@ -83,7 +84,8 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     time, estimate = time[usable], np.ascontiguousarray(estimate[usable], dtype=np.float64)
     block = min(max(1, round(_BLOCK_S / float(np.median(np.diff(time))))), len(time))
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
-    blocks = lag_steps.block_costs(_segments(known, value), time, estimate, shifts, block)
+    every = -(-len(time) // _BLOCKS_MAX)
+    blocks = lag_steps.block_costs(_segments(known, value), time, estimate, shifts, block, every)
     scale = float(blocks.total.max())
     whole = lag_steps.best(blocks.total, scale)
     if scale - blocks.total.min() <= _FLAT * scale or not 0 < whole < len(shifts) - 1:

@@ -24,8 +24,8 @@ What must stay true. The result is the one that all costs would give, to the las
 over all shifts. Where several neighbouring shifts fit equally well (the hand stands still), the first of them counts. A
 resample counts as still only if each of its blocks is (`_STILL`).
 
-What may change. The size of a group, and how blocks are picked. The cost must stay a sum over instants, or nothing of
-this holds.
+What may change. The size of a group, how blocks are picked, and how many are kept of a long recording, each of which
+takes 2 kB. The cost must stay a sum over instants, or nothing of this holds.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Segments(NamedTuple):
 
 
 class Blocks(NamedTuple):
-    """Costs of all blocks of consecutive instants, one block from each instant that has enough instants after it."""
+    """Costs of blocks of consecutive instants, one from each `every`-th instant that has enough instants after it."""
 
     cost: FloatArray  # (groups, blocks, 8) mm²; the last group is filled up with inf
     bound: FloatArray  # (blocks, groups) mm²: the lowest of each group
@@ -61,13 +61,16 @@ class Blocks(NamedTuple):
 
 
 @compiled
-def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shifts: FloatArray, block: int) -> Blocks:
+def block_costs(
+    segments: Segments, time: FloatArray, estimate: FloatArray, shifts: FloatArray, block: int, every: int
+) -> Blocks:
     """Σ‖estimate(t) − reference(t − shift)‖² over every `block` consecutive instants, for rising `shifts` in s.
 
-    `time` (n,) rises, `estimate` is (n, d); the reference must cover every shift of each instant.
+    `time` (n,) rises, `estimate` is (n, d); the reference must cover every shift of each instant. Blocks are kept that
+    begin at every `every`-th instant; `total` is of all instants.
     """
     count, groups = len(shifts), (len(shifts) + _GROUP - 1) // _GROUP
-    blocks = len(time) - block + 1
+    blocks = (len(time) - block) // every + 1
     cost = np.empty((groups, blocks, _GROUP))
     cost[-1] = np.inf
     bound, still, total = np.empty((blocks, groups)), np.empty(blocks, np.bool_), np.zeros(count)
@@ -86,8 +89,9 @@ def block_costs(segments: Segments, time: FloatArray, estimate: FloatArray, shif
             running[shift] += newest[shift] - oldest[shift]
             total[shift] += newest[shift]
             oldest[shift] = newest[shift]
-        if row >= block - 1:
-            still[row - block + 1] = _into_groups(running, cost[:, row - block + 1], bound[row - block + 1])
+        at = (row - block + 1) // every
+        if row >= block - 1 and at * every == row - block + 1:
+            still[at] = _into_groups(running, cost[:, at], bound[at])
     return Blocks(cost, bound, still, total)
 
 

@@ -228,3 +228,16 @@ def test_a_quaternion_of_length_zero_is_refused() -> None:
 def test_samples_that_cannot_be_are_refused(time: list[float], value: list[list[float]], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Samples(np.array(time), np.array(time), np.array(value))
+
+
+def test_a_long_recording_has_fewer_blocks_to_draw_from_and_the_same_lag(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = np.arange(0, 60, 1 / 90)
+    track = moving(time - 0.07) + np.random.default_rng(3).normal(0, 5, (len(time), 2))
+    whole = accuracy.lag(time, track, of(time, moving(time)), np.random.default_rng(1))
+    monkeypatch.setattr(accuracy, "_BLOCKS_MAX", 500)
+    fewer = accuracy.lag(time, track, of(time, moving(time)), np.random.default_rng(1))
+    assert fewer.value == whole.value
+    # The SD of a 2.5 percentile of 1000 draws is √(.025·.975/1000)/φ(1.96) = 0.085 of theirs, a 46th of the interval.
+    ends = 4 * np.sqrt(2) * (whole.high - whole.low) / 46
+    assert abs(fewer.low - whole.low) < ends
+    assert abs(fewer.high - whole.high) < ends
