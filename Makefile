@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench lock clean
+.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -74,6 +74,9 @@ docs: .venv/installed ## write docs/tables.md anew from the records in pipeline/
 bench: .venv/installed ## how fast, as ratios in one run, beside other libraries
 	@sh tools/make-peers
 	@$(python) -m tests.benchmarks $(ARGS)
+
+limits: .venv/installed ## how much a study may hold: seconds and memory of large studies (an hour); ARGS="trials": some of them
+	@$(python) -m tests.benchmarks.limits $(ARGS)
 
 lock: .venv/installed ## bring requirements.lock up to date with pyproject.toml
 	@sh tools/make-lock

@@ -10,13 +10,14 @@ import numpy as np
 import pyarrow as pa
 
 from pipeline.engine.stage import Outcome, Work
-from pipeline.errors import SessionError, did_you_mean
+from pipeline.errors import PipelineError, SessionError, did_you_mean
 from pipeline.sessions.checks import check_rows
 from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.logs import read_logs
 from pipeline.sessions.logs.log import Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
 from pipeline.sessions.wanted import of_events, of_stream, wanted_by
+from pipeline.study.memory import free_bytes, shortage
 from pipeline.study.pseudonyms import SOMEONE_ELSE, Pseudonyms
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
@@ -26,6 +27,8 @@ from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Row
 
 MM_PER_M = 1000.0
+MEMORY_PER_BYTE = 20.0
+"""Bytes of memory that a session takes for each of its log, by docs/limits.md."""
 _NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
 _DAY_NS = 86_400e9
 _SAME_CLOCK_S = 3600.0
@@ -36,6 +39,7 @@ _LATE_S = 0.5  # what an estimator remembers by default
 def run(work: Work) -> Outcome:
     """One session's positions, imu, events, quality and checks; SessionError with the reason if it cannot be used."""
     study, session = work.study, work.session
+    _require_memory(session)
     limits = Limits(study.log_limits.unpacked_mib * 2**20, study.log_limits.messages)
     log = read_logs(session.files, wanted_by(study), limits)
     participant, condition = _participant_and_condition(session, log, study, work.pseudonyms)
@@ -78,6 +82,14 @@ def run(work: Work) -> Outcome:
         tables.write("session_orders", tables.of_rows("session_orders", [order]), work.out)
     in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
+
+
+def _require_memory(session: Session) -> None:
+    """Raise PipelineError, and not SessionError, which would stand in the cache when there is room for the log."""
+    size = sum(file.stat().st_size for file in session.files)
+    lacking = shortage(size, MEMORY_PER_BYTE, free_bytes())
+    if lacking is not None:
+        raise PipelineError(f"session {session.id}: {lacking}")
 
 
 def _participant_and_condition(

@@ -12,6 +12,7 @@ from pipeline.errors import PipelineError, did_you_mean
 from pipeline.study.fields import identifier
 from pipeline.study.guessing.headers import UNITS
 from pipeline.study.large_tables import by_column
+from pipeline.study.memory import free_bytes, shortage
 from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.settings import Study
 from pipeline.study.table_parts import Part, check_told_apart, named_identifiers, parts_of
@@ -20,6 +21,9 @@ from pipeline.study.table_text import is_workbook, read_rows
 
 Codes = Sequence[float | str]
 """What study.yaml lists under `missing`: numbers or words that stand for a value that is not there."""
+
+MEMORY_PER_BYTE = 27.0
+"""Bytes of memory that a report takes for each of a table, by docs/limits.md."""
 
 _IN_OURS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "s": 1.0, "ms": 1e-3}
 
@@ -117,6 +121,7 @@ def _read_one(
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """One file. What its name says is a column, unless it has that column itself."""
     path = file.path
+    _require_memory(path)
     large = None if named or is_workbook(path) else by_column(path, file.form)
     if large is not None:
         _check_names(path, large.header)
@@ -148,6 +153,13 @@ def _read_one(
             table[key] = value
     table.index = pd.Index([line for line, _ in rows[1:]])  # the file's own line numbers
     return table, factors
+
+
+def _require_memory(path: Path) -> None:
+    lacking = shortage(path.stat().st_size, MEMORY_PER_BYTE, free_bytes()) if path.is_file() else None
+    if lacking is not None:
+        raise PipelineError(f"{path}: {lacking}")
+
 
 
 def _without_empty_ends(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:

@@ -95,18 +95,18 @@ def _readings(seconds: float) -> Iterator[Message]:
     random = np.random.default_rng(0)
     for begins in range(int(seconds)):
         second: list[Message] = []
-        for topic, content, rate, width in (
-            ("/tracker", "position", 120, 3),
-            ("/reference", "position", 120, 3),
-            ("/imu", "acceleration", 1000, 10),
+        for topic, content, rate, width, noise in (
+            ("/tracker", "position", 120, 3, 0.008),
+            ("/reference", "position", 120, 3, 0.0001),
+            ("/imu", "acceleration", 1000, 10, 0.1),
         ):
             at = begins + np.arange(rate) / rate
-            values = random.normal(0, 0.008 if topic == "/tracker" else 0.0, (rate, width))
+            values = random.normal(0, noise, (rate, width))
             if content == "position":
                 values[:, 0] += 0.1 * np.sin(2 * at)
             else:
                 values[:, :3] += np.column_stack([-0.4 * np.sin(2 * at), np.full(rate, 9.80665), np.zeros(rate)])
-                values[:, 9] = 1.0
+                values[:, 6:] = (0.0, 0.0, 0.0, 1.0)
             late = 0.05 if topic == "/tracker" else 0.0
             for instant, value in zip(at, values, strict=True):
                 arrival = EPOCH_NS + round((instant + late) * 1e9)
