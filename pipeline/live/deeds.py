@@ -20,9 +20,9 @@ def do(run: StudyRun, event: Said, do: Do) -> Stepped:
         return changed(run, operators=(event.client, *others), seen=None), (Tell(event.client, Done(do.id)),)
     if not run.operators or event.client != run.operators[0]:
         return run, (Tell(event.client, Refused(do.id, "Another page may act; press “Take over” first.")),)
-    allowed, why = desk.may(run, do.what, do.text.strip(), event.at_ns)
-    if not allowed:
-        return run, (Tell(event.client, Refused(do.id, why)),)
+    refusal = desk.refusal(run, do.what, do.text.strip(), event.at_ns)
+    if refusal is not None:
+        return run, (Tell(event.client, Refused(do.id, refusal.why, refusal.reason_overrules)),)
     run, actions = _DEEDS[do.what](run, do.text.strip(), event.at_ns)
     return run, (*actions, Tell(event.client, Done(do.id)))
 
@@ -38,7 +38,7 @@ def _start(run: StudyRun, reason: str, at_ns: int) -> Stepped:
         run, saved = save(run, record)
         actions += saved
     run, saved = save(run, {"type": "begun", **ids, "condition": condition, "at_ns": at_ns})
-    opened = Open(person.id, condition, desk.facts(run, person, index, reason))
+    opened = Open(person.id, condition, desk.facts(run, person, index, reason, at_ns))
     attempt, begun = session.begin(run.setup.attempt(person.id, condition), run.phone, at_ns)
     welcome = () if run.phone is None else (Tell(run.phone, run.setup.welcome(index + 1)),)
     return changed(run, phase="session", attempt=attempt), (*actions, *saved, opened, *welcome, *begun)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pipeline.live import health, plan
@@ -12,7 +13,7 @@ from pipeline.study.recording import BUILT_IN
 if TYPE_CHECKING:
     from pipeline.live.run_state import StudyRun
 
-__all__ = ["BUILT_IN", "facts", "lights", "may", "state", "summary", "trace"]
+__all__ = ["BUILT_IN", "Refusal", "facts", "lights", "refusal", "state", "summary", "trace"]
 
 _NS_PER_MS = 1e6
 _NS_PER_S = 1e9
@@ -48,22 +49,30 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
         found.append(run.disk.fault)
     elif run.disk is not None and run.disk.free_bytes < _LEAST_FREE_BYTES:
         found.append("The disk is nearly full. A study needs 200 MB.")
-    return found
+    return [*found, *(one.text for one in run.checks if one.light == "red")]
 
 
-def may(run: StudyRun, what: str, reason: str, at_ns: int) -> tuple[bool, str]:
-    """Whether something can be done now; if not, why."""
+@dataclass(frozen=True)
+class Refusal:
+    """Why something cannot be done now, and whether a reason that is given overrules that."""
+
+    why: str
+    reason_overrules: bool = False
+
+
+def refusal(run: StudyRun, what: str, reason: str, at_ns: int) -> Refusal | None:
+    """Why something cannot be done now; None where it can."""
     if what not in _choices(run):
-        return False, f"“{what}” is not possible now."
+        return Refusal(f"“{what}” is not possible now.")
     if what == "note" and not reason:
-        return False, "A note needs a text."
+        return Refusal("A note needs a text.")
     if what == "start":
         red = red_lights(run, at_ns)
         if run.phone is None or (run.disk is not None and run.disk.fault is not None):
-            return False, red[0]
+            return Refusal(red[0])
         if red and not reason:
-            return False, red[0]
-    return True, ""
+            return Refusal(red[0], reason_overrules=True)
+    return None
 
 
 def _choices(run: StudyRun) -> tuple[str, ...]:
@@ -84,7 +93,8 @@ def summary(run: StudyRun) -> object:
     attempt = run.attempt
     within = None if attempt is None else (attempt.phase, attempt.target, attempt.seconds_left)
     fault = None if run.disk is None else run.disk.fault
-    return (run.plan, run.phase, within, run.phones, run.phone, run.operators, run.forms, run.closed, run.agreed, fault)
+    pages = run.phones, run.phone, run.operators, run.forms
+    return (run.plan, run.phase, within, pages, run.closed, run.agreed, fault, run.checks)
 
 
 def state(run: StudyRun, client: int) -> Whole:
@@ -98,7 +108,7 @@ def state(run: StudyRun, client: int) -> Whole:
         "phase": phase(run),
         "next": _next(run),
         "now": None if now is None else _now(run, *now),
-        "checks": [],
+        "checks": [{"id": one.id, "light": one.light, "text": one.text} for one in run.checks],
         "log": _log(run),
         "disk_free_bytes": None if run.disk is None else run.disk.free_bytes,
         "agreement": _agreement(run),
@@ -268,7 +278,7 @@ def trace(run: StudyRun, at_ns: int) -> tuple[int, float | None, float | None]:
     return at_ns, raw, shown
 
 
-def facts(run: StudyRun, person: plan.Person, index: int, reason: str) -> dict[str, str]:
+def facts(run: StudyRun, person: plan.Person, index: int, reason: str, at_ns: int) -> dict[str, str]:
     """What the log says of itself, first of all."""
     setup, hello, mapping = run.setup, run.hello, run.clock.mapping
     condition = person.tasks[index].condition
@@ -295,6 +305,10 @@ def facts(run: StudyRun, person: plan.Person, index: int, reason: str) -> dict[s
     if mapping is not None:
         drift = f"{mapping.drift * 1e6:.1f} ppm"
         found["clock"] = f"offset {mapping.offset_ms:.3f} ms, {drift}, ± {mapping.uncertainty_ms:.2f} ms"
+    found |= {f"check_{one.id}": f"{one.light}: {one.text}" for one in run.checks}
     if reason:
         found["started_although"] = reason
+        red = red_lights(run, at_ns)
+        if red:
+            found["overruled"] = " ".join(red)
     return found

@@ -12,6 +12,7 @@ from typing import Literal
 
 from pipeline.live.messages import Incoming
 from pipeline.live.outgoing import Outgoing
+from pipeline.live.watch import Light, Request
 from pipeline.sessions.logs.mcap import Message
 
 Role = Literal["operator", "phone", "questionnaire"]
@@ -124,7 +125,16 @@ class WallClock:
     at_ns: int
 
 
-Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed | Woke | WallClock
+@dataclass(frozen=True)
+class Examined:
+    """What came of `Examine`: of the checks that were seen, and of what the readings claim."""
+
+    seen: tuple[Light, ...]
+    claims: tuple[Light, ...]
+    at_ns: int
+
+
+Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed | Woke | WallClock | Examined
 
 
 @dataclass(frozen=True)
@@ -192,7 +202,14 @@ class Tables:
     ratings: tuple[Mapping[str, str], ...]
 
 
-Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables
+@dataclass(frozen=True)
+class Examine:
+    """Check the last readings, beside everything else; `Examined` comes back."""
+
+    request: Request
+
+
+Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables | Examine
 
 Actions = tuple[Action, ...]
 NOTHING: Actions = ()

@@ -9,13 +9,16 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
+from typing import Any
 
-from pipeline.live import run_state, study_run
+import numpy as np
+
+from pipeline.live import checks, run_state, study_run
 from pipeline.live.adapters.mouse import MouseHand
 from pipeline.live.clerk import Clerk, FileAction, agreement
 from pipeline.live.events import (
@@ -24,6 +27,8 @@ from pipeline.live.events import (
     Agreed,
     Closed,
     Event,
+    Examine,
+    Examined,
     Joined,
     Left,
     Open,
@@ -40,6 +45,7 @@ from pipeline.live.messages import Incoming, Mouse
 from pipeline.live.outgoing import Outgoing, Whole
 from pipeline.live.plan import Plan
 from pipeline.live.setup import Setup
+from pipeline.live.watch import Light
 from pipeline.tables.columns import S_PER_NS
 
 _TICK_S = 0.005
@@ -172,6 +178,14 @@ class Loop:
                 self._files.append(action)
                 if not isinstance(action, Write):
                     self._urgent.set()
+            elif isinstance(action, Examine):
+                self._beside(self._examine(action))
+
+    def _beside(self, work: Coroutine[Any, Any, None]) -> None:
+        """Do something slow, while everything else goes on."""
+        task = asyncio.create_task(work)
+        self._checks.add(task)
+        task.add_done_callback(self._checks.discard)
 
     # --- what goes on by itself
 
@@ -228,9 +242,15 @@ class Loop:
             for event in events:
                 self.happens(event)
                 if isinstance(event, Closed) and event.file and "set-aside" not in event.file:
-                    task = asyncio.create_task(self._check(event.file, *self._opened))
-                    self._checks.add(task)
-                    task.add_done_callback(self._checks.discard)
+                    self._beside(self._check(event.file, *self._opened))
+
+    async def _examine(self, action: Examine) -> None:
+        """Check the last readings."""
+        try:
+            seen, claims = await asyncio.to_thread(checks.examined, self.run.setup.study, action.request)
+        except (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError) as error:  # no reason to end a study
+            seen, claims = (), (Light(checks.CLAIMS, "amber", f"The last readings could not be checked: {error}."),)
+        self.happens(Examined(seen, claims, self.now_ns()))
 
     async def _check(self, file: str, participant: str, condition: str) -> None:
         """Hold what was shown against the replay of the log, while the questionnaire is filled in."""

@@ -88,6 +88,7 @@ class PhoneMotion:
     sign: float | None = None
     still: tuple[float, float, float] = (0.0, 0.0, 0.0)  # since when, sum along "up", count
     moved_s: float = -math.inf
+    upright: Values | None = None  # the browser's own orientation at the newest reading, whatever its heading
 
     @property
     def is_known(self) -> bool:
@@ -128,6 +129,7 @@ def moved(
     turning = tuple(rate * RAD_PER_DEG for rate in message.r)
     state = changed(state, origin_ns=origin, moved_s=time)
     state, upright = _upright(state, time, message.a, turning)
+    state = changed(state, upright=upright if state.source == "browser" else None)
     if state.sign is None or upright is None:
         sign = state.sign if state.sign is not None else 1.0
         return state, (*(sign * part for part in message.a), *turning, *(math.nan,) * 4)

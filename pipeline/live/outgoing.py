@@ -49,7 +49,7 @@ class Shown:
     trial: int
 
 
-PhoneState = Literal["waiting", "practice", "countdown", "running", "paused", "done", "finished", "second"]
+PhoneState = Literal["waiting", "checks", "practice", "countdown", "running", "paused", "done", "finished", "second"]
 
 
 @dataclass(frozen=True)
@@ -111,11 +111,12 @@ class AnswerSaved:
 
 @dataclass(frozen=True)
 class Refused:
-    """What was asked for cannot be done."""
+    """What was asked for cannot be done, or not without a reason that is given."""
 
     TYPE: ClassVar[str] = "refused"
     id: str
     why: str
+    reason_overrules: bool = False
 
 
 @dataclass(frozen=True)

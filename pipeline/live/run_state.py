@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.live import desk, plan, session
+from pipeline.live import checks, desk, plan, session
 from pipeline.live.changes import changed
 from pipeline.live.clock import Clock, OneWay
 from pipeline.live.events import NOTHING, Action, Actions, Agreed, Close, Closed, Disk, Save, Tables, Tell
@@ -21,6 +21,7 @@ from pipeline.live.outgoing import Form, FormState, PhaseOfTask
 from pipeline.live.plan import Person, Plan, Record
 from pipeline.live.session import Session
 from pipeline.live.setup import Setup
+from pipeline.live.watch import Light, Watched
 
 Phase = Literal["ready", "session", "writing", "questionnaire", "cut"]
 
@@ -54,12 +55,22 @@ class StudyRun:
     traces: tuple[tuple[int, float | None, float | None], ...] = ()
     lights_ns: int = 0
     drawn: tuple[int, ...] = ()
+    watched: Watched = field(default_factory=Watched)
     seen: object = None
 
     @property
     def now(self) -> tuple[Person, int] | None:
         """The participant and the index of the task that is under way or next."""
         return plan.current(self.plan)
+
+    @property
+    def checks(self) -> tuple[Light, ...]:
+        """The lights of the checks before a task, and of what the last readings claim."""
+        found = self.watched.found
+        missing = {name: Light(name, "off", text) for name, text in checks.NOT_YET.items()}
+        reached = checks.reach(len(self.watched.reached), len(self.setup.corners_mm))
+        known = {**missing, checks.REACH: reached, **found}
+        return (*(known[name] for name in self.setup.guided), *self.watched.claims)
 
 
 Stepped = tuple[StudyRun, Actions]
@@ -118,18 +129,33 @@ def tables(run: StudyRun) -> Actions:
 
 def activate(run: StudyRun, client: int | None, at_ns: int) -> Stepped:
     """Make a phone the active one, or none. Its clock is learned anew: it may be another phone."""
-    run = changed(run, phone=client, clock=Clock(), motion=PhoneMotion(), hello=None)
+    run = changed(run, phone=client, clock=Clock(), motion=PhoneMotion(), hello=None, watched=_forgotten(run))
     run, actions = to_attempt(run, session.PhoneIs(client, at_ns))
     if client is None:
         return run, actions
     return run, (Tell(client, run.setup.welcome(task_number(run))), *phone_phase(run), *actions)
 
 
+def _forgotten(run: StudyRun) -> Watched:
+    """What is still known when the phone is another: the tracker's readings, and what they reached."""
+    setup, watched = run.setup, run.watched
+    others = {name: kept for name, kept in watched.streams.items() if name != setup.motion_stream}
+    found = {} if setup.motion_stream is not None else {k: v for k, v in watched.found.items() if k != checks.TAP}
+    return changed(watched, streams=others, found=found, claims=())
+
+
 def phone_phase(run: StudyRun) -> Actions:
     """What the phone shows while no attempt is under way."""
     if run.phone is None or (run.attempt is not None and run.attempt.phase != "ended"):
         return NOTHING
-    return (Tell(run.phone, PhaseOfTask("done" if run.phase in ("writing", "questionnaire") else "waiting")),)
+    if run.phase in ("writing", "questionnaire"):
+        return (Tell(run.phone, PhaseOfTask("done")),)
+    return (Tell(run.phone, PhaseOfTask("checks" if wants_checks(run) else "waiting")),)
+
+
+def wants_checks(run: StudyRun) -> bool:
+    """Whether the participant is asked to do the checks: a task is next, and something has not been seen yet."""
+    return run.phase == "ready" and any(one.light == "off" for one in run.checks)
 
 
 def task_number(run: StudyRun) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fusion_core import Estimator, Sample, Sensor
 from pipeline.engine.cache import digest_of
+from pipeline.live import checks, watch
 from pipeline.live.orientation import Aligner
 from pipeline.live.outgoing import Welcome
 from pipeline.live.plan import Plan
@@ -34,7 +35,8 @@ class Setup:
 
     `simulated` says so where readings are, `mouse` that a pointer is the hand. `links` are the addresses, by role, that
     phones and questionnaires join at. `motion_stream` is the stream of the phone's own motion, if it is used, and
-    `aligner` what finds its orientation.
+    `aligner` what finds its orientation. `guided` are the checks before a task, and `corners_mm` what one of them wants
+    reached; there are none where sensors are simulated.
     """
 
     study: Study
@@ -51,6 +53,8 @@ class Setup:
     links: tuple[tuple[str, str], ...] = ()
     aligner: Aligner | None = None
     motion_stream: str | None = None
+    guided: tuple[str, ...] = ()
+    corners_mm: tuple[tuple[float, ...], ...] = ()
 
     def estimator(self, condition: str) -> Estimator:
         """The estimator that a condition shows."""
@@ -113,13 +117,14 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
     assert study.recording is not None and study.task is not None  # noqa: S101 - checked
     motion = next((name for name, one in study.recording.senders.items() if one.phone is not None), None)
     shown = {study.shown[condition] for condition in study.conditions}
+    targets_mm = tuple((float(x), float(y)) for x, y in targets(study.task))
     return Setup(
         study,
         study.recording,
         study.task,
         live_streams(study, where),
         {name: build_estimator(study, name) for name in shown},
-        tuple((float(x), float(y)) for x, y in targets(study.task)),
+        targets_mm,
         topics,
         digest_of(study.model_dump_json(include=_RECORDED_BY)),
         version("steadyhand"),
@@ -127,6 +132,8 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
         simulated,
         aligner=None if motion is None else _aligner(study, motion),
         motion_stream=motion,
+        guided=() if simulated else checks.guided(study),
+        corners_mm=tuple(watch.corners(study.task.path_mm, targets_mm)),
     )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipeline.live import clock, deeds, desk, forms, health, orientation, session
+from pipeline.live import checking, clock, deeds, desk, forms, health, orientation, session
 from pipeline.live.changes import changed
 from pipeline.live.clock import OneWay
 from pipeline.live.events import (
@@ -20,6 +20,7 @@ from pipeline.live.events import (
     Closed,
     Disk,
     Event,
+    Examined,
     Joined,
     Left,
     Reading,
@@ -76,11 +77,14 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
         measured = (reading.arrival_ns if stream.stamps_arrival else stamp) - stream.late_ns
         seen = orientation.seen(run.setup.aligner, run.motion, measured, reading.arrival_ns, reading.values)
         run = changed(run, motion=seen)
+    run = checking.kept(run, reading)
     return to_attempt(run, reading) if run.attempt is not None else (run, NOTHING)
 
 
 def _tick(run: StudyRun, tick: Tick) -> Stepped:
     run, actions = to_attempt(run, tick)
+    run, examine = checking.examine(run, tick.at_ns)
+    actions = (*actions, *examine)
     if not run.traces or tick.at_ns - run.traces[-1][0] >= _TRACE_NS:
         run = changed(run, traces=(*run.traces[1 - _TRACES :], desk.trace(run, tick.at_ns)))
     if tick.at_ns - run.lights_ns < _LIGHTS_NS:
@@ -206,6 +210,8 @@ def _drew(run: StudyRun, event: Said, drawn: Drawn) -> Stepped:
 
 def _pressed(run: StudyRun, event: Said, select: Select) -> Stepped:
     at = phone_ns(run, select.t, event.at_ns)
+    if run.attempt is None:
+        return checking.tapped(run, (event.at_ns - at) / _NS_PER_MS)
     return to_attempt(run, session.PhonePressed(select.n, at, event.at_ns))
 
 
@@ -260,5 +266,6 @@ _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Closed: _closed,
     Woke: _woke,
     WallClock: _wall_clock,
+    Examined: checking.examined,
     Agreed: lambda run, event: (changed(run, agreed=event), NOTHING),
 }

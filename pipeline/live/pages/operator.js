@@ -157,11 +157,11 @@ function ask(what, text) {
   at("answer").textContent = link.send({ type: "do", what, text, id }) ? "" : texts.common.connection.lost;
 }
 
-function answered({ type, id, why }) {
+function answered({ type, id, why, reason_overrules: overrules }) {
   const { what, text } = asked.get(id) ?? {};
   asked.delete(id);
   at("answer").textContent = type === "refused" ? filled(texts.refused, { why }) : what === "note" ? texts.noted : "";
-  if (type === "refused" && what === "start" && !text) askWithReason(what, why); // a reason may overrule it
+  if (type === "refused" && overrules && !text) askWithReason(what, why);
 }
 
 // A typed reason; null where it was thought better of.

@@ -13,6 +13,7 @@ import { View } from "./view.js";
 const STALE_MS = 300; // without news: the picture is not to be trusted
 const MOUSE_EVERY_MS = 1000 / 60;
 const ACTIVE = new Set(["practice", "running"]);
+const CHECKS = "checks"; // nothing is shown yet, and a press is how the way to the computer is timed
 
 const texts = await loadTexts("phone");
 const at = (id) => document.getElementById(id);
@@ -214,7 +215,8 @@ function show() {
   const ready = phone.connection === "open" && ACTIVE.has(state);
   const waits = ready && phone.stale;
   stage.classList.toggle("stale", waits || phone.connection !== "open" || state === "paused");
-  button.disabled = !ready || waits || phone.drawnN === null;
+  const checks = phone.connection === "open" && state === CHECKS;
+  button.disabled = !checks && (!ready || waits || phone.drawnN === null);
   at("message").textContent = words(state, ready, waits);
   at("message").classList.toggle("count", state === "countdown");
   at("badge").textContent = phone.task ? badge(state, target) : "";
@@ -241,7 +243,7 @@ function badge(state, target) {
 const presses = listenToPresses(button, {
   confirmMs: () => phone.task.confirm_ms ?? 150,
   begin: () => phone.drawnN,
-  select: (n, { t, pressed_ms }) => phone.link.send({ type: "select", n, t, pressed_ms }),
+  select: (n, { t, pressed_ms }) => phone.link.send({ type: "select", n: n ?? 0, t, pressed_ms }),
 });
 
 picture.addEventListener("pointerdown", (event) => {

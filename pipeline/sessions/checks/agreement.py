@@ -78,10 +78,11 @@ def lag(recorded: Recorded) -> Iterator[Finding]:
         )
         yield Finding(LAG, status, found, expected, message)
         return
-    yield Finding(LAG, status, found, expected, _lag_message(tracker, imu, motion.lag_s.value, off_s))
+    yield Finding(LAG, status, found, expected, lag_message(tracker, imu, motion.lag_s.value, off_s))
 
 
-def _lag_message(tracker: Positions, imu: Imu, lag_s: float, off_s: float) -> str:
+def lag_message(tracker: Positions, imu: Imu, lag_s: float, off_s: float) -> str:
+    """What a lag that study.yaml does not state comes from, and what to set."""
     later = f'the stamps of "{tracker.name}" are {in_ms(lag_s)} later than those of "{imu.name}"'
     if off_s > 0 and tracker.times.late_s == 0:
         latency = f"{max(0.0, lag_s + imu.times.late_s):.2f}"

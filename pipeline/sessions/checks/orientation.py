@@ -52,7 +52,7 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
     expected = "0.87 to 1.15 times the turning of the orientation"
     if max(turns, reads) < _TURNS_RAD_S:
         return
-    alike = float(np.sum(rate * measured) / max(np.sqrt(np.sum(rate**2) * np.sum(measured**2)), 1e-300))
+    alike = _correlation(rate, measured)
     stands = np.all(rate == 0.0, axis=1) & (np.linalg.norm(measured, axis=1) > _TURNS_RAD_S)
     if stands.mean() > _STANDS and alike >= _ALIKE / 2:
         yield Finding(
@@ -100,6 +100,22 @@ def _against_orientation(imu: Imu) -> Iterator[Finding]:
     status: Status = "red" if alike < _ALIKE else graded(max(ratio, 1 / max(ratio, 1e-9)), _AMBER, _RED)
     message = "" if status == "green" else _turning_message(imu, ratio, alike, turning_cause(*spans, measured))
     yield Finding(of(TURNING, imu.name), status, found, expected, message)
+
+
+def turning(imu: Imu) -> tuple[float, float] | None:
+    """How fast the orientation turns (root mean square, rad/s), and its correlation with the gyroscope.
+
+    None where less than 2 s have an orientation.
+    """
+    found = _turning(imu)
+    if found is None:
+        return None
+    rate, measured, _ = found
+    return _rms(rate), _correlation(rate, measured)
+
+
+def _correlation(rate: FloatArray, measured: FloatArray) -> float:
+    return float(np.sum(rate * measured) / max(np.sqrt(np.sum(rate**2) * np.sum(measured**2)), 1e-300))
 
 
 def _turning_message(imu: Imu, ratio: float, alike: float, cause: str) -> str:
@@ -154,8 +170,7 @@ def _late_s(rate: FloatArray, measured: FloatArray) -> float | None:
     middle = measured[_LATE_STEPS : _LATE_STEPS + count]
     alike = []
     for shift in range(2 * _LATE_STEPS + 1):
-        moved = rate[shift : shift + count]
-        alike.append(float(np.sum(moved * middle) / max(np.sqrt(np.sum(moved**2) * np.sum(middle**2)), 1e-300)))
+        alike.append(_correlation(rate[shift : shift + count], middle))
     best = int(np.argmax(alike))
     if abs(best - _LATE_STEPS) < 2 or alike[best] < 0.9 or alike[best] < alike[_LATE_STEPS] + 0.01:
         return None

@@ -56,13 +56,18 @@ def one_big_button_begins(tab: Tab, server: LiveServer) -> None:
     assert text(tab, "#big") == "Start Task 1 of P01"
     _click(tab, "#big")
     assert _asked(server, 1) == ("start", "")
-    server.say("operator", type="refused", id=server.said("operator", "do")[0]["id"], why=HOSTILE)
+    refused = {"type": "refused", "id": server.said("operator", "do")[0]["id"], "why": HOSTILE}
+    server.say("operator", **refused, reason_overrules=False)
     until(lambda: text(tab, "#answer") == f"Not done: {HOSTILE}", "the reason")
+    assert not is_seen(tab, "#reason")
+    _click(tab, "#big")
+    assert _asked(server, 2) == ("start", "")
+    server.say("operator", **{**refused, "id": server.said("operator", "do")[1]["id"]}, reason_overrules=True)
     wait_for(tab, "#reason")
     assert text(tab, "#reason-why") == HOSTILE
     write(tab, "It is only a trial run.")
     key(tab, "Enter")
-    assert _asked(server, 2) == ("start", "It is only a trial run.")
+    assert _asked(server, 3) == ("start", "It is only a trial run.")
 
 
 def a_red_check_wants_a_reason(tab: Tab, server: LiveServer) -> None:

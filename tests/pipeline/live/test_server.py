@@ -187,7 +187,7 @@ def test_a_socket_is_for_its_role_alone_and_from_our_pages(tmp_path: Path) -> No
 def test_hostile_pages_and_senders_change_nothing(tmp_path: Path) -> None:
     async def play(running: Running) -> None:
         async with running.page("phone") as phone, running.page("operator") as operator:
-            await hears(phone, "state", state="waiting")
+            await hears(phone, "state", state="checks")
             await hears(operator, "state", phase="ready")
             for frame in (
                 "{",
