@@ -295,8 +295,21 @@ def record(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="With --demo: the folder. Default: demo/ and the study's name.")
     ] = None,
-    host: Annotated[str, typer.Option(help="The address to serve pages on.")] = "127.0.0.1",
+    lan: Annotated[
+        bool, typer.Option("--lan", help="Serve pages to the network too, by TLS with a certificate made here.")
+    ] = False,
+    host: Annotated[
+        str | None,
+        typer.Option(help="With --lan: which of this computer's addresses to serve at."),
+    ] = None,
     port: Annotated[int, typer.Option(min=1, max=65535, help="The port to serve pages on.")] = 8443,
+    operator_lan: Annotated[
+        bool, typer.Option("--operator-lan", help="With --lan: the operator's page may be on another computer.")
+    ] = False,
+    certificate: Annotated[
+        Path | None, typer.Option("--cert", metavar="FILE", help="With --lan: a certificate of your own, in PEM.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="Its private key, in PEM.")] = None,
     goes_on: Annotated[
         bool, typer.Option("--continue", help="Go on though study.yaml has changed since the first session.")
     ] = False,
@@ -304,7 +317,8 @@ def record(
     """Run a study live: pages for operator, phone and questionnaire, a steady display, and logs that replay."""
     from pipeline.commands import record as command
 
-    command.record(study, command.Options(host, port, demo, goes_on), out, participants if bots else None)
+    options = command.Options(host, port, demo, goes_on, lan, operator_lan, certificate, key)
+    command.record(study, options, out, participants if bots else None)
 
 
 @app.command()

@@ -13,21 +13,25 @@ from pipeline.study.folder import SETTINGS_FILE, load_study
 
 if TYPE_CHECKING:
     from pipeline.live.access import Access
+    from pipeline.live.certificates import Certificates
     from pipeline.live.setup import Setup
 
 _EXTRA = ("starlette", "uvicorn", "websockets", "segno", "cryptography", "pythonosc")
 _NOT_IN_A_DEMO = ("simulation", "repeats", "printed", "trials", "measures", "preregistration", "exclusions")
-_LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 @dataclass(frozen=True)
 class Options:
     """How a study is served. `goes_on`: even if study.yaml has changed since the first session."""
 
-    host: str = "127.0.0.1"
+    host: str | None = None
     port: int = 8443
     demo: bool = False
     goes_on: bool = False
+    lan: bool = False
+    operator_lan: bool = False
+    certificate: Path | None = None
+    key: Path | None = None
 
 
 def record(folder: Path, options: Options, out: Path | None, bots: int | None) -> None:
@@ -35,8 +39,6 @@ def record(folder: Path, options: Options, out: Path | None, bots: int | None) -
     missing = [name for name in _EXTRA if find_spec(name) is None]
     if missing and bots is None:
         raise PipelineError('record: serving pages needs a few more packages: pip install "steadyhand[live]"')
-    if options.host not in _LOOPBACK:
-        raise PipelineError(f"--host {options.host}: pages are served on this computer alone so far; use 127.0.0.1")
     if options.demo:
         folder = _demo_folder(folder, out, bots is not None)
     elif bots is not None or out is not None:
@@ -48,13 +50,13 @@ def record(folder: Path, options: Options, out: Path | None, bots: int | None) -
     from pipeline.live.record import Serving
     from pipeline.live.record import record as serve
 
-    serving = Serving(options.host, options.port, options.demo, options.goes_on)
+    serving = Serving(**vars(options))
     serve(folder, study, serving, _ready(folder), lambda: console.say("Warming up the estimators …"))
     console.say(f"Recorded into {console.short_path(folder)}. Report: steadyhand report {console.short_path(folder)}")
 
 
 def _ready(folder: Path) -> Any:
-    def say(setup: Setup, access: Access) -> None:
+    def say(setup: Setup, access: Access, certificates: Certificates | None) -> None:
         console.say(f"{setup.study.title}: into {console.short_path(folder)}. End with Ctrl-C.")
         console.say(f"Operator       {access.address('operator')}")
         console.say(f"Phone          {access.address('phone')}")
@@ -62,6 +64,9 @@ def _ready(folder: Path) -> Any:
             console.say(f"Questionnaire  {access.address('questionnaire')}")
         if any(sender.udp_json is not None for sender in setup.recording.senders.values()):
             console.say(f'Senders        "key": "{access.sensors}"')
+        if certificates is not None and certificates.authority is not None:
+            console.say(f"Phones trust these pages once they trust this computer: {access.origin}/ca says how.")
+            console.say(f"Its certificate's SHA-256: {certificates.fingerprint()}")
 
     return say
 

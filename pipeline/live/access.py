@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 from pipeline.live.events import Role
 
 ROLES: tuple[Role, ...] = ("operator", "phone", "questionnaire")
-_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 def secret() -> str:
@@ -20,7 +20,11 @@ def secret() -> str:
 
 @dataclass(frozen=True)
 class Access:
-    """The secrets of a run: `keys` are in addresses and codes, `tokens` in cookies; `sensors` is that of datagrams."""
+    """The secrets of a run: `keys` are in addresses and codes, `tokens` in cookies; `sensors` is that of datagrams.
+
+    Phones find the pages at `scheme`, `host` and `port`. With a `host` in a network they are on this computer by plain
+    HTTP too, as a phone at a USB cable needs them, and the operator unless `operator_anywhere`.
+    """
 
     scheme: str
     host: str
@@ -38,20 +42,32 @@ class Access:
     def _netloc(self, host: str) -> str:
         return f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
 
+    @property
+    def in_network(self) -> bool:
+        """Whether other computers can open the pages."""
+        return self.host not in LOOPBACK
+
+    @property
+    def origins(self) -> frozenset[str]:
+        """Every origin of our pages."""
+        on_this = "http" if self.in_network else self.scheme
+        return frozenset({self.origin.lower(), *(f"{on_this}://{self._netloc(name)}" for name in LOOPBACK)})
+
     def address(self, role: Role) -> str:
         """The address that a page of that role is opened by, its key in it."""
-        page = "operator" if role == "operator" else "join"
-        return f"{self.origin}/{page}#k={self.keys[role]}"
+        if role != "operator":
+            return f"{self.origin}/join#k={self.keys[role]}"
+        elsewhere = self.operator_anywhere or not self.in_network
+        origin = self.origin if elsewhere else f"http://{self._netloc(LOOPBACK[0])}"
+        return f"{origin}/operator#k={self.keys[role]}"
 
     def is_our_host(self, host: str) -> bool:
         """Whether a request's Host header names us: no other name may lead here (DNS rebinding)."""
-        names = {self._netloc(self.host), *(self._netloc(name) for name in _LOOPBACK)}
-        return host.lower() in names
+        return host.lower() in {urlsplit(origin).netloc for origin in self.origins}
 
     def is_our_origin(self, origin: str, host: str) -> bool:
         """Whether a request's Origin header is that of the page that it was sent to."""
-        parts = urlsplit(origin)
-        return parts.scheme == self.scheme and parts.netloc.lower() == host.lower() and self.is_our_host(host)
+        return origin.lower() in self.origins and urlsplit(origin).netloc.lower() == host.lower()
 
     def role_of_key(self, key: str, client: str) -> Role | None:
         """The role that a key opens, for a request from that address."""
@@ -70,4 +86,4 @@ class Access:
         return self._may_be(role, client) and compare_digest(given.encode(), self.tokens[role].encode())
 
     def _may_be(self, role: Role, client: str) -> bool:
-        return role != "operator" or self.operator_anywhere or client in _LOOPBACK
+        return role != "operator" or self.operator_anywhere or client in LOOPBACK

@@ -5,16 +5,20 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from itertools import product
 from pathlib import Path
 
 import uvicorn
+from starlette.applications import Starlette
 
 from pipeline.errors import PipelineError
 from pipeline.live import setup
-from pipeline.live.access import Access
+from pipeline.live.access import LOOPBACK, Access
 from pipeline.live.adapters import osc, udp
+from pipeline.live.certificates import Certificates, for_address, given, usual_folder
 from pipeline.live.clerk import Clerk
 from pipeline.live.journal import Journal, known_plan
 from pipeline.live.loop import Clock, Loop
@@ -24,21 +28,69 @@ from pipeline.live.server import app
 from pipeline.live.setup import Setup
 from pipeline.study.settings import Study
 
+_SOMEWHERE = "203.0.113.1"  # an address for examples (RFC 5737): only the way to it is looked up
+
 
 @dataclass(frozen=True)
 class Serving:
-    """How a study is served. `goes_on`: even if study.yaml has changed since the first session."""
+    """How a study is served. `goes_on`: even if study.yaml has changed since the first session.
 
-    host: str = "127.0.0.1"
+    In a network (`lan`) at `host`, or where that is None at the address that this computer has there.
+    """
+
+    host: str | None = None
     port: int = 8443
     demo: bool = False
     goes_on: bool = False
+    lan: bool = False
+    operator_lan: bool = False
+    certificate: Path | None = None
+    key: Path | None = None
+
+
+def lan_address() -> str:
+    """The address of this computer in its network; nothing is sent. Raises PipelineError where it has none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        try:
+            made.connect((_SOMEWHERE, 9))
+            found = str(made.getsockname()[0])
+        except OSError:
+            found = LOOPBACK[0]
+    if found in LOOPBACK:
+        raise PipelineError(
+            "--lan: this computer has no address in a network; connect it, name one by --host, or leave out --lan and"
+            " connect the phone by a USB cable (docs/live.md)"
+        )
+    return found
+
+
+def secured(options: Serving, folder: Path, now: datetime) -> tuple[Access, Certificates | None]:
+    """Where the pages are and by which certificates. Raises PipelineError where that cannot be.
+
+    `folder` keeps this computer's own certificates.
+    """
+    if (options.certificate is None) != (options.key is None):
+        raise PipelineError("--cert and --key belong together; give both")
+    if not options.lan:
+        host = options.host or LOOPBACK[0]
+        if host not in LOOPBACK:
+            raise PipelineError(f"--host {host}: pages are served on this computer alone unless --lan is given; add it")
+        if options.certificate is not None or options.operator_lan:
+            raise PipelineError("--cert, --key and --operator-lan are for a network: add --lan")
+        return Access("http", host, options.port), None
+    host = options.host or lan_address()
+    if host in LOOPBACK or host in ("0.0.0.0", "::"):  # noqa: S104 - refused
+        raise PipelineError(f"--host {host}: with --lan, name one address of this computer in the network")
+    if options.certificate is not None and options.key is not None:
+        certificates = given(options.certificate, options.key, now)
+    else:
+        certificates = for_address(host, folder, now)
+    return Access("https", host, options.port, options.operator_lan), certificates
 
 
 def listening(host: str, port: int) -> socket.socket:
     """A socket that listens. Raises PipelineError where it cannot."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    made = socket.socket(family, socket.SOCK_STREAM)
+    made = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind((host, port))
@@ -50,12 +102,63 @@ def listening(host: str, port: int) -> socket.socket:
     return made
 
 
-async def serve(made: Setup, folder: Path, journal: Journal, access: Access, on: socket.socket, known: Plan) -> None:
+@dataclass(frozen=True)
+class Doors:
+    """The sockets that pages are served at, `inside` on this computer alone, `outside` by `certificates`."""
+
+    inside: socket.socket
+    outside: socket.socket | None = None
+    certificates: Certificates | None = None
+
+    def close(self) -> None:
+        """Listen no more."""
+        self.inside.close()
+        if self.outside is not None:
+            self.outside.close()
+
+
+def opened(access: Access, certificates: Certificates | None) -> Doors:
+    """The sockets of a run. Raises PipelineError where one cannot be listened on."""
+    if not access.in_network:
+        return Doors(listening(access.host, access.port))
+    inside = listening(LOOPBACK[0], access.port)
+    try:
+        return Doors(inside, listening(access.host, access.port), certificates)
+    except PipelineError:
+        inside.close()
+        raise
+
+
+async def serve(made: Setup, folder: Path, journal: Journal, access: Access, doors: Doors, known: Plan) -> None:
     """Run the study until the server is stopped."""
     loop = Loop(made, folder, Clerk(journal, check=None), known, Clock())
     receivers = await _listen_for_senders(made, loop, access)
-    config = uvicorn.Config(
-        app(loop, access),
+    application = app(loop, access, doors.certificates)
+    servers = [(uvicorn.Server(_config(application)), doors.inside)]
+    if doors.outside is not None:
+        servers.append((uvicorn.Server(_config(application, doors.certificates)), doors.outside))
+    going = asyncio.create_task(loop.go())
+    serving = [asyncio.create_task(server.serve(sockets=[on])) for server, on in servers]
+    try:
+        await asyncio.wait((going, *serving), return_when=asyncio.FIRST_COMPLETED)
+        for server, _ in servers:
+            server.should_exit = True
+        await asyncio.gather(*serving, return_exceptions=True)
+    finally:
+        for task in serving:
+            task.cancel()
+        await asyncio.gather(*serving, return_exceptions=True)
+        for receiver in receivers:
+            receiver.close()
+        if not going.done():
+            going.cancel()
+        with suppress(asyncio.CancelledError):
+            await going
+
+
+def _config(application: Starlette, certificates: Certificates | None = None) -> uvicorn.Config:
+    return uvicorn.Config(
+        application,
         ws="websockets-sansio",
         ws_max_size=FRAME_BYTES,
         ws_per_message_deflate=False,
@@ -63,23 +166,12 @@ async def serve(made: Setup, folder: Path, journal: Journal, access: Access, on:
         access_log=False,
         server_header=False,
         date_header=False,
+        proxy_headers=False,  # nobody is between us and the pages, so nobody may say who asks
         lifespan="off",
         timeout_graceful_shutdown=1,
+        ssl_certfile=None if certificates is None else certificates.certificate,
+        ssl_keyfile=None if certificates is None else certificates.key,
     )
-    going = asyncio.create_task(loop.go())
-    try:
-        serving = asyncio.create_task(uvicorn.Server(config).serve(sockets=[on]))
-        await asyncio.wait((going, serving), return_when=asyncio.FIRST_COMPLETED)
-        if going.done():
-            serving.cancel()
-        await asyncio.gather(serving, return_exceptions=True)
-    finally:
-        for receiver in receivers:
-            receiver.close()
-        if not going.done():
-            going.cancel()
-        with suppress(asyncio.CancelledError):
-            await going
 
 
 async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[asyncio.DatagramTransport]:
@@ -92,9 +184,10 @@ async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[a
         if sender.osc is not None:
             addresses = osc.expected(made, sender.osc.port)
             receivers[sender.osc.port] = osc.Receiver(addresses, loop.happens, loop.now_ns)
-    for port, receiver in sorted(receivers.items()):
+    hosts = (LOOPBACK[0], access.host) if access.in_network else (access.host,)
+    for (port, receiver), host in product(sorted(receivers.items()), hosts):
         try:
-            found.append(await udp.listen(access.host, port, receiver))
+            found.append(await udp.listen(host, port, receiver))
         except OSError as error:
             raise PipelineError(
                 f"port {port} of recording: senders cannot be listened on: {error.strerror or error}; choose another"
@@ -103,22 +196,26 @@ async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[a
 
 
 def record(
-    folder: Path, study: Study, options: Serving, ready: Callable[[Setup, Access], None], warming: Callable[[], None]
+    folder: Path,
+    study: Study,
+    options: Serving,
+    ready: Callable[[Setup, Access, Certificates | None], None],
+    warming: Callable[[], None],
 ) -> None:
     """Serve a study until Ctrl-C. `ready` is called with the addresses once pages can be opened."""
+    access, certificates = secured(options, usual_folder(), datetime.now(UTC))
     simulated = "simulated by Steadyhand: a demo, the pointer was the hand" if options.demo else ""
     made = setup.set_up(study, folder, mouse=options.demo, simulated=simulated)
     journal = Journal(folder, study)
     journal.hold()
     try:
         known = known_plan(made.empty_plan(), journal, made.digest, options.goes_on)
-        access = Access("http", options.host, options.port)
         made = replace(made, links=tuple((role, access.address(role)) for role in ("phone", "questionnaire")))
-        with listening(options.host, options.port) as on:
+        with closing(opened(access, certificates)) as doors:
             warming()
             setup.warm_up(made)
-            ready(made, access)
+            ready(made, access, certificates)
             with suppress(KeyboardInterrupt):
-                asyncio.run(serve(made, folder, journal, access, on, known))
+                asyncio.run(serve(made, folder, journal, access, doors, known))
     finally:
         journal.release()

@@ -19,6 +19,7 @@ from starlette.websockets import WebSocket
 
 from pipeline.live.access import Access
 from pipeline.live.adapters import websocket
+from pipeline.live.certificates import Certificates
 from pipeline.live.events import Role
 from pipeline.live.loop import Loop
 
@@ -36,8 +37,8 @@ HEADERS = {
 }
 
 
-def app(loop: Loop, access: Access) -> Starlette:
-    """The application of a run."""
+def app(loop: Loop, access: Access, certificates: Certificates | None = None) -> Starlette:
+    """The application of a run. `certificates` are those that it is served with."""
 
     async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
         if not access.is_our_host(request.headers.get("host", "")):
@@ -69,10 +70,23 @@ def app(loop: Loop, access: Access) -> Starlette:
     async def code(request: Request) -> Response:
         return _code(request, access)
 
+    async def authority(_: Request) -> Response:
+        """The certificate that phones have to trust; no secret."""
+        if certificates is None or certificates.authority is None:
+            return _nothing()
+        headers = {"Content-Disposition": 'attachment; filename="steadyhand.crt"'}
+        return Response(certificates.authority.read_bytes(), media_type="application/x-x509-ca-cert", headers=headers)
+
+    async def fingerprint(_: Request) -> Response:
+        return JSONResponse({"fingerprint": None if certificates is None else certificates.fingerprint() or None})
+
     routes = [
         *(page(name) for name in ("operator", "phone", "questionnaire")),
         Route("/join", join, methods=["POST"]),
         Route("/join", lambda _: _file(PAGES / "join.html", "text/html"), methods=["GET"]),
+        Route("/ca", lambda _: _file(PAGES / "ca.html", "text/html")),
+        Route("/ca.crt", authority),
+        Route("/ca.json", fingerprint),
         Route("/pages/texts/{language}.json", _texts),
         Route("/pages/{name}", _asset),
         Route("/qr/{role}.svg", code),
@@ -127,7 +141,7 @@ async def _join(request: Request, access: Access) -> Response:
     if role is None:
         return JSONResponse({"why": "This key is not valid any more."}, 403)
     response = JSONResponse({"role": role, "go": f"/{role}"})
-    secure = access.scheme == "https"
+    secure = request.url.scheme == "https"
     response.set_cookie(access.cookie(role), access.tokens[role], httponly=True, samesite="strict", secure=secure)
     return response
 

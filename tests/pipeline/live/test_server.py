@@ -6,7 +6,7 @@ import asyncio
 import json
 import socket
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,10 @@ from pipeline.live.access import Access
 from pipeline.live.adapters import osc
 from pipeline.live.adapters.osc import Receiver as OscReceiver
 from pipeline.live.adapters.udp import Receiver, expected
+from pipeline.live.certificates import Certificates
 from pipeline.live.events import Reading
 from pipeline.live.journal import Journal
-from pipeline.live.record import listening, serve
+from pipeline.live.record import opened, serve
 from pipeline.live.setup import warm_up
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
@@ -82,18 +83,25 @@ class Running:
         return int(first.split()[1]), {n.lower(): v for n, _, v in (line.partition(": ") for line in rest)}, content
 
 
-def served(folder: Path, play: Callable[[Running], Awaitable[None]], text: str = STUDY) -> None:
-    """Serve a study while `play` is played."""
-    udp_port, port = free_port(socket.SOCK_DGRAM), free_port()
+def served(
+    folder: Path,
+    play: Callable[[Running], Awaitable[None]],
+    text: str = STUDY,
+    access: Access | None = None,
+    certificates: Certificates | None = None,
+) -> None:
+    """Serve a study while `play` is played; on this computer alone unless `access` says otherwise."""
+    udp_port = free_port(socket.SOCK_DGRAM)
+    access = access or Access("http", "127.0.0.1", free_port())
+    port = access.port
     study, setup = study_in(folder, text.replace("PORT", str(udp_port)))
     journal = Journal(folder, study)
     journal.hold()
-    access = Access("http", "127.0.0.1", port)
     warm_up(setup)
 
     async def run() -> None:
-        with listening("127.0.0.1", port) as on:
-            serving = asyncio.create_task(serve(setup, folder, journal, access, on, setup.empty_plan()))
+        with closing(opened(access, certificates)) as doors:
+            serving = asyncio.create_task(serve(setup, folder, journal, access, doors, setup.empty_plan()))
             try:
                 await _answers(port)
                 await asyncio.wait_for(play(Running(access, folder, udp_port)), 60)
