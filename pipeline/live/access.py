@@ -23,13 +23,15 @@ class Access:
     """The secrets of a run: `keys` are in addresses and codes, `tokens` in cookies; `sensors` is that of datagrams.
 
     Phones find the pages at `scheme`, `host` and `port`. With a `host` in a network they are on this computer by plain
-    HTTP too, as a phone at a USB cable needs them, and the operator unless `operator_anywhere`.
+    HTTP too, as a phone at a USB cable needs them, and the operator unless `operator_anywhere`. `language` is that of
+    the participants' pages.
     """
 
     scheme: str
     host: str
     port: int
     operator_anywhere: bool = False
+    language: str | None = None
     keys: Mapping[Role, str] = field(default_factory=lambda: {role: secret() for role in ROLES})
     tokens: Mapping[Role, str] = field(default_factory=lambda: {role: secret() for role in ROLES})
     sensors: str = field(default_factory=secret)
@@ -56,7 +58,8 @@ class Access:
     def address(self, role: Role) -> str:
         """The address that a page of that role is opened by, its key in it."""
         if role != "operator":
-            return f"{self.origin}/join#k={self.keys[role]}"
+            language = f"?lang={self.language}" if self.language else ""
+            return f"{self.origin}/join{language}#k={self.keys[role]}"
         elsewhere = self.operator_anywhere or not self.in_network
         origin = self.origin if elsewhere else f"http://{self._netloc(LOOPBACK[0])}"
         return f"{origin}/operator#k={self.keys[role]}"

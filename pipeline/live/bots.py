@@ -128,6 +128,12 @@ class Players:
             value = min(max(round(share * steps), 0), steps)
             answer = Answer(form.questionnaire, str(item["id"]), value, f"{self.now_ns}-{item['id']}"[:32])
             self.says("questionnaire", FORMS, answer)
+        for pair in form.pairs:  # what was rated higher counts more
+            first, second = (given.get(str(pair[side]), 50.0) for side in ("first", "second"))
+            answer = Answer(
+                form.questionnaire, str(pair["id"]), int(second > first), f"{self.now_ns}-{pair['id']}"[:32]
+            )
+            self.says("questionnaire", FORMS, answer)
         self.says("questionnaire", FORMS, Submit(form.questionnaire, str(self.now_ns)))
         self.now_ns += _STEP_NS
 

@@ -187,6 +187,7 @@ def _sign_leaf(address: str, folder: Path, path: Path, key_path: Path, now: date
     from cryptography.hazmat.primitives.asymmetric import ec
     from cryptography.hazmat.primitives.hashes import SHA256
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
+    from cryptography.x509.oid import ExtendedKeyUsageOID
 
     authority = x509.load_pem_x509_certificate((folder / _AUTHORITY).read_bytes())
     signing = load_pem_private_key((folder / _key_of("authority")).read_bytes(), None)
@@ -199,7 +200,7 @@ def _sign_leaf(address: str, folder: Path, path: Path, key_path: Path, now: date
         .not_valid_after(now + timedelta(days=_LEAF_DAYS) - _EARLY)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(names, critical=False)
-        .add_extension(x509.ExtendedKeyUsage([x509.ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
+        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
         .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(signing.public_key()), critical=False)
         .sign(signing, SHA256())
     )

@@ -68,8 +68,9 @@ def exchanged(clock: Clock, exchange: Exchange) -> Clock:
     if any(one.t1 == exchange.t1 for one in clock.exchanges[-4:]):
         return clock
     if clock.mapping is not None:
-        off = abs(offset_ms(exchange) - clock.mapping.offset_at(exchange.t1)) - trip / 2
-        if off > _STEP_MS:
+        apart = abs(offset_ms(exchange) - clock.mapping.offset_at(exchange.t1))
+        # Each may be off by half its round trip: a page that is still loading answers late, and its clock is not set.
+        if apart - trip / 2 - clock.mapping.uncertainty_ms > _STEP_MS:
             return _off(clock, exchange)
     since = exchange.t2 - KEPT_MS
     kept = (*(one for one in clock.exchanges[-_MOST:] if one.t2 >= since), exchange)

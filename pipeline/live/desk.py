@@ -137,10 +137,10 @@ def _person(run: StudyRun, person: plan.Person, blind: bool) -> dict[str, object
                     {
                         "id": name,
                         "answered": sum(one == name for one, _ in task.answers),
-                        "of": len(items),
+                        "of": len(run.plan.wanted(name)),
                         "submitted": name in task.submitted,
                     }
-                    for name, items in run.plan.questionnaires.items()
+                    for name in run.plan.questionnaires
                 ],
             }
             for index, task in enumerate(person.tasks)

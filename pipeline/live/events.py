@@ -203,13 +203,20 @@ class Tables:
 
 
 @dataclass(frozen=True)
+class Replace:
+    """End a page's connection: the same page has another by now."""
+
+    client: int
+
+
+@dataclass(frozen=True)
 class Examine:
     """Check the last readings, beside everything else; `Examined` comes back."""
 
     request: Request
 
 
-Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables | Examine
+Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables | Examine | Replace
 
 Actions = tuple[Action, ...]
 NOTHING: Actions = ()

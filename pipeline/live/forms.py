@@ -7,14 +7,17 @@ from pipeline.live.events import Said, Tell
 from pipeline.live.messages import Answer, Submit
 from pipeline.live.outgoing import AnswerSaved, Refused
 from pipeline.live.run_state import Stepped, StudyRun, form, save, settled, tables, tell_everybody
+from pipeline.study.recording import pair_id
 
 
 def answered(run: StudyRun, event: Said, answer: Answer) -> Stepped:
     """An answer, if its questionnaire is open; the page is told when it is on the disk."""
     now = run.now
     known = next((one for one in run.setup.recording.questionnaires if one.id == answer.questionnaire), None)
-    item = None if known is None else next((one for one in known.items if one.id == answer.item), None)
-    if now is None or run.phase != "questionnaire" or known is None or item is None or answer.value > item.steps:
+    largest = {} if known is None else {one.id: one.steps for one in known.items}
+    largest |= {} if known is None else {pair_id(pair): 1 for pair in known.pairs}
+    fits = answer.item in largest and answer.value <= largest[answer.item]
+    if now is None or run.phase != "questionnaire" or known is None or not fits:
         return run, (Tell(event.client, Refused(answer.id, "This questionnaire is not open.")),)
     person, index = now
     if plan.open_questionnaire(run.plan, person.tasks[index]) != known.id:
@@ -24,7 +27,7 @@ def answered(run: StudyRun, event: Said, answer: Answer) -> Stepped:
         "participant": person.id,
         "condition": person.tasks[index].condition,
         "questionnaire": known.id,
-        "item": item.id,
+        "item": answer.item,
         "value": answer.value,
         "at_ns": event.at_ns,
     }

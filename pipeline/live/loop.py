@@ -32,6 +32,7 @@ from pipeline.live.events import (
     Joined,
     Left,
     Open,
+    Replace,
     Role,
     Said,
     Show,
@@ -97,12 +98,15 @@ def _always_ns() -> int:
 
 
 class Outbox:
-    """What waits to be sent to one page. Of states and lights only the newest waits."""
+    """What waits to be sent to one page. Of states and lights only the newest waits.
+
+    It ends when too much waits (`full`), or when the page has another connection (`replaced`).
+    """
 
     def __init__(self) -> None:
         self._waiting: deque[Outgoing] = deque()
         self._news = asyncio.Event()
-        self.full = False
+        self.full = self.replaced = False
 
     def put(self, message: Outgoing) -> None:
         """One more message."""
@@ -114,9 +118,17 @@ class Outbox:
             self._waiting.append(message)
         self._news.set()
 
-    async def get(self) -> Outgoing:
-        """The next message, when there is one."""
+    def replace(self) -> None:
+        """Send nothing more."""
+        self.replaced = True
+        self._waiting.clear()
+        self._news.set()
+
+    async def get(self) -> Outgoing | None:
+        """The next message, when there is one; None after the last."""
         while not self._waiting:
+            if self.replaced:
+                return None
             self._news.clear()
             await self._news.wait()
         return self._waiting.popleft()
@@ -178,6 +190,9 @@ class Loop:
                 self._files.append(action)
                 if not isinstance(action, Write):
                     self._urgent.set()
+            elif isinstance(action, Replace):
+                if action.client in self.pages:
+                    self.pages[action.client].replace()
             elif isinstance(action, Examine):
                 self._beside(self._examine(action))
 

@@ -35,7 +35,7 @@ class MessageError(ValueError):
 
 @dataclass(frozen=True)
 class Hello:
-    """The first message of a page."""
+    """The first message of a page. `id` is chance that stays the same when a phone's page is loaded anew."""
 
     page: str
     version: int
@@ -44,6 +44,7 @@ class Hello:
     permission: str = ""
     secure: bool = False
     wake_lock: bool = False
+    id: str = ""
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,7 @@ def _hello(fields_: _Fields) -> Hello:
         str(given.get("permission", ""))[:_ID],
         given.get("secure") is True,
         given.get("wake_lock") is True,
+        fields_.text("id", _ID, 0) if given.get("id") is not None else "",
     )
 
 

@@ -73,10 +73,11 @@ class Selected:
 
 @dataclass(frozen=True)
 class Say:
-    """A sentence to the participant; empty takes it away."""
+    """A sentence to the participant; empty takes it away. The page has `what` in its own language."""
 
     TYPE: ClassVar[str] = "say"
     text: str
+    what: Literal["", "wait"] = ""
 
 
 @dataclass(frozen=True)

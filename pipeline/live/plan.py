@@ -8,11 +8,13 @@ killed knows as much as before, once it has read them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from pipeline.statistics.counterbalancing import assigned, williams_design
+from pipeline.study.recording import Pair, pair_id
 
 Record = Mapping[str, Any]
 TaskState = Literal["todo", "now", "cut", "done", "skipped"]
@@ -50,11 +52,19 @@ class Person:
 
 @dataclass(frozen=True)
 class Plan:
-    """All participants so far, and those that the study plans; `questionnaires` are ids with their items."""
+    """All participants so far, and those that the study plans.
+
+    `questionnaires` are ids with their items, `pairs` ids with the pairs of items that are compared besides.
+    """
 
     conditions: tuple[str, ...]
     questionnaires: Mapping[str, tuple[str, ...]]
     persons: tuple[Person, ...] = ()
+    pairs: Mapping[str, tuple[Pair, ...]] = field(default_factory=dict)
+
+    def wanted(self, questionnaire: str) -> tuple[str, ...]:
+        """Everything that a questionnaire asks: its items, and its pairs."""
+        return (*self.questionnaires[questionnaire], *map(pair_id, self.pairs.get(questionnaire, ())))
 
     def person(self, name: str) -> Person | None:
         """The participant of that id."""
@@ -121,8 +131,8 @@ def open_questionnaire(plan: Plan, task: Task) -> str | None:
 
 
 def missing_items(plan: Plan, task: Task, questionnaire: str) -> list[str]:
-    """The items of a questionnaire that have no answer."""
-    return [item for item in plan.questionnaires[questionnaire] if (questionnaire, item) not in task.answers]
+    """The items and pairs of a questionnaire that have no answer."""
+    return [item for item in plan.wanted(questionnaire) if (questionnaire, item) not in task.answers]
 
 
 # --- records
@@ -208,16 +218,31 @@ def participant_rows(plan: Plan) -> tuple[dict[str, str], ...]:
 
 
 def rating_rows(plan: Plan) -> tuple[dict[str, str], ...]:
-    """The rows of questionnaires.csv: each answer that counts."""
+    """The rows of questionnaires.csv: each answer that counts, and of pairs how often each item was chosen."""
     return tuple(
         {
             "participant": person.id,
             "condition": task.condition,
             "questionnaire": questionnaire,
-            "scale": item,
-            "rating": str(value * _TLX_POINTS if questionnaire == "nasa_tlx" else value),
+            "scale": scale,
+            "rating": str(rating),
         }
         for person in plan.persons
         for task in person.tasks
-        for (questionnaire, item), value in sorted(task.answers.items())
+        for questionnaire, scale, rating in sorted((*_ratings(plan, task), *_weights(plan, task)))
     )
+
+
+def _ratings(plan: Plan, task: Task) -> Iterator[tuple[str, str, int]]:
+    for (questionnaire, item), value in task.answers.items():
+        if item in plan.questionnaires.get(questionnaire, (item,)):
+            yield questionnaire, item, value * _TLX_POINTS if questionnaire == "nasa_tlx" else value
+
+
+def _weights(plan: Plan, task: Task) -> Iterator[tuple[str, str, int]]:
+    """How often each item was chosen, once all pairs are answered: before that it would be another number."""
+    for questionnaire, pairs in plan.pairs.items():
+        given = [task.answers.get((questionnaire, pair_id(pair))) for pair in pairs]
+        chosen = Counter(pair[value] for pair, value in zip(pairs, given, strict=True) if value is not None)
+        if chosen.total() == len(pairs):
+            yield from ((questionnaire, f"weight_{item}", chosen[item]) for item in plan.questionnaires[questionnaire])

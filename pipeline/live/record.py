@@ -210,6 +210,7 @@ def record(
     journal.hold()
     try:
         known = known_plan(made.empty_plan(), journal, made.digest, options.goes_on)
+        access = replace(access, language=made.recording.language)
         made = replace(made, links=tuple((role, access.address(role)) for role in ("phone", "questionnaire")))
         with closing(opened(access, certificates)) as doors:
             warming()

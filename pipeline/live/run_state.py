@@ -22,6 +22,7 @@ from pipeline.live.plan import Person, Plan, Record
 from pipeline.live.session import Session
 from pipeline.live.setup import Setup
 from pipeline.live.watch import Light, Watched
+from pipeline.study.recording import pair_id
 
 Phase = Literal["ready", "session", "writing", "questionnaire", "cut"]
 
@@ -30,8 +31,9 @@ Phase = Literal["ready", "session", "writing", "questionnaire", "cut"]
 class StudyRun:
     """The state of a study that is run.
 
-    `phone` is the connection of the active phone, `phones` all of them, `operators` those of operator's pages, the one
-    that may act first. `asked` remembers what is being saved, by token: whom to tell, and how.
+    `phone` is the connection of the active phone, `phones` all of them, `ids` which phone each is of, `operators` those
+    of operator's pages, the one that may act first. `asked` remembers what is being saved, by token: whom to tell, and
+    how.
     """
 
     setup: Setup
@@ -39,6 +41,7 @@ class StudyRun:
     phase: Phase = "ready"
     attempt: Session | None = None
     phones: tuple[int, ...] = ()
+    ids: Mapping[int, str] = field(default_factory=dict)
     phone: int | None = None
     operators: tuple[int, ...] = ()
     forms: tuple[int, ...] = ()
@@ -187,9 +190,12 @@ def form(run: StudyRun) -> Form | FormState:
         for item in known.items
     ]
     ids = [one.id for one in run.setup.recording.questionnaires]
-    return Form(
-        known.id, f"Task {index + 1}", known.title if own else None, items, [], ids.index(known.id) + 1, len(ids)
-    )
+    pairs = [
+        {"id": pair_id(one), "first": one[0], "second": one[1], "value": answers.get((known.id, pair_id(one)))}
+        for one in known.pairs
+    ]
+    title = known.title if own else None
+    return Form(known.id, f"Task {index + 1}", title, items, pairs, ids.index(known.id) + 1, len(ids))
 
 
 def _follows_somebody(run: StudyRun, person: Person) -> bool:

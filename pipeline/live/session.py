@@ -429,7 +429,7 @@ def _listen(state: Session, at_ns: int) -> Stepped:
         kind = "sensor_lost" if gone else "sensor_silent" if silent else "sensor_back"
         actions += _note(state, at_ns, kind, f"{name}, trial {state.trial}")[1]
         if silent != heard.silent:
-            actions += _to_phone(state, Say("Please wait." if silent else ""))
+            actions += _to_phone(state, Say("Please wait.", "wait") if silent else Say(""))
     return state, tuple(actions)
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion_core import Estimator, Sample, Sensor
+from fusion_core import Estimator, Sample, Samples, Sensor
 from pipeline.engine.cache import digest_of
+from pipeline.errors import PipelineError
 from pipeline.live import checks, watch
 from pipeline.live.orientation import Aligner
 from pipeline.live.outgoing import Welcome
@@ -26,6 +27,7 @@ from pipeline.study.units import G_MM_S2
 
 _NS_PER_S = 1e9
 _WARM_UP_STEPS = 50
+TEXTS = Path(__file__).parent / "pages" / "texts"
 _RECORDED_BY = {"conditions", "axes", "streams", "events", "display", "estimators", "shown", "task", "recording"}
 
 
@@ -105,7 +107,8 @@ class Setup:
     def empty_plan(self) -> Plan:
         """A plan with nobody in it."""
         questionnaires = {one.id: tuple(item.id for item in one.items) for one in self.recording.questionnaires}
-        return Plan(self.study.conditions, questionnaires)
+        pairs = {one.id: one.pairs for one in self.recording.questionnaires if one.pairs}
+        return Plan(self.study.conditions, questionnaires, pairs=pairs)
 
 
 def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = "") -> Setup:
@@ -115,6 +118,7 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
     where = str(folder / "study.yaml")
     topics = required(study, where)
     assert study.recording is not None and study.task is not None  # noqa: S101 - checked
+    _knows_language(study.recording, where)
     motion = next((name for name, one in study.recording.senders.items() if one.phone is not None), None)
     shown = {study.shown[condition] for condition in study.conditions}
     targets_mm = tuple((float(x), float(y)) for x, y in targets(study.task))
@@ -135,6 +139,16 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
         guided=() if simulated else checks.guided(study),
         corners_mm=tuple(watch.corners(study.task.path_mm, targets_mm)),
     )
+
+
+def _knows_language(recording: Recording, where: str) -> None:
+    """Raise PipelineError where the pages have no texts in the study's language."""
+    known = sorted(path.stem for path in TEXTS.glob("*.yaml"))
+    if recording.language not in (None, *known):
+        raise PipelineError(
+            f'{where}: recording: language: the pages have no texts in "{recording.language}"; use'
+            f" {' or '.join(known)}, or leave it out for the language of each browser"
+        )
 
 
 def _aligner(study: Study, name: str) -> Aligner | None:
@@ -160,6 +174,23 @@ def warm_up(setup: Setup) -> None:
                 reading = Sample(time, time + 0.01, np.zeros(of_stream.dimension), rotation, force)
                 state = estimator.update(state, name, reading)
             estimator.predict(state, step / 30 + 0.02)
+        _replay(estimator)
     if setup.aligner is not None:
         heading = setup.aligner.filter.position(setup.aligner.filter.start(), 0.0, 0.01, np.zeros(3))
         setup.aligner.filter.angle(setup.aligner.filter.acceleration(heading, 0.02, 0.02, np.zeros(3)))
+
+
+def _replay(estimator: Estimator) -> None:
+    """Replay readings of a hand at rest, as the log is replayed when a task is over."""
+    times = np.arange(_WARM_UP_STEPS) / 30
+    rows = {
+        name: Samples(
+            times,
+            times + 0.01,
+            np.zeros((len(times), one.dimension)),
+            np.tile(np.eye(3)[: one.dimension], (len(times), 1, 1)),
+            np.tile([0.0, G_MM_S2, 0.0], (len(times), 1)),
+        )
+        for name, one in estimator.sensors.items()
+    }
+    estimator.replay(rows, times + 0.02)

@@ -17,6 +17,7 @@ from fusion_core.phone.orientation import rotation
 from pipeline.errors import PipelineError
 from pipeline.live.units import units
 from pipeline.statistics.arrays import FloatArray
+from pipeline.study.recording import WEIGHTED_TLX, Recording
 from pipeline.study.settings import Study
 from pipeline.study.streams import AccelerationStream, PositionStream, ReferenceStream
 from pipeline.tables.columns import S_PER_NS
@@ -25,6 +26,7 @@ _MM_PER_M = 1000.0
 _ALL_AXES = ("x", "y", "z")
 KINDS = ("phone", "udp_json", "osc", "demo")
 """The senders that work."""
+_OF_OTHER_LOGS = ("unit", "turning_unit", "fields", "child", "parent", "stamp_unit", "arrival")
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,8 @@ def required(study: Study, where: str) -> Mapping[str, str]:
     for condition in study.conditions:
         if condition not in study.shown:
             raise PipelineError(f'{where}: shown: has no estimator for "{condition}"; add the one it displays')
+    _weights_have_a_rule(study, study.recording, where)
+    _logs_are_plain(study, where)
     for name, sender in study.recording.senders.items():
         if sender.kind not in KINDS:
             raise PipelineError(
@@ -133,3 +137,41 @@ def required(study: Study, where: str) -> Mapping[str, str]:
 def _names_both(study: Study) -> str | None:
     pattern = study.sessions or ""
     return pattern if "{participant}" in pattern and "{condition}" in pattern and "{session}" not in pattern else None
+
+
+def _weights_have_a_rule(study: Study, recording: Recording, where: str) -> None:
+    for one in recording.questionnaires:
+        scored = study.scoring.get(one.id)
+        if one.pairs and (scored is None or scored.rule != WEIGHTED_TLX):
+            raise PipelineError(
+                f"{where}: recording: questionnaires: {WEIGHTED_TLX} asks for weights, and no rule says what to do with"
+                f" them; write scoring: {{{one.id}: {{rule: {WEIGHTED_TLX}, range: [0, 100]}}}}"
+            )
+
+
+def _logs_are_plain(study: Study, where: str) -> None:
+    """Raise PipelineError for what says how a log of somebody else's is to be read; a report would apply it to ours."""
+    for name, stream in study.streams.items():
+        for key in _OF_OTHER_LOGS:
+            usual = type(stream).model_fields[key].default if key in type(stream).model_fields else None
+            found = getattr(stream, key, None)
+            if found and found != usual:
+                of_sender = name in study.sensor_streams and key in ("unit", "turning_unit")
+                instead = f"say it under recording: senders: {name}: unit" if of_sender else "remove it"
+                raise PipelineError(
+                    f"{where}: streams.{name}: {key}: {_in_words(found)} says how a log is read that others wrote; a"
+                    f" live study's logs hold metres, m/s², rad/s and stamps of their own, so {instead}"
+                )
+        if stream.stamp == "log_time":
+            raise PipelineError(
+                f"{where}: streams.{name}: stamp: log_time is for logs without stamps, and a live study's have them;"
+                " write stamp: arrival if the sender does not say when it measured"
+            )
+    if study.events is not None and study.events.arrival != "log":
+        raise PipelineError(
+            f"{where}: events: arrival: {study.events.arrival} says how a log is read that others wrote; remove it"
+        )
+
+
+def _in_words(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, Mapping) else str(value)

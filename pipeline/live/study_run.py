@@ -16,6 +16,7 @@ from pipeline.live.clock import OneWay
 from pipeline.live.events import (
     NOTHING,
     Action,
+    Actions,
     Agreed,
     Closed,
     Disk,
@@ -24,6 +25,7 @@ from pipeline.live.events import (
     Joined,
     Left,
     Reading,
+    Replace,
     Said,
     Saved,
     Tell,
@@ -158,6 +160,7 @@ def _left(run: StudyRun, event: Left) -> Stepped:
 
     was_active = event.client == run.phone
     asked = {token: who for token, who in run.asked.items() if who[0] != event.client}
+    run = changed(run, ids={client: name for client, name in run.ids.items() if client != event.client})
     run = changed(run, phones=without(run.phones), operators=without(run.operators), forms=without(run.forms))
     run = changed(run, asked=asked, seen=None if event.role == "operator" else run.seen)
     if not was_active:
@@ -170,7 +173,7 @@ def _left(run: StudyRun, event: Left) -> Stepped:
 
 
 def _said(run: StudyRun, event: Said) -> Stepped:
-    if event.role == "phone" and event.client != run.phone and not isinstance(event.message, Ping):
+    if event.role == "phone" and event.client != run.phone and not isinstance(event.message, Ping | Hello):
         return run, NOTHING
     answer = _ANSWERS.get(type(event.message))
     return (run, NOTHING) if answer is None else answer(run, event, event.message)
@@ -241,7 +244,19 @@ def _moved(run: StudyRun, event: Said, message: Motion) -> Stepped:
 
 
 def _greeted(run: StudyRun, event: Said, hello: Hello) -> Stepped:
-    return (changed(run, hello=hello), NOTHING) if event.client == run.phone else (run, NOTHING)
+    """A page says who it is. A phone that is back takes the place of its own old connection, and of nobody else's."""
+    if event.role != "phone":
+        return run, NOTHING
+    others = [client for client, name in run.ids.items() if hello.id and name == hello.id and client != event.client]
+    ids = {client: name for client, name in run.ids.items() if client not in others}
+    phones = tuple(client for client in run.phones if client not in others)
+    was_active = run.phone in others
+    run = changed(run, ids={**ids, event.client: hello.id}, phones=phones)
+    actions: Actions = tuple(map(Replace, others))
+    if was_active:
+        run, activated = activate(run, event.client, event.at_ns)
+        actions = (*actions, *activated)
+    return (changed(run, hello=hello) if event.client == run.phone else run), actions
 
 
 _ANSWERS: Mapping[type, Callable[[StudyRun, Said, Any], Stepped]] = {

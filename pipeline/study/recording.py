@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -20,6 +21,8 @@ METRES: Mapping[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 M_S2: Mapping[str, float] = {"g": G_M_S2, "m_s2": 1.0}
 RAD_S: Mapping[str, float] = {"deg_s": RAD_PER_DEG, "rad_s": 1.0}
 """What one of a unit is in SI."""
+
+_TLX, WEIGHTED_TLX = "nasa_tlx", "weighted_tlx"
 
 SENDERS = ("phone", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")
 """The kinds of senders."""
@@ -151,29 +154,48 @@ class Item(Frozen):
     steps: Annotated[int, Field(ge=1, le=100)] = 20
 
 
+Pair = tuple[str, str]
+
+
 class Questionnaire(Frozen):
-    """A questionnaire of the study's own; ratings are 0 … steps, from left to right."""
+    """A questionnaire of the study's own; ratings are 0 … steps, from left to right.
+
+    With `compared`, each pair of items is held against each other too, as NASA-TLX's weights want it.
+    """
 
     id: Id
     title: str = ""
     items: Annotated[tuple[Item, ...], Field(min_length=1, max_length=60)]
+    compared: bool = False
 
     @model_validator(mode="after")
     def _each_once(self) -> Questionnaire:
         unique("items", tuple(item.id for item in self.items))
+        if self.compared and self.id != _TLX:
+            raise ValueError(f'compared: only {_TLX} has a rule for what is made of pairs; name it "{WEIGHTED_TLX}"')
         return self
 
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The pairs of items that are compared."""
+        return tuple(combinations((item.id for item in self.items), 2)) if self.compared else ()
 
-def _nasa_tlx() -> Questionnaire:
+
+def pair_id(pair: Pair) -> str:
+    """By what name the answer to a pair is kept: 0 for the first, 1 for the second."""
+    return "-".join(pair)
+
+
+def _nasa_tlx(compared: bool = False) -> Questionnaire:
     """NASA-TLX (Hart and Staveland 1988); its definitions are among the pages' texts, in their languages."""
-    known = QUESTIONNAIRES["nasa_tlx"]
+    known = QUESTIONNAIRES[_TLX]
     own_ends = {"performance": ("perfect", "failure")}
     ends = {name: own_ends.get(name, ("very low", "very high")) for name in known.scales}
     items = tuple(Item(id=name, text=name, low=low, high=high) for name, (low, high) in ends.items())
-    return Questionnaire(id=known.name, title=known.label, items=items)
+    return Questionnaire(id=known.name, title=known.label, items=items, compared=compared)
 
 
-BUILT_IN: Mapping[str, Questionnaire] = {"nasa_tlx": _nasa_tlx()}
+BUILT_IN: Mapping[str, Questionnaire] = {_TLX: _nasa_tlx(), WEIGHTED_TLX: _nasa_tlx(compared=True)}
 """Questionnaires that need no definition in study.yaml."""
 
 
@@ -187,9 +209,10 @@ def _built_in(value: object) -> object:
 
 
 class Recording(Frozen):
-    """How a study is run live."""
+    """How a study is run live. `language` is that of the participants' pages; None: that of their browser."""
 
     phone: Phone = Phone()
+    language: Annotated[str, Field(pattern="^[a-z]{2,3}$")] | None = None
     blind: Literal["participant", "both"] = "participant"
     practice: Practice = Practice()
     selection: Selection = Selection()

@@ -16,7 +16,7 @@ from pipeline.live.outgoing import to_json
 
 _PER_SECOND = 300.0
 MOST_SOCKETS = 16
-FORBIDDEN, TOO_MUCH, CROWDED = 4403, 4408, 4429
+FORBIDDEN, TOO_MUCH, REPLACED, CROWDED = 4403, 4408, 4409, 4429
 refused: Counter[str] = Counter()
 """What pages sent that was not taken, by reason."""
 
@@ -38,12 +38,14 @@ async def serve(socket: WebSocket, role: Role, loop: Loop) -> None:
         await asyncio.gather(sending, receiving, return_exceptions=True)
         loop.leave(role, client)
         with suppress(RuntimeError, WebSocketDisconnect):  # it has gone already
-            await socket.close(TOO_MUCH)
+            await socket.close(REPLACED if outbox.replaced else TOO_MUCH)
 
 
 async def _send(socket: WebSocket, outbox: Outbox) -> None:
     while not outbox.full:
         message = await outbox.get()
+        if message is None:
+            return
         await socket.send_text(to_json(message).decode())
 
 

@@ -34,13 +34,19 @@ export function showLights(list, texts, lights) {
   if (shown.some((item, i) => list.children[i] !== item) || list.children.length !== shown.length) list.replaceChildren(...shown);
 }
 
-// A function that says in `place` which lights got worse since its last call.
+// A function that says in `place` which lights got worse since its last call, and takes that away once it is no longer so.
 export function announcer(place, texts) {
   const before = new Map();
+  let said = new Map();
   return (lights) => {
     const worse = lights.filter((one) => ["amber", "red"].includes(one.light) && before.get(one.id) !== one.light);
     for (const one of lights) before.set(one.id, one.light);
-    if (!worse.length) return;
-    place.textContent = worse.map((one) => filled(texts.changed, { ...one, light: texts.light[one.light] })).join(" ");
+    if (worse.length) {
+      said = new Map(worse.map((one) => [one.id, one.light]));
+      place.textContent = worse.map((one) => filled(texts.changed, { ...one, light: texts.light[one.light] })).join(" ");
+    } else if ([...said].some(([id, light]) => before.get(id) !== light)) {
+      said.clear();
+      place.textContent = "";
+    }
   };
 }

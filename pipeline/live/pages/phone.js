@@ -152,7 +152,7 @@ function receive(message) {
   if (type === "show") return takeEstimate(message);
   if (type === "welcome") takeTask(message);
   else if (type === "state") phone.state = message;
-  else if (type === "say") phone.said = message.text;
+  else if (type === "say") phone.said = { wait: texts.wait }[message.what] ?? message.text;
   show();
   return requestDrawing();
 }

@@ -5,6 +5,7 @@
 
 const DELAYS_MS = [250, 500, 1000, 2000];
 const FORBIDDEN = 4403;
+const REPLACED = 4409; // by this very page in another tab, or loaded anew
 const CROWDED = 4429;
 const NEVER_OPENED = 4; // tries after which "connecting" turns into advice
 const PING_MS = { first: 50, later: 250 };
@@ -19,7 +20,7 @@ export function clockMs(timeStamp = performance.now()) {
 
 export class Link {
   // `hello()` gives the first message of each connection; `receive(message)` gets every other one than pongs;
-  // `status(name)` hears "connecting", "open", "lost", "unreachable", "forbidden" and "crowded".
+  // `status(name)` hears "connecting", "open", "lost", "unreachable", "forbidden", "replaced" and "crowded".
   constructor(role, { hello, receive, status, pings = false }) {
     Object.assign(this, { role, hello, receive, status, pings });
     this.failures = 0;
@@ -60,8 +61,8 @@ export class Link {
 
   closed(code) {
     clearTimeout(this.nextPing);
-    if (code === FORBIDDEN) {
-      this.status("forbidden");
+    if (code === FORBIDDEN || code === REPLACED) {
+      this.status(code === FORBIDDEN ? "forbidden" : "replaced");
       return;
     }
     const delay = DELAYS_MS[Math.min(this.failures, DELAYS_MS.length - 1)];

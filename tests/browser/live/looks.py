@@ -21,6 +21,23 @@ def _joining(tab: Tab, server: LiveServer) -> None:
     until(lambda: "scan" in tab.evaluate("document.getElementById('status').textContent"), "the words are there")
 
 
+def _authority(tab: Tab, server: LiveServer) -> None:
+    tab.open(f"{server.address}/ca")
+    until(lambda: ":" in tab.evaluate("document.getElementById('fingerprint').textContent"), "the fingerprint is there")
+
+
+def _phone_checks(tab: Tab, server: LiveServer) -> None:
+    _phone_stands(tab, server)
+    server.say("phone", type="state", state="checks")
+    until(lambda: "still" in tab.evaluate("document.getElementById('message').textContent"), "it says what to do")
+
+
+def _started(tab: Tab, server: LiveServer) -> None:
+    """A phone that was begun by touch before; whatever page is open, only one of ours may say so."""
+    tab.open(f"{server.address}/join")
+    tab.evaluate("sessionStorage.setItem('started', 'granted')")
+
+
 def _phone_begins(tab: Tab, server: LiveServer) -> None:
     tab.open(f"{server.address}/phone")
     tab.evaluate("sessionStorage.clear()")
@@ -36,7 +53,7 @@ def _phone_runs(tab: Tab, server: LiveServer) -> None:
 
 
 def _phone_stands(tab: Tab, server: LiveServer) -> None:
-    tab.evaluate("sessionStorage.setItem('started', 'granted')")
+    _started(tab, server)
     tab.open(f"{server.address}/phone")
     server.wait("phone", "hello")
     server.say("phone", **welcome())
@@ -55,7 +72,7 @@ def _phone_lacks(tab: Tab, server: LiveServer) -> None:
 
 
 def _phone_is_measured(tab: Tab, server: LiveServer) -> None:
-    tab.evaluate("sessionStorage.setItem('started', 'granted')")
+    _started(tab, server)
     tab.open(f"{server.address}/phone")
     server.wait("phone", "hello")
     server.say("phone", **welcome(window="true_size"))
@@ -92,6 +109,8 @@ def _operator_asks(tab: Tab, server: LiveServer) -> None:
 
 SCENES: dict[str, Scene] = {
     "join": _joining,
+    "the way to trust": _authority,
+    "phone, checks": _phone_checks,
     "phone, begin": _phone_begins,
     "phone, a task": _phone_runs,
     "phone, words": _phone_stands,

@@ -139,6 +139,8 @@ def lights_differ_in_more_than_colour(tab: Tab, server: LiveServer) -> None:
     assert lamps == [["✓", "good"], ["✓", "good"], ["!", "look"], ["–", "nothing known"]]
     server.say("operator", **lights("red"))
     until(lambda: text(tab, "#changed") == "Phone: act. Scan the code with the phone.", "the red one is said")
+    server.say("operator", **lights("green"))
+    until(lambda: text(tab, "#changed") == "", "it is not said any more once it is no longer so")
     assert text(tab, "#drawn-hz") == "59.8 Hz"
     assert text(tab, "#round-trip") == "–"
     assert value(tab, "#traces", "it.getContext('2d').getImageData(0, 0, it.width, it.height).data.some(Boolean)")

@@ -183,6 +183,29 @@ def a_press_names_nothing_that_was_not_drawn(tab: Tab, server: LiveServer) -> No
     assert server.wait("phone", "select")[0]["n"] == 7
 
 
+def the_checks_are_asked_for_and_a_press_is_one(tab: Tab, server: LiveServer) -> None:
+    """Before anything is shown there is nothing that a press could select; it goes out all the same."""
+    _opened(tab, server)
+    server.say("phone", type="state", state="checks")
+    until(lambda: "hold the phone still" in text(tab, "#message"), "it says what to do")
+    assert not value(tab, "#select", "it.disabled")
+    touch(tab, "#select")
+    (press,) = server.wait("phone", "select")
+    assert press["n"] == 0
+    server.say("phone", type="state", state="waiting")
+    until(lambda: bool(value(tab, "#select", "it.disabled")), "the button rests")
+
+
+def a_page_that_is_open_elsewhere_stops(tab: Tab, server: LiveServer) -> None:
+    """It does not connect again: the two would take each other's place without end."""
+    _opened(tab, server)
+    server.forget()
+    server.cut("phone", 4409)
+    until(lambda: "another tab" in text(tab, "#message"), "it says so")
+    time.sleep(1.0)
+    assert server.said("phone", "hello") == []
+
+
 def silence_greys_the_picture(tab: Tab, server: LiveServer) -> None:
     """Without news for 0.3 s: wait, and no selection; with news it goes on."""
     _opened(tab, server)
@@ -401,6 +424,8 @@ CASES = (
     the_newest_estimate_wins,
     a_press_names_what_was_seen,
     a_press_names_nothing_that_was_not_drawn,
+    the_checks_are_asked_for_and_a_press_is_one,
+    a_page_that_is_open_elsewhere_stops,
     silence_greys_the_picture,
     what_the_study_says_is_shown,
     without_a_wake_lock_it_says_so,

@@ -72,6 +72,19 @@ def test_one_late_ping_is_no_step_and_an_impossible_one_is_nothing() -> None:
     assert exchanged(clock, Exchange(at, at + 1, at + 0.5, at + 5)) is clock
 
 
+def test_a_page_that_answers_late_while_it_loads_has_no_clock_that_was_set() -> None:
+    clock, at = Clock(), EPOCH_MS
+    for late in (280.0, 150.0):  # all of it on the way back: the offset is half of it off, and no stamp tells
+        clock = exchanged(clock, Exchange(at, at + 1, at + 1.1, at + 1.1 + late))
+        at += 300.0
+    for _ in range(40):
+        clock = exchanged(clock, Exchange(at, at + 2, at + 2.1, at + 4.1))
+        at += 250.0
+    assert clock.steps == 0
+    assert clock.mapping is not None
+    assert clock.mapping.offset_ms == pytest.approx(0, abs=1)
+
+
 def test_without_a_channel_back_the_fastest_arrival_tells() -> None:
     random, clock = np.random.default_rng(3), OneWay()
     for number in range(900):

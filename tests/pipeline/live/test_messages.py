@@ -122,7 +122,7 @@ def test_any_field_may_be_anything(known: tuple[str, str], data: st.DataObject) 
 def test_what_goes_out_is_json_of_the_same_names() -> None:
     assert json.loads(to_json(Shown(7, 1.5, -2.0, 1))) == {"type": "show", "n": 7, "x": 1.5, "y": -2.0, "trial": 1}
     assert json.loads(to_json(Whole("lights", {"drawn_hz": 60}))) == {"type": "lights", "drawn_hz": 60}
-    assert json.loads(to_json(Say(""))) == {"type": "say", "text": ""}
+    assert json.loads(to_json(Say("Please wait.", "wait"))) == {"type": "say", "text": "Please wait.", "what": "wait"}
     with pytest.raises(ValueError, match="finite"):
         to_json(Shown(7, float("nan"), 0.0, 1))
     assert messages.FRAME_BYTES == 4096

@@ -216,7 +216,7 @@ def test_what_stands_in_the_way_of_a_network_is_said_with_its_remedy(
     assert "certificates are made for addresses only" in said(host="lab.example", lan=True)
     assert "give both" in said(lan=True, certificate=made.certificate)
     assert "add --lan" in said(operator_lan=True)
-    own = {"host": _LAN, "lan": True, "certificate": made.certificate}
+    own: dict[str, Any] = {"host": _LAN, "lan": True, "certificate": made.certificate}
     assert "has ended on" in said(NOW + timedelta(days=400), **own, key=made.key)
     assert "is not the key of" in said(**own, key=made.key.with_name("authority.key"))
     assert "is no private key" in said(**own, key=made.certificate)
