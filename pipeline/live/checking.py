@@ -24,7 +24,7 @@ def kept(run: StudyRun, reading: Reading) -> StudyRun:
         stamp = arrival
     turned = run.motion.upright if name == setup.motion_stream else _orientation_of(values)
     watched = watch.kept(run.watched, name, Row(min(stamp, arrival), arrival, values, turned))
-    if name == setup.study.tracker and len(watched.reached) < len(setup.corners_mm):
+    if name == setup.tracker and len(watched.reached) < len(setup.corners_mm):
         watched = watch.reached(watched, setup.corners_mm, values)
     return changed(run, watched=watched)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -198,6 +199,11 @@ def _problems(run: StudyRun) -> list[str]:
     if run.disk is not None and run.disk.fault is not None:
         found.append(run.disk.fault)
     for person in run.plan.persons:
+        if person.dropped and any(task.state == "done" for task in person.tasks):
+            entry = json.dumps({"participant": person.id, "reason": person.left_because or "left"}, ensure_ascii=False)
+            found.append(
+                f"{person.id} left. To leave out what was recorded of them: exclusions: [{entry}] in study.yaml."
+            )
         for index, task in enumerate(person.tasks):
             if task.state == "cut":
                 of = f"{task.trials} of {len(run.setup.targets_mm)} targets"
@@ -245,7 +251,10 @@ def _clock_light(run: StudyRun) -> dict[str, object]:
         return {"light": "off" if run.phone is None else "amber", "text": "The phone's clock is not known yet."}
     text = f"Known to ± {mapping.uncertainty_ms:.1f} ms."
     if run.clock.steps:
-        return {"light": "amber", "text": f"{text} It was set {run.clock.steps} times."}
+        return {
+            "light": "amber",
+            "text": f"{text} It was set {'once' if run.clock.steps == 1 else f'{run.clock.steps} times'}.",
+        }
     return {"light": "green" if mapping.uncertainty_ms < 10 else "amber", "text": text}
 
 
@@ -272,7 +281,7 @@ def trace(run: StudyRun, at_ns: int) -> tuple[int, float | None, float | None]:
     attempt = run.attempt
     if attempt is None:
         return at_ns, None, None
-    heard = attempt.heard.get(run.setup.study.tracker or "")
+    heard = attempt.heard.get(run.setup.tracker or "")
     raw = heard.last[0] * 1e3 if heard is not None and heard.last else None
     shown = attempt.sent[-1].mean_mm[list(attempt.attempt.axes).index("x")] if attempt.sent else None
     return at_ns, raw, shown

@@ -48,14 +48,20 @@ class Journal:
     # --- the folder
 
     def hold(self) -> None:
-        """Take the folder. PipelineError where another recorder that is alive holds it."""
-        self.own.mkdir(parents=True, exist_ok=True)
+        """Take the folder. PipelineError where another recorder that is alive holds it, or nothing can be written."""
         lock = self.own / _LOCK
         with suppress(OSError, ValueError):
             other = int(lock.read_text(encoding="ascii"))
             if other != os.getpid() and _is_alive(other):
                 raise PipelineError(f"{self.folder}: another recorder (process {other}) holds this study; end it first")
-        lock.write_text(str(os.getpid()), encoding="ascii")
+        try:
+            self.own.mkdir(parents=True, exist_ok=True)
+            lock.write_text(str(os.getpid()), encoding="ascii")
+        except OSError as error:
+            raise PipelineError(
+                f"{self.own}: cannot be written to: {error.strerror or error}; make the study's folder writable, or"
+                " copy study.yaml to one that is"
+            ) from None
 
     def release(self) -> None:
         """Give the folder back."""

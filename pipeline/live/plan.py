@@ -43,6 +43,7 @@ class Person:
     tasks: tuple[Task, ...]
     dropped: bool = False
     begun: bool = False
+    left_because: str = ""
 
     @property
     def order(self) -> tuple[str, ...]:
@@ -147,7 +148,7 @@ def after(plan: Plan, record: Record) -> Plan:
     if person is None:
         return plan
     if kind == "dropped":
-        return _with(plan, replace(person, dropped=True))
+        return _with(plan, replace(person, dropped=True, left_because=str(record.get("reason", ""))))
     for index, task in enumerate(person.tasks):
         if task.condition == condition:
             tasks = (*person.tasks[:index], _task_after(task, record), *person.tasks[index + 1 :])

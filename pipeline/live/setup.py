@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,11 @@ class Setup:
     motion_stream: str | None = None
     guided: tuple[str, ...] = ()
     corners_mm: tuple[tuple[float, ...], ...] = ()
+
+    @cached_property
+    def tracker(self) -> str | None:
+        """The tracker's stream, which is asked for with every reading."""
+        return self.study.tracker
 
     def estimator(self, condition: str) -> Estimator:
         """The estimator that a condition shows."""

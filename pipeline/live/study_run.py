@@ -73,7 +73,7 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
         run, reading = changed(run, one_way={**run.one_way, name: known}), changed(reading, stamp_ns=stamp)
     state = health.heard(run.health[name], reading.arrival_ns, reading.stamp_ns)
     run = changed(run, health={**run.health, name: state})
-    if name == run.setup.study.tracker and run.setup.aligner is not None and run.motion.heading is not None:
+    if name == run.setup.tracker and run.setup.aligner is not None and run.motion.heading is not None:
         stamp = reading.arrival_ns if reading.stamp_ns is None else reading.stamp_ns
         stream = run.setup.streams[name]
         measured = (reading.arrival_ns if stream.stamps_arrival else stamp) - stream.late_ns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from pipeline.live.units import Units, in_si, units
 
 _PER_SECOND = 1000.0  # datagrams of one source
 _SOURCES = 64
+_WAITING_BYTES = 4 << 20  # the system may allow less
 _MS_PER_S = 1000.0
 
 
@@ -109,4 +111,6 @@ async def listen(host: str, port: int, receiver: Limited) -> asyncio.DatagramTra
     """Open a port. OSError where it is taken."""
     running = asyncio.get_running_loop()
     transport, _ = await running.create_datagram_endpoint(lambda: receiver, local_addr=(host, port))
+    # What comes while the loop is busy waits here, a flood and the readings that come with it too.
+    transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING_BYTES)
     return transport

@@ -6,8 +6,10 @@ import errno
 from pathlib import Path
 
 import pytest
+import yaml
 
-from pipeline.live import run_state, study_run
+from pipeline.errors import PipelineError
+from pipeline.live import desk, run_state, study_run
 from pipeline.live.clerk import Clerk
 from pipeline.live.events import (
     Action,
@@ -22,6 +24,7 @@ from pipeline.live.events import (
     Said,
     Save,
     Saved,
+    Show,
     Tell,
     Tick,
     WallClock,
@@ -30,7 +33,7 @@ from pipeline.live.events import (
 )
 from pipeline.live.journal import PART, Journal
 from pipeline.live.loop import Clock, Outbox
-from pipeline.live.messages import Do
+from pipeline.live.messages import Do, Drawn, Exchange, Ping
 from pipeline.live.outgoing import Refused, Say, Whole
 from pipeline.live.run_state import StudyRun
 from pipeline.sessions.logs.mcap import Message
@@ -130,6 +133,67 @@ def test_a_tracker_that_falls_silent_is_said_and_noted(lab: Lab) -> None:
     assert lights["tracker"]["light"] == "red"
     assert notes(lab.goes_on(0.1)) == ["sensor_back"]
     assert lab.run.phase == "session"
+
+
+def test_without_accelerations_the_estimator_goes_on_with_what_there_is(lab: Lab) -> None:
+    while lab.run.now is not None and lab.run.now[0].tasks[lab.run.now[1]].condition != "fusion":
+        lab.does("skip", "not this one")
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(2.0)
+    silent = lab.goes_on(3.0, imu=False)
+    assert notes(silent) == ["sensor_silent", "sensor_lost"]
+    for made in [one for one in lab.actions if isinstance(one, Show)][-2:]:
+        lab.happens(Said("phone", PHONE, Drawn(made.message.n, lab.at_ms), lab.now))  # type: ignore[union-attr]
+    shown = [one for one in lab.goes_on(0.5, imu=False) if isinstance(one, Show)]
+    assert shown
+    assert lab.run.phase == "session"
+    lights = desk.lights(lab.run, lab.now).content["lights"]
+    assert lights["imu"]["light"] == "red"  # type: ignore[index]
+    lab.does("abort", "the phone's motion is gone")
+    lab.happens(Closed("data/set-aside/P01_fusion.1.mcap", lab.now))
+    assert refusals(lab.does("start"))[0].startswith("imu is silent")
+
+
+def test_a_phone_s_clock_that_is_set_is_followed_noted_and_amber(lab: Lab) -> None:
+    def pings(seconds: float, off_ms: float) -> list[Action]:
+        found: list[Action] = []
+        for _ in range(round(seconds * 4)):
+            lab.goes_on(0.25)
+            now, theirs = lab.now / MS, lab.now / MS - off_ms
+            exchange = Exchange(theirs - 2, now - 1, now - 1, theirs)
+            found += lab.happens(Said("phone", PHONE, Ping(theirs, exchange), lab.now))
+        return found
+
+    pings(2.0, 0.0)
+    lab.does("start")
+    lab.goes_on(1.5)
+    assert notes(pings(1.0, 0.0)) == []
+    assert notes(pings(3.0, 60_000.0)) == ["clock_step"]
+    light = desk.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
+    assert (light["light"], "was set once" in light["text"]) == ("amber", True)
+    assert lab.run.phase == "session"
+    theirs = lab.now / MS - 60_000.0
+    assert study_run.phone_ns(lab.run, theirs, lab.now + 10 * MS) == pytest.approx(lab.now, abs=5 * MS)
+
+
+def test_after_a_lost_tracker_the_task_may_be_done_again(lab: Lab) -> None:
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(2.0)
+    lab.goes_on(2.5, tracker=False)
+    lab.does("abort", "the tracker was lost")
+    lab.happens(Closed("data/set-aside/P01_kinect.1.mcap", lab.now))
+    lab.goes_on(0.5)
+    (opened,) = (one for one in lab.does("start") if isinstance(one, Open))
+    assert (opened.participant, opened.facts["attempt"]) == ("P01", "2")
+
+
+def test_a_folder_that_cannot_be_written_to_is_said_before_anything_begins(tmp_path: Path) -> None:
+    study, _ = study_in(tmp_path)
+    (tmp_path / "data").write_text("not a folder", encoding="utf-8")
+    with pytest.raises(PipelineError, match=r"\.recorder: cannot be written to: .*; make the study's folder writable"):
+        Journal(tmp_path, study).hold()
 
 
 def test_a_suspended_computer_ends_the_attempt_and_a_wall_clock_that_is_set_does_not(lab: Lab) -> None:
@@ -258,3 +322,14 @@ def test_a_participant_who_stops_is_replaced_and_the_log_says_why(lab: Lab) -> N
     lab.happens(Closed("data/set-aside/P01_kinect.1.mcap", lab.now))
     first, second = lab.run.plan.persons
     assert (first.dropped, second.order, lab.run.phase) == (True, first.order, "ready")
+    assert desk.state(lab.run, OPERATOR).content["problems"] == []  # nothing of them counts
+
+
+def test_whose_tasks_count_and_who_leaves_is_proposed_as_an_exclusion(lab: Lab) -> None:
+    ids = {"participant": "P01", "condition": "kinect"}
+    lab.run, _ = run_state.save(lab.run, {"type": "begun", **ids})
+    lab.run, _ = run_state.save(lab.run, {"type": "finished", **ids, "trials": 3})
+    lab.does("drop", 'said "no more"')
+    (problem,) = desk.state(lab.run, OPERATOR).content["problems"]  # type: ignore[misc]
+    entry = yaml.safe_load(problem.split("of them: ")[1].removesuffix(" in study.yaml."))
+    assert entry == {"exclusions": [{"participant": "P01", "reason": 'said "no more"'}]}
