@@ -80,6 +80,8 @@ def run(work: Work) -> Outcome:
     if "order" in log.facts:
         order = {"session": session.id, "order": log.facts["order"]}
         tables.write("session_orders", tables.of_rows("session_orders", [order]), work.out)
+    if "recorder" in log.facts:
+        tables.write("recorders", tables.of_rows("recorders", [_recorder(session.id, log.facts, work.pseudonyms)]), work.out)
     in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 
@@ -90,6 +92,20 @@ def _require_memory(session: Session) -> None:
     lacking = shortage(size, MEMORY_PER_BYTE, free_bytes())
     if lacking is not None:
         raise PipelineError(f"session {session.id}: {lacking}")
+
+
+def _recorder(session: str, facts: Mapping[str, str], pseudonyms: Pseudonyms | None) -> Row:
+    """What a log that was recorded live says of that."""
+    if pseudonyms is not None:  # the operator's reasons are their own words
+        facts = {key: pseudonyms.in_text(text) for key, text in facts.items()}
+    return {
+        "session": session,
+        "recorder": facts["recorder"],
+        "settings": facts.get("study_digest"),
+        "attempt": facts.get("attempt"),
+        "started_although": facts.get("started_although"),
+        "overruled": facts.get("overruled"),
+    }
 
 
 def _participant_and_condition(

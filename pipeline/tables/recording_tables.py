@@ -83,6 +83,23 @@ QUALITY = Table(
     as_csv=True,
 )
 
+RECORDERS = Table(
+    "recorders",
+    "One row per session whose log says that Steadyhand recorded it live.",
+    (
+        SESSION,
+        text("recorder", "what recorded it, with its version"),
+        text("settings", "digest of what study.yaml said of the recording; where it differs, other settings"),
+        text("attempt", "which attempt at the task it was"),
+        text("started_although", "the reason that was given to begin over a red light; null where none was"),
+        text("overruled", "what the red lights said then; null where none was"),
+    ),
+    stages=("ingest", "compare"),
+    key=("session",),
+    in_results=True,
+    as_csv=True,
+)
+
 CHECKS = Table(
     "checks",
     "One row per check of what a log or a table claims: against its own readings and against study.yaml.",

@@ -34,6 +34,7 @@ from pipeline.tables.recording_tables import (
     CHECKS,
     PHONES,
     QUALITY,
+    RECORDERS,
     REPLAY_AGREEMENT,
     SENSOR_NOISE,
     SENSORS_FOUND,
@@ -335,6 +336,7 @@ STUDY_TABLES = (
         as_csv=True,
     ),
     SENSORS_FOUND,
+    RECORDERS,
     Table(
         "measures",
         "One row per participant, condition and measure, and level of further factors.",

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pipeline.analysis.kinds_of_values import SHAPE
 from pipeline.report.document.model import Strong, Text
 from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_reference
-from pipeline.report.sections import checks, preregistration
+from pipeline.report.sections import checks, preregistration, recorded_live
 from pipeline.report.sections.material import Material
 from pipeline.statistics import OK, T_BEYOND
 from pipeline.study.statistical_tests import TESTS
@@ -49,6 +49,7 @@ def cautions(material: Material) -> list[Text]:
         *checks.caution(material),
         *checks.worse_than_tracker(material),
         *checks.suspicious_values(material),
+        *recorded_live.cautions(material),
         *_origin_and_size(material),
         *_assumptions(material),
         *_design_remarks(material),

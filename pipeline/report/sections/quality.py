@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.report import figures, traffic_lights
 from pipeline.report.document.model import Block, Column, Folded, Paragraph, Section, Strong, Table, columns
-from pipeline.report.sections import checks, sensors_found, timeline
+from pipeline.report.sections import checks, recorded_live, sensors_found, timeline
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
@@ -44,6 +44,7 @@ def section(material: Material) -> Section:
     if any(row["calibrated_until_s"] is not None for row in material.rows("phones")):
         blocks.append(_mounting_table(material))
     blocks += sensors_found.folded(material)
+    blocks += recorded_live.blocks(material)
     agreement = material.rows("replay_agreement")
     if agreement:
         blocks.append(Folded(_agreement_summary(agreement), (_agreement_table(material),)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,14 @@ from pipeline.errors import PipelineError
 from pipeline.live import plan, run_state
 from pipeline.live.bots import FORMS, PHONE, Players, as_simulated
 from pipeline.live.events import Joined, Left, Said, Tick
-from pipeline.live.journal import PART, Journal
+from pipeline.live.journal import PART, Journal, known_plan
 from pipeline.live.messages import Answer, Do, Drawn, Select, Submit
 from pipeline.live.outgoing import AnswerSaved, Form, FormState, Refused, to_json
+from pipeline.report.sections import recorded_live
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.live.studies import study_in
+from tests.pipeline.live.studies import STUDY, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 
@@ -91,6 +93,37 @@ def test_a_log_says_how_it_was_recorded(demo: Demo) -> None:
     assert facts["estimator"].startswith("fusion_kalman")
     assert facts["origin"].startswith("simulated")
     assert {"/recorder/notes", "/display/drawn"} <= set(log.types)
+
+
+def test_the_report_says_how_sessions_were_recorded_and_that_settings_changed(
+    tmp_path: Path, steadyhand: Steadyhand
+) -> None:
+    for count, sd in ((1, "8"), (2, "9")):  # noise_sd_mm is changed after the first participant
+        study, setup = study_in(tmp_path, STUDY.replace("noise_sd_mm: 8", f"noise_sd_mm: {sd}"))
+        journal = Journal(tmp_path, study)
+        journal.hold()
+        if count == 2:
+            with pytest.raises(PipelineError, match="has changed since P01"):
+                known_plan(setup.empty_plan(), journal, setup.digest, goes_on=False)
+        known = known_plan(setup.empty_plan(), journal, setup.digest, goes_on=True)
+        Players(as_simulated(setup), tmp_path, journal, known, EPOCH_NS + count * 10**13).play(count)
+        journal.release()
+    ran = steadyhand("compare", tmp_path)
+    assert ran.code == 0, ran.err
+    rows = steadyhand.results()["recorders"]
+    assert [row["session"] for row in rows] == ["P01_fusion", "P01_kinect", "P02_fusion", "P02_kinect"]
+    assert len({row["settings"] for row in rows}) == 2
+    assert {(row["attempt"], row["started_although"]) for row in rows} == {("1", "simulated")}
+    material = SimpleNamespace(rows=lambda name: rows if name == "recorders" else [])
+    words = repr([*recorded_live.blocks(material), *recorded_live.cautions(material)])  # type: ignore[arg-type]
+    assert "4 sessions recorded live, by steadyhand" in words
+    assert words.count("study.yaml was changed while the study was recorded") == 2
+    red = {**rows[0], "overruled": "At rest 1.00 m/s²", "attempt": "2"}
+    material = SimpleNamespace(rows=lambda name: [red])
+    words = repr(list(recorded_live.blocks(material)))  # type: ignore[arg-type]
+    assert "At a further attempt: P01_fusion" in words
+    assert "At rest 1.00 m/s²" in words
+    assert list(recorded_live.cautions(material)) == []  # type: ignore[arg-type]
 
 
 def test_no_message_to_phone_or_questionnaire_names_a_condition(demo: Demo) -> None:

@@ -330,6 +330,8 @@ def test_whose_tasks_count_and_who_leaves_is_proposed_as_an_exclusion(lab: Lab) 
     lab.run, _ = run_state.save(lab.run, {"type": "begun", **ids})
     lab.run, _ = run_state.save(lab.run, {"type": "finished", **ids, "trials": 3})
     lab.does("drop", 'said "no more"')
-    (problem,) = desk.state(lab.run, OPERATOR).content["problems"]  # type: ignore[misc]
+    problems = desk.state(lab.run, OPERATOR).content["problems"]
+    assert isinstance(problems, list) and len(problems) == 1
+    problem = str(problems[0])
     entry = yaml.safe_load(problem.split("of them: ")[1].removesuffix(" in study.yaml."))
     assert entry == {"exclusions": [{"participant": "P01", "reason": 'said "no more"'}]}

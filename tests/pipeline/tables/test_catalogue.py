@@ -19,7 +19,7 @@ from tests.pipeline.helpers import Steadyhand
 
 Folder = Callable[..., Path]
 EVERY = (*SESSION_TABLES, *STUDY_TABLES, *REPLAY_TABLES, *EXPLORE_TABLES)
-OF_SOME_STUDIES = {"readings", "session_orders", "printed", "simulated_reductions"}
+OF_SOME_STUDIES = {"readings", "recorders", "session_orders", "printed", "simulated_reductions"}
 SETTINGS = """
 conditions: [a, b]
 sessions: '{participant}_{condition}.mcap'
@@ -73,6 +73,7 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
         "fitts_points",
         "descriptives_by_group",
         "sensors_found",
+        "recorders",
     )
     assert in_results_of("replay") == ["accuracy", "replay_means", "replay_exclusions"]
     assert written_by("replay") == ["accuracy", "replay_trials", "replay_means", "replay_exclusions"]
