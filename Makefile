@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits lock clean
+.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits bench-live soak lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -77,6 +77,12 @@ bench: .venv/installed ## how fast, as ratios in one run, beside other libraries
 
 limits: .venv/installed ## how much a study may hold: seconds and memory of large studies (an hour); ARGS="trials": some of them
 	@$(python) -m tests.benchmarks.limits $(ARGS)
+
+bench-live: .venv/installed ## how soon a live study shows a reading, with 1 and 8 phones and under a flood (a quiet machine)
+	@$(python) -m tests.benchmarks.live $(ARGS)
+
+soak: .venv/installed ## PHONES=8 for MINUTES=30: does memory stay flat, is a reading lost?
+	@$(python) -m tests.benchmarks.live soak $(or $(MINUTES),30) $(or $(PHONES),8)
 
 lock: .venv/installed ## bring requirements.lock up to date with pyproject.toml
 	@sh tools/make-lock

@@ -14,6 +14,7 @@ import numpy as np
 from fusion_core import ESTIMATORS, Estimator, FusionAdaptive, FusionKalman, Samples, Sensor, WindowGP, replay_loop
 from tests.benchmarks import archive, coverage, peers
 from tests.benchmarks.error_rates import error_rates
+from tests.benchmarks.live.__main__ import latency as live_latency
 from tests.benchmarks.people import people
 from tests.benchmarks.reading import reading
 from tests.benchmarks.recorders import recorders
@@ -154,3 +155,4 @@ if __name__ == "__main__":
     archive.measure(archive.SMALL)
     error_rates()
     stress()
+    live_latency()

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from tests.browser.chromium import BrowserError, Tab, tab
-from tests.browser.live import operator, phone, played, questionnaire, whole_study
+from tests.browser.live import by_sensors, operator, phone, played, questionnaire, whole_study
 from tests.browser.live.acts import fake_sensors
 from tests.browser.live.looks import SCENES
 from tests.browser.live.looks import faults as looks_faults
 from tests.browser.live.server import LiveServer, live_server
 
 Case = Callable[[Tab, LiveServer], None]
-WHOLE = "study: recorded, played and reported"
+WHOLE: dict[str, Callable[[], None]] = {
+    "study: by sensors and touch": by_sensors.plays_by_sensors,
+    "study: recorded, played and reported": whole_study.plays_and_reports,
+}
 _FLAGS = ("--host-resolver-rules=MAP phone.test 127.0.0.1",)
 CASES: dict[str, Sequence[Case]] = {
     "phone": phone.CASES,
@@ -30,8 +33,9 @@ def results(wanted: str = "") -> Iterator[tuple[str, list[str]]]:
             name = f"{page}: {case.__name__.replace('_', ' ')}"
             if wanted in name:
                 yield name, faults(lambda case=case: _with_stand_in(case))  # type: ignore[misc]
-    if wanted in WHOLE:
-        yield WHOLE, faults(whole_study.plays_and_reports)
+    for name, plays in WHOLE.items():
+        if wanted in name:
+            yield name, faults(plays)
 
 
 def _with_stand_in(case: Case) -> None:

@@ -11,7 +11,8 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -64,12 +65,12 @@ _PATIENCE_S = 300.0  # the estimators' first compilation is among it
 
 
 @contextmanager
-def _recorder(study: Path, folder: Path) -> Iterator[str]:
-    """`steadyhand record --demo` of a study into a folder; the operator's address."""
+def recorder(study: Path, *options: str) -> Iterator[re.Match[str]]:
+    """`steadyhand record` of a study; what it said, the operator's address as the first group."""
     with socket.create_server(("127.0.0.1", 0)) as found_free:
         port = str(found_free.getsockname()[1])
     spoken = study / "said.txt"
-    command = [sys.executable, "-m", "pipeline", "record", str(study), "--demo", "--out", str(folder), "--port", port]
+    command = [sys.executable, "-m", "pipeline", "record", str(study), *options, "--port", port]
     with spoken.open("w") as said:
         environment = {**os.environ, "PYTHONFAULTHANDLER": "1"}
         process = subprocess.Popen(command, cwd=CLONE, env=environment, stdout=said, stderr=subprocess.STDOUT)
@@ -78,12 +79,13 @@ def _recorder(study: Path, folder: Path) -> Iterator[str]:
             def address() -> re.Match[str] | None:
                 words = spoken.read_text(encoding="utf-8")
                 assert process.poll() is None, words
-                return re.search(r"https?://\S+/operator#k=[\w-]+(?=\s)", words)
+                return re.search(r"(https?://\S+/operator#k=[\w-]+)(?=\s)", words)
 
             until(lambda: address() is not None, "the operator's address is printed", _PATIENCE_S)
+            time.sleep(0.5)  # what follows it is printed too
             found = address()
             assert found is not None
-            yield found[0]
+            yield found
         finally:
             process.send_signal(signal.SIGINT)
             try:
@@ -134,9 +136,13 @@ class Operator:
         return bool(value(self.page, "#big", "it.dataset.do === 'abort'"))
 
 
-def _opened(operator: Operator, role: str, width: int, height: int) -> Tab:
+def opened_as(
+    operator: Operator, role: str, width: int, height: int, before: Callable[[Tab], None] = lambda _: None
+) -> Tab:
+    """A participant's page by its link; `before` does something to the tab first."""
     page = operator.page.another()
     sized(page, width, height)
+    before(page)
     page.open(operator.links()[role])
     until(lambda: page.evaluate("location.pathname") == f"/{role}", f"the {role}'s page opens")
     return page
@@ -160,9 +166,9 @@ def plays_and_reports() -> None:
         study, folder = Path(made) / "animals", Path(made) / "recorded"
         study.mkdir()
         (study / "study.yaml").write_text(_STUDY, encoding="utf-8")
-        with _recorder(study, folder) as address, tab() as opened:
-            operator = Operator(opened, address)
-            phone, form = _opened(operator, "phone", 1440, 900), _opened(operator, "questionnaire", 390, 844)
+        with recorder(study, "--demo", "--out", str(folder)) as words, tab() as opened:
+            operator = Operator(opened, words[1])
+            phone, form = opened_as(operator, "phone", 1440, 900), opened_as(operator, "questionnaire", 390, 844)
             sized(form, 390, 844)
             touch(phone, "#start")
             player, wire = Participant(phone, _ERRORS_MM), Wire(form)
