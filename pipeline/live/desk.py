@@ -20,6 +20,7 @@ _NS_PER_MS = 1e6
 _NS_PER_S = 1e9
 _LEAST_FREE_BYTES = 200_000_000
 _LATE_WRITE_MS = 2_000.0
+_LATELY_NS = 10_000_000_000
 _UNALIGNED = (
     "The phone's orientation is not known yet: hold it still for a second, then move it about in view of the tracker;"
     " or give a reason to start without it."
@@ -218,7 +219,13 @@ def lights(run: StudyRun, at_ns: int) -> Whole:
     for name, one in run.health.items():
         lost = attempt.heard[name].lost if attempt is not None else 0
         found[name] = health.light(one, at_ns, lost)
-    found |= {"phone": _phone_light(run), "clock": _clock_light(run), "disk": _disk_light(run), "log": _log_light(run)}
+    found |= {
+        "senders": _senders_light(run, at_ns),
+        "phone": _phone_light(run),
+        "clock": _clock_light(run),
+        "disk": _disk_light(run),
+        "log": _log_light(run),
+    }
     mapping = run.clock.mapping
     return Whole(
         "lights",
@@ -233,6 +240,16 @@ def lights(run: StudyRun, at_ns: int) -> Whole:
             },
         },
     )
+
+
+def _senders_light(run: StudyRun, at_ns: int) -> dict[str, object]:
+    """What was sent and not taken: amber for ten seconds after each."""
+    dropped = run.dropped
+    if dropped is None:
+        return {"light": "off", "text": "Nothing was dropped."}
+    counted = ", ".join(f"{reason} ({count})" for reason, count in sorted(dropped.counts.items()))
+    lately = at_ns - dropped.at_ns < _LATELY_NS
+    return {"light": "amber" if lately else "green", "text": f"Not taken: {counted}."}
 
 
 def _phone_light(run: StudyRun) -> dict[str, object]:

@@ -126,6 +126,14 @@ class WallClock:
 
 
 @dataclass(frozen=True)
+class Dropped:
+    """How many frames and datagrams were not taken so far, by reason; said when there are more."""
+
+    counts: Mapping[str, int]
+    at_ns: int
+
+
+@dataclass(frozen=True)
 class Examined:
     """What came of `Examine`: of the checks that were seen, and of what the readings claim."""
 
@@ -134,7 +142,7 @@ class Examined:
     at_ns: int
 
 
-Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed | Woke | WallClock | Examined
+Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed | Woke | WallClock | Dropped | Examined
 
 
 @dataclass(frozen=True)

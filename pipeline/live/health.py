@@ -15,7 +15,7 @@ _SMOOTHED = 0.05
 
 @dataclass(frozen=True)
 class Health:
-    """A stream's newest arrival, mean interval, widest recent gap and mean delay; `refused` were not taken."""
+    """A stream's newest arrival, mean interval, widest recent gap and mean delay."""
 
     arrival_ns: int = 0
     count: int = 0
@@ -23,7 +23,6 @@ class Health:
     gap_ms: float = 0.0
     gap_ns: int = 0
     late_ms: float | None = None
-    refused: int = 0
 
 
 def heard(health: Health, arrival_ns: int, stamp_ns: int | None) -> Health:
@@ -32,7 +31,7 @@ def heard(health: Health, arrival_ns: int, stamp_ns: int | None) -> Health:
     if late is not None and health.late_ms is not None:
         late = health.late_ms + _SMOOTHED * (late - health.late_ms)
     if not health.count:
-        return Health(arrival_ns, 1, late_ms=late, refused=health.refused)
+        return Health(arrival_ns, 1, late_ms=late)
     apart = (arrival_ns - health.arrival_ns) / _NS_PER_MS
     weight = max(_SMOOTHED, 1.0 / health.count)
     interval = health.interval_ms + weight * (apart - health.interval_ms)
@@ -71,7 +70,5 @@ def light(health: Health, at_ns: int, lost: int) -> dict[str, object]:
         return {"light": "red", "text": f"Silent for {silent_s:.1f} s.", **figures}
     late = "" if health.late_ms is None else f", {health.late_ms:.0f} ms late"
     text = f"{rate:.1f} Hz, gap {health.gap_ms:.0f} ms{late}"
-    if health.refused:
-        text += f", {health.refused} refused"
-    amber = health.gap_ms > _GAP_AMBER_MS or health.refused
+    amber = health.gap_ms > _GAP_AMBER_MS
     return {"light": "amber" if amber else "green", "text": text, **figures}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -26,6 +26,7 @@ from pipeline.live.events import (
     Actions,
     Agreed,
     Closed,
+    Dropped,
     Event,
     Examine,
     Examined,
@@ -54,6 +55,7 @@ _FLUSH_NS = 500_000_000
 _FILES_S = 0.1
 _STOOD_STILL_S = 2.0
 _WALL_CLOCK_NS = 10_000_000_000
+_COUNT_NS = 1_000_000_000
 _SET_NS = 100_000_000  # by which a wall clock jumps when it is set; it drifts by 1 ms in 10 s
 _MOST_WAITING = 256  # messages of one page: one that does not read is closed
 
@@ -140,7 +142,9 @@ class Loop:
     def __init__(self, setup: Setup, folder: Path, clerk: Clerk, known: Plan, clock: Clock) -> None:
         self.run = run_state.begin(setup, known)
         self.now_ns, self.pages = clock, dict[int, Outbox]()
+        self.refused: list[Counter[str]] = []  # of every adapter: what it did not take, by reason
         self._ticked_ns, self._wall_ns = clock(), clock()
+        self._counted_ns, self._counts = clock(), Counter[str]()
         self._folder, self._clerk = folder, clerk
         self._files: list[Action] = []
         self._urgent = asyncio.Event()
@@ -228,6 +232,7 @@ class Loop:
             await asyncio.sleep(_TICK_S)
             now = self.now_ns()
             self._watch_clocks(now)
+            self._count_refused(now)
             if self._mouse is not None:
                 for reading in self._mouse.readings(now):
                     self.happens(reading)
@@ -242,6 +247,16 @@ class Loop:
         if now - self._wall_ns >= _WALL_CLOCK_NS or stood_s > _STOOD_STILL_S:
             self._wall_ns = now
             self.happens(self.now_ns.wall_clock())
+
+    def _count_refused(self, now: int) -> None:
+        """Say that adapters have dropped more than before, once a second."""
+        if now - self._counted_ns < _COUNT_NS:
+            return
+        self._counted_ns = now
+        counts = sum(self.refused, Counter[str]())
+        if counts != self._counts:
+            self._counts = counts
+            self.happens(Dropped(dict(counts), now))
 
     async def _file(self) -> None:
         running, flushed = asyncio.get_running_loop(), 0

@@ -193,6 +193,7 @@ async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[a
         if sender.osc is not None:
             addresses = osc.expected(made, sender.osc.port)
             receivers[sender.osc.port] = osc.Receiver(addresses, loop.happens, loop.now_ns)
+    loop.refused += [receiver.refused for receiver in receivers.values()]
     hosts = (LOOPBACK[0], access.host) if access.in_network else (access.host,)
     for (port, receiver), host in product(sorted(receivers.items()), hosts):
         try:

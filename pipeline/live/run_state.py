@@ -13,7 +13,7 @@ from typing import Literal
 from pipeline.live import checks, desk, plan, session
 from pipeline.live.changes import changed
 from pipeline.live.clock import Clock, OneWay
-from pipeline.live.events import NOTHING, Action, Actions, Agreed, Close, Closed, Disk, Save, Tables, Tell
+from pipeline.live.events import NOTHING, Action, Actions, Agreed, Close, Closed, Disk, Dropped, Save, Tables, Tell
 from pipeline.live.health import Health
 from pipeline.live.messages import Hello
 from pipeline.live.orientation import PhoneMotion
@@ -51,6 +51,7 @@ class StudyRun:
     one_way: Mapping[str, OneWay] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)
     disk: Disk | None = None
+    dropped: Dropped | None = None
     asked: Mapping[str, tuple[int, str]] = field(default_factory=dict)
     tokens: int = 0
     closed: Closed | None = None

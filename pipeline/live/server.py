@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from functools import cache
 from pathlib import Path
@@ -40,6 +41,9 @@ HEADERS = {
 def app(loop: Loop, access: Access, certificates: Certificates | None = None) -> Starlette:
     """The application of a run. `certificates` are those that it is served with."""
 
+    refused: Counter[str] = Counter()
+    loop.refused.append(refused)
+
     async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
         if not access.is_our_host(request.headers.get("host", "")):
             response: Response = PlainTextResponse("This address is not ours.", 421)
@@ -57,7 +61,7 @@ def app(loop: Loop, access: Access, certificates: Certificates | None = None) ->
             headers, client = asked.headers, asked.client.host if asked.client else ""
             ours = access.is_our_origin(headers.get("origin", ""), headers.get("host", ""))
             if ours and access.is_let_in(role, asked.cookies, client):
-                await websocket.serve(asked, role, loop)
+                await websocket.serve(asked, role, loop, refused)
             else:
                 await asked.accept()  # a page cannot see the code of a connection that was never there
                 await asked.close(websocket.FORBIDDEN)

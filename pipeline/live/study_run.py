@@ -20,6 +20,7 @@ from pipeline.live.events import (
     Agreed,
     Closed,
     Disk,
+    Dropped,
     Event,
     Examined,
     Joined,
@@ -281,6 +282,7 @@ _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Closed: _closed,
     Woke: _woke,
     WallClock: _wall_clock,
+    Dropped: lambda run, event: (changed(run, dropped=event), NOTHING),
     Examined: checking.examined,
     Agreed: lambda run, event: (changed(run, agreed=event), NOTHING),
 }

@@ -17,19 +17,17 @@ from pipeline.live.outgoing import to_json
 _PER_SECOND = 300.0
 MOST_SOCKETS = 16
 FORBIDDEN, TOO_MUCH, REPLACED, CROWDED = 4403, 4408, 4409, 4429
-refused: Counter[str] = Counter()
-"""What pages sent that was not taken, by reason."""
 
 
-async def serve(socket: WebSocket, role: Role, loop: Loop) -> None:
-    """Serve a page that may connect, until it goes."""
+async def serve(socket: WebSocket, role: Role, loop: Loop, refused: Counter[str]) -> None:
+    """Serve a page that may connect, until it goes; what it sends and is not taken is counted in `refused`."""
     await socket.accept()
     if len(loop.pages) >= MOST_SOCKETS:
         await socket.close(CROWDED)
         return
     client, outbox = loop.join(role)
     sending = asyncio.create_task(_send(socket, outbox))
-    receiving = asyncio.create_task(_receive(socket, role, client, loop))
+    receiving = asyncio.create_task(_receive(socket, role, client, loop, refused))
     try:
         await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -49,7 +47,7 @@ async def _send(socket: WebSocket, outbox: Outbox) -> None:
         await socket.send_text(to_json(message).decode())
 
 
-async def _receive(socket: WebSocket, role: Role, client: int, loop: Loop) -> None:
+async def _receive(socket: WebSocket, role: Role, client: int, loop: Loop, refused: Counter[str]) -> None:
     flow = Flow(_PER_SECOND, loop.now_ns())
     while not flow.is_flood:
         try:
@@ -58,9 +56,9 @@ async def _receive(socket: WebSocket, role: Role, client: int, loop: Loop) -> No
             return
         flow, admitted = admit(flow, _PER_SECOND, loop.now_ns())
         if not admitted:
-            refused["too many"] += 1
+            refused[f"{role}: too many frames"] += 1
             continue
         try:
             loop.hear(role, client, parse(role, frame))
         except MessageError:
-            refused["not understood"] += 1
+            refused[f"{role}: not understood"] += 1

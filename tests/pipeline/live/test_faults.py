@@ -16,6 +16,7 @@ from pipeline.live.events import (
     Close,
     Closed,
     Disk,
+    Dropped,
     Event,
     Joined,
     Left,
@@ -187,6 +188,17 @@ def test_after_a_lost_tracker_the_task_may_be_done_again(lab: Lab) -> None:
     lab.goes_on(0.5)
     (opened,) = (one for one in lab.does("start") if isinstance(one, Open))
     assert (opened.participant, opened.facts["attempt"]) == ("P01", "2")
+
+
+def test_what_is_not_taken_is_said_for_ten_seconds_and_counted_for_good(lab: Lab) -> None:
+    def light() -> dict[str, str]:
+        return desk.lights(lab.run, lab.now).content["lights"]["senders"]  # type: ignore[index,no-any-return]
+
+    assert light() == {"light": "off", "text": "Nothing was dropped."}
+    lab.happens(Dropped({"wrong key": 3, "too long": 1}, lab.now))
+    assert light() == {"light": "amber", "text": "Not taken: too long (1), wrong key (3)."}
+    lab.goes_on(10.1)
+    assert light() == {"light": "green", "text": "Not taken: too long (1), wrong key (3)."}
 
 
 def test_a_folder_that_cannot_be_written_to_is_said_before_anything_begins(tmp_path: Path) -> None:

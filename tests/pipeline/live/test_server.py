@@ -220,6 +220,15 @@ def test_hostile_pages_and_senders_change_nothing(tmp_path: Path) -> None:
             assert (await hears(phone, "pong"))["t1"] == 5
             lights = await hears(operator, "lights")
             assert lights["lights"]["tracker"] == {"light": "red", "text": "Nothing has come yet."}
+            while (senders := (await hears(operator, "lights"))["lights"]["senders"])["light"] != "amber":
+                pass
+            for reason in (
+                "phone: not understood (",
+                "phone: too many frames (",
+                "wrong key (1)",
+                "too many datagrams (",
+            ):
+                assert reason in senders["text"]
             with suppress(websockets.ConnectionClosed):
                 await phone.send("x" * 5000)  # longer than any message: the connection is closed
                 await asyncio.wait_for(hears(phone, "never"), 10)
