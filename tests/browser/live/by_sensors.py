@@ -21,7 +21,7 @@ from tests.browser.live.server import until
 from tests.browser.live.whole_study import Operator, opened_as, recorder
 from tests.conftest import CLONE
 
-_STUDY = """
+STUDY = """
 title: By sensors
 data_origin: simulated
 conditions: [quokka, wombat]
@@ -164,13 +164,11 @@ def _task(operator: Operator, phone: Tab, hand: Hand) -> None:
 
 def plays_by_sensors() -> None:
     """What the hand did beside each target is what the report says, by a tracker's datagrams and a phone's motion."""
-    with tempfile.TemporaryDirectory() as made, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-        free.close()
+    with tempfile.TemporaryDirectory() as made:
+        port = free_udp_port()
         study = Path(made) / "sensors"
         study.mkdir()
-        (study / "study.yaml").write_text(_STUDY.replace("PORT", str(port)), encoding="utf-8")
+        (study / "study.yaml").write_text(STUDY.replace("PORT", str(port)), encoding="utf-8")
         with recorder(study) as words, tab() as opened:
             address, key = words.group(1), re.search(r'"key": "([^"]+)"', words.string)
             assert key is not None
@@ -188,6 +186,13 @@ def plays_by_sensors() -> None:
                     assert "⁻" in said or "at most 0 mm" in said
                 assert not is_seen(operator.page, "#reason")
         _comes_out(study)
+
+
+def free_udp_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
 
 
 def _comes_out(study: Path) -> None:

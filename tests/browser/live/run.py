@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from tests.browser.chromium import BrowserError, Tab, tab
-from tests.browser.live import by_sensors, operator, phone, played, questionnaire, whole_study
+from tests.browser.live import by_sensors, by_tls, operator, phone, played, questionnaire, whole_study
 from tests.browser.live.acts import fake_sensors
 from tests.browser.live.looks import SCENES
 from tests.browser.live.looks import faults as looks_faults
@@ -14,6 +14,7 @@ from tests.browser.live.server import LiveServer, live_server
 Case = Callable[[Tab, LiveServer], None]
 WHOLE: dict[str, Callable[[], None]] = {
     "study: by sensors and touch": by_sensors.plays_by_sensors,
+    "study: by TLS": by_tls.joins_by_tls,
     "study: recorded, played and reported": whole_study.plays_and_reports,
 }
 _FLAGS = ("--host-resolver-rules=MAP phone.test 127.0.0.1",)

@@ -65,15 +65,15 @@ _PATIENCE_S = 300.0  # the estimators' first compilation is among it
 
 
 @contextmanager
-def recorder(study: Path, *options: str) -> Iterator[re.Match[str]]:
+def recorder(study: Path, *options: str, **environment: str) -> Iterator[re.Match[str]]:
     """`steadyhand record` of a study; what it said, the operator's address as the first group."""
     with socket.create_server(("127.0.0.1", 0)) as found_free:
         port = str(found_free.getsockname()[1])
     spoken = study / "said.txt"
     command = [sys.executable, "-m", "pipeline", "record", str(study), *options, "--port", port]
     with spoken.open("w") as said:
-        environment = {**os.environ, "PYTHONFAULTHANDLER": "1"}
-        process = subprocess.Popen(command, cwd=CLONE, env=environment, stdout=said, stderr=subprocess.STDOUT)
+        all_of_it = {**os.environ, "PYTHONFAULTHANDLER": "1", **environment}
+        process = subprocess.Popen(command, cwd=CLONE, env=all_of_it, stdout=said, stderr=subprocess.STDOUT)
         try:
 
             def address() -> re.Match[str] | None:
