@@ -17,6 +17,7 @@ from pipeline.sessions.checks import checked
 from pipeline.sessions.checks.agreement import expected_lag_s, in_ms, lag_message, lag_text, see_one_movement
 from pipeline.sessions.checks.clocks import TOGETHER
 from pipeline.sessions.checks.of_log import of_log
+from pipeline.sessions.checks.one_movement import ONE_MOVEMENT
 from pipeline.sessions.checks.orientation import gyroscope, turning
 from pipeline.sessions.checks.recorded import Imu, Recorded
 from pipeline.sessions.logs.log import Log, Readings
@@ -39,7 +40,12 @@ _SWEPT_MM = 10.0  # SD of the movement between 0.3 and 4 Hz
 _LAG_S = 0.04
 _HEADING_DEG = 5.0
 _LATE_TAP_MS, _TOO_LATE_TAP_MS = 50.0, 150.0
-_WHOLE_LOG = (TOGETHER,)  # checks of a whole log, which say nothing of 20 s of it
+# Checks of a whole log: 20 s need not be common to all, and of an even sweep any beat fits any other.
+_WHOLE_LOG = (TOGETHER, ONE_MOVEMENT)
+_NOT_ONE = (
+    "Tracker and phone are not seen to make one movement yet: sweep on, less evenly. If that does not help, it is"
+    " another phone, or the axes of one are wrong."
+)
 
 
 def guided(study: Study) -> tuple[str, ...]:
@@ -144,7 +150,8 @@ def _swept(recorded: Recorded, heading_sd_rad: float | None) -> Iterator[Light]:
     if tracker is None or imu is None or motion is None or motion.position_mm < _SWEPT_MM:
         return
     if not see_one_movement(motion) or motion.lag_beyond:
-        return  # what is wrong then is said by the checks of what is claimed
+        yield Light(SWEEP, "amber", _NOT_ONE)
+        return
     stated_s = expected_lag_s(tracker, imu)
     off_s = motion.lag_s.value - stated_s
     certain_s = max(motion.lag_s.low - stated_s, stated_s - motion.lag_s.high)

@@ -96,6 +96,30 @@ def test_a_lag_that_study_yaml_does_not_state_is_red(setup: Setup, late_s: float
     assert ("set latency_s: " in found.text) == (light == "red")
 
 
+@pytest.mark.parametrize(("pace_rad_s", "is_same_hand"), [(8.2, True), (12.6, True), (8.2, False)])
+def test_an_even_sweep_accuses_nobody(setup: Setup, pace_rad_s: float, is_same_hand: bool) -> None:
+    """Of an even beat any fits any other, a period off; and of another's movement it is said that it is another's."""
+    random = np.random.default_rng(0)
+    time, values = hands.phone()
+    tracker_s, _ = hands.tracker()
+    x, y = 0.1 * np.sin(pace_rad_s * tracker_s), 0.5 + 0.04 * np.sin(pace_rad_s / 2 * tracker_s)
+    places = np.column_stack([x, y, np.full(len(x), 1.2)]) + random.normal(0, 1e-3, (len(x), 3))
+    if is_same_hand:
+        along_x, along_y = (
+            -far * rate**2 * np.sin(rate * time) for far, rate in ((0.1, pace_rad_s), (0.04, pace_rad_s / 2))
+        )
+        moved = np.column_stack([along_x, along_y, np.zeros(len(time))])
+        values[:, :3] = moved - hands.GRAVITY_M_S2 + random.normal(0, 0.05, moved.shape)
+        values[:, 3:] = [0, 0, 0, 0, 0, 0, 1]
+    rows = {"imu": hands.rows(time, values, 0.01), "tracker": hands.rows(tracker_s, places, 0.1, stamped_late=True)}
+    guided, claims = checks.examined(setup.study, Request(rows))
+    found = {one.id: one for one in (*guided, *claims)}
+    assert found["sweep"].light != "red"
+    if not is_same_hand:
+        assert found["sweep"].text.endswith("it is another phone, or the axes of one are wrong.")
+    assert not any(one.startswith(("one movement", "lag")) for one in found)
+
+
 def test_a_heading_that_is_not_known_yet_is_amber(setup: Setup) -> None:
     assert seen(setup, sd=np.inf)["sweep"].light == "amber"
     assert seen(setup, sd=np.radians(6.0))["sweep"].light == "amber"
