@@ -36,10 +36,14 @@ class UdpJson(Frozen):
 
 
 class Osc(Frozen):
-    """Open Sound Control: the arguments `fields` of messages to `address`."""
+    """Open Sound Control: the arguments `fields` of messages to `address`.
+
+    It has no key, so it is heard from this computer alone unless `source` names the sender's address (or `any`).
+    """
 
     port: Port
     address: str = Field(pattern="^/")
+    source: str | None = None
     fields: tuple[Annotated[int, Field(ge=0, le=63)], ...] = (0, 1, 2)
 
 

@@ -1,6 +1,7 @@
-"""Readings by Open Sound Control: arguments of messages to an address. It has no key: only this computer is heard.
+"""Readings by Open Sound Control: arguments of messages to an address.
 
-OSC states a time for bundles alone, and most senders leave it out, so a reading's stamp is its arrival.
+It has no key, so this computer alone is heard, or the sender that study.yaml names. OSC states a time for bundles
+alone, and most senders leave it out, so a reading's stamp is its arrival.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from pipeline.live.access import LOOPBACK
 from pipeline.live.adapters.udp import Limited
 from pipeline.live.events import Reading
 from pipeline.live.messages import Datagram
@@ -21,12 +23,17 @@ _POSITION, _MOTION, _ORIENTED = 3, 6, 10  # numbers of a reading
 
 @dataclass(frozen=True)
 class Expected:
-    """A stream that comes to an address: which arguments make it, what they hold, and their units."""
+    """A stream that comes to an address: which arguments make it, what they hold, their units, and who may send it."""
 
     stream: str
     fields: tuple[int, ...]
     content: str
     units: Units
+    source: str | None = None
+
+    def hears(self, source: str) -> bool:
+        """Whether a sender at that address may send it."""
+        return source in LOOPBACK if self.source is None else self.source in ("any", source)
 
 
 def expected(setup: Setup, port: int) -> dict[str, Expected]:
@@ -34,7 +41,8 @@ def expected(setup: Setup, port: int) -> dict[str, Expected]:
     found = {}
     for name, sender in setup.recording.senders.items():
         if sender.osc is not None and sender.osc.port == port:
-            of_stream = Expected(name, sender.osc.fields, setup.streams[name].content, units(sender))
+            content = setup.streams[name].content
+            of_stream = Expected(name, sender.osc.fields, content, units(sender), sender.osc.source)
             found[sender.osc.address] = of_stream
     return found
 
@@ -61,6 +69,9 @@ class Receiver(Limited):
             stream = self._streams.get(message.address)
             if stream is None:
                 self.refused["no such address"] += 1
+                continue
+            if not stream.hears(source):
+                self.refused["not from its source"] += 1
                 continue
             reading = _reading(stream, message.params)
             values = None if reading is None else in_si(stream.units, stream.content, reading)

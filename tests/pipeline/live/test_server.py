@@ -374,6 +374,30 @@ def test_osc_messages_to_an_address_are_readings(tmp_path: Path) -> None:
     assert receiver.refused["no such address"] == 1
 
 
+@pytest.mark.parametrize(
+    ("source", "heard"),
+    [
+        ("", ["127.0.0.1"]),
+        (", source: 10.1.2.3", ["10.1.2.3"]),
+        (", source: any", ["127.0.0.1", "10.1.2.3", "10.1.2.4"]),
+    ],
+)
+def test_osc_is_heard_from_this_computer_or_whom_study_yaml_names(
+    tmp_path: Path, source: str, heard: list[str]
+) -> None:
+    senders = f"senders: {{tracker: {{osc: {{port: 9000, address: /hand{source}}}}}, imu: {{demo: {{}}}}}}"
+    _, setup = study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}, imu: {demo: {}}}", senders))
+    message = OscMessageBuilder("/hand")
+    for number in (1.0, 2.0, 3.0):
+        message.add_arg(number)
+    found = []
+    for address in ("127.0.0.1", "10.1.2.3", "10.1.2.4"):
+        receiver = OscReceiver(osc.expected(setup, 9000), lambda _, one=address: found.append(one), lambda: 5)  # type: ignore[misc]
+        receiver.datagram_received(message.build().dgram, (address, 1))
+        assert receiver.refused["not from its source"] == (address not in heard)
+    assert found == heard
+
+
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_osc(data: bytes) -> None:
     receiver = OscReceiver({}, lambda reading: None, lambda: 0)
