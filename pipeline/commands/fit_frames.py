@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from fusion_core.samples import Samples
 from pipeline.sessions import recording
 from pipeline.sessions.checks.agreement import lag_text
-from pipeline.sessions.frames import Frame, frame_of, matched
+from pipeline.sessions.frames import Frame, frame_of, on_the_rest, until
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.study.streams import ReferenceStream
 from pipeline.words.phrases import counted
@@ -30,8 +29,7 @@ def lines(study: Study, entries: Mapping[str, Path], first_s: float) -> Iterator
         session: (recording.in_space(study, entry, tracker), recording.in_space(study, entry, name))
         for session, entry in entries.items()
     }
-    early = {session: (_until(seen, first_s), known) for session, (seen, known) in sessions.items()}
-    frame = frame_of(early)
+    frame = frame_of(until(sessions, first_s))
     if frame is None:
         yield (
             f"# streams.{name}: its frame cannot be found: in the first {first_s:g} s of no session does it show a"
@@ -44,34 +42,18 @@ def lines(study: Study, entries: Mapping[str, Path], first_s: float) -> Iterator
             f" ± {frame.turn_half_deg:.0f}°); move along all three axes"
         )
     else:
-        yield from _frame(name, stated, frame, *_on_the_rest(sessions, frame, first_s))
+        yield from _frame(name, stated, frame, on_the_rest(sessions, frame, first_s))
     yield from _clocks(name, tracker, frame)
 
 
-def _until(samples: Samples, first_s: float) -> Samples:
-    kept = samples.arrival < (samples.arrival[0] + first_s if len(samples) else 0.0)
-    return replace(samples, time=samples.time[kept], arrival=samples.arrival[kept], value=samples.value[kept])
-
-
-def _on_the_rest(sessions: Mapping[str, tuple[Samples, Samples]], frame: Frame, first_s: float) -> tuple[float, float]:
-    """The median distance of tracker and reference after the first part, as stated and as found; NaN without a rest."""
-    before, after = [], []
-    for session, lag_s in frame.lags_s.items():
-        p, q, time = matched(*sessions[session], lag_s.value)
-        rest = time > first_s
-        before.append(np.linalg.norm(p - q, axis=1)[rest])
-        after.append(np.linalg.norm(p - frame.applied(q), axis=1)[rest])
-    both = np.concatenate(before), np.concatenate(after)
-    return (float(np.median(both[0])), float(np.median(both[1]))) if len(both[0]) else (np.nan, np.nan)
-
-
-def _frame(name: str, stated: ReferenceStream, frame: Frame, before_mm: float, after_mm: float) -> Iterator[str]:
+def _frame(name: str, stated: ReferenceStream, frame: Frame, rest_mm: tuple[float, float] | None) -> Iterator[str]:
     """Proposed only where it is beyond its own interval and no worse on the rest."""
+    before_mm, after_mm = rest_mm or (0.0, 0.0)
     turned = f"turned by {frame.turn_deg:.2f} ± {frame.turn_half_deg:.2f}°"
     moved = f"moved by {frame.shift_mm:.1f} ± {frame.shift_half_mm:.1f} mm from what is stated"
     yield f"# streams.{name} against the tracker, by {counted(len(frame.lags_s), 'session')}: {turned}, {moved};"
     yield f"#   {frame.left_mm:.1f} mm RMS are left between the two"
-    if np.isfinite(before_mm):
+    if rest_mm is not None:
         yield f"#   median distance on the rest of each session: {before_mm:.1f} -> {after_mm:.1f} mm"
     if frame.turn_deg <= frame.turn_half_deg and frame.shift_mm <= frame.shift_half_mm:
         yield "#   which agrees with study.yaml"
@@ -86,7 +68,7 @@ def _frame(name: str, stated: ReferenceStream, frame: Frame, before_mm: float, a
     yield f"    translation_mm: [{', '.join(f'{part:.1f}' for part in translation_mm)}]"
 
 
-def _composed(stated: ReferenceStream, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+def _composed(stated: ReferenceStream, frame: Frame) -> tuple[FloatArray, FloatArray]:
     """What study.yaml states, followed by the frame that was found: as a quaternion and a translation."""
     from scipy.spatial.transform import Rotation
 

@@ -131,7 +131,8 @@ def _cut(
     study: Study, recordings: Mapping[str, Recording], first_s: float
 ) -> tuple[dict[str, _Part], dict[str, _Part]]:
     """The first part of each session, and the rest; sessions without positions in it are left out."""
-    parts, rests = {}, {}
+    parts: dict[str, _Part] = {}
+    rests: dict[str, _Part] = {}
     for session, loaded in recordings.items():
         until = _begin(study, loaded) + first_s
         part, rest = _part(loaded.samples, -np.inf, until), _part(loaded.samples, until, np.inf)

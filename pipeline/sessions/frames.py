@@ -12,7 +12,7 @@ about it open, and shows in an interval as wide as that.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +70,10 @@ class Frame:
 
 def frame_of(sessions: Mapping[str, tuple[Samples, Samples]]) -> Frame | None:
     """By all sessions' tracker and reference, of three axes each; None where they do not show one movement."""
-    seen, known, block, lags = [], [], [], {}
+    seen: list[FloatArray] = []
+    known: list[FloatArray] = []
+    block: list[FloatArray] = []
+    lags = {}
     for session, (tracker, reference) in sessions.items():
         found = compare_positions(tracker.time, tracker.value, reference.time, reference.value)
         if found is None or found.explained < _FITS or found.lag_beyond:
@@ -87,6 +90,30 @@ def frame_of(sessions: Mapping[str, tuple[Samples, Samples]]) -> Frame | None:
     if of.max(initial=0) + 1 < _BLOCKS_MIN:
         return None
     return _rigid(p, q, of, lags)
+
+
+def until(sessions: Mapping[str, tuple[Samples, Samples]], first_s: float) -> dict[str, tuple[Samples, Samples]]:
+    """The same with the first seconds of each session's tracker alone."""
+    return {session: (_until(tracker, first_s), reference) for session, (tracker, reference) in sessions.items()}
+
+
+def _until(samples: Samples, first_s: float) -> Samples:
+    kept = samples.arrival < (samples.arrival[0] + first_s if len(samples) else 0.0)
+    return replace(samples, time=samples.time[kept], arrival=samples.arrival[kept], value=samples.value[kept])
+
+
+def on_the_rest(
+    sessions: Mapping[str, tuple[Samples, Samples]], frame: Frame, first_s: float
+) -> tuple[float, float] | None:
+    """The median distance in mm of tracker and reference after the first seconds, as stated and as found."""
+    before, after = [], []
+    for session, lag_s in frame.lags_s.items():
+        p, q, time = matched(*sessions[session], lag_s.value)
+        rest = time > first_s
+        before.append(np.linalg.norm(p - q, axis=1)[rest])
+        after.append(np.linalg.norm(p - frame.applied(q), axis=1)[rest])
+    as_stated, as_found = np.concatenate(before), np.concatenate(after)
+    return (float(np.median(as_stated)), float(np.median(as_found))) if len(as_stated) else None
 
 
 def matched(tracker: Samples, reference: Samples, lag_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:

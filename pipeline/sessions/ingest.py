@@ -81,7 +81,8 @@ def run(work: Work) -> Outcome:
         order = {"session": session.id, "order": log.facts["order"]}
         tables.write("session_orders", tables.of_rows("session_orders", [order]), work.out)
     if "recorder" in log.facts:
-        tables.write("recorders", tables.of_rows("recorders", [_recorder(session.id, log.facts, work.pseudonyms)]), work.out)
+        recorder = _recorder(session.id, log.facts, work.pseudonyms)
+        tables.write("recorders", tables.of_rows("recorders", [recorder]), work.out)
     in_part += [f"{row['stream']}: {row['messages_lost']} messages lost" for row in quality if row["messages_lost"]]
     return Outcome(in_part="; ".join(in_part) or None, participant=participant, condition=condition)
 

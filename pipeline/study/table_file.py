@@ -161,7 +161,6 @@ def _require_memory(path: Path) -> None:
         raise PipelineError(f"{path}: {lacking}")
 
 
-
 def _without_empty_ends(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
     """The rows without columns on their right that have neither a name nor a value, as spreadsheets leave them."""
     width = max(
