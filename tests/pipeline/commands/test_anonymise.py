@@ -27,7 +27,7 @@ sessions: data/{participant}_{condition}.mcap
 participants: people.csv
 trials: trials.csv
 questionnaires: answers.csv
-measures: values.csv
+measures: values/{participant}.csv
 estimators: {raw: {type: raw}}
 comparisons: [{test: t_paired, measure: "*"}]
 exclusions:
@@ -64,9 +64,12 @@ def study(folder: Callable[..., Path]) -> Path:
             "answers.csv": _rows(
                 "participant,condition,questionnaire,scale,rating", "{person},{each},ease,total,{higher}{n}"
             ),
-            "values.csv": _rows("participant,condition,measure,value", "{person},{each},comfort,{n}{higher}{n}"),
         },
     )
+    (root / "values").mkdir()
+    for number, person in enumerate(PEOPLE):  # a table that is split: the ids are in the names of its files alone
+        rows = "".join(f"{each},comfort,{number}{ord(each) - 96}{number}\n" for each in "ab")
+        (root / "values" / f"{person}.csv").write_text("condition,measure,value\n" + rows, encoding="utf-8")
     for person in PEOPLE[:2]:
         for condition in "ab":
             write_session(root / "data" / f"{person}_{condition}.mcap", session_messages(2.5), participant=person)
@@ -125,7 +128,7 @@ def test_no_id_is_in_anything_that_is_written_or_printed(study: Path, steadyhand
     left_out = {row["session"] for row in steadyhand.results()["exclusions"]}
     assert {"P01_a", "P02_a", "P03_b", "P05_b", "data/unreadable_1.mcap", "data/other_1.mcap"} <= left_out
     written = [*texts_of(steadyhand.out), ("console", hidden.out + hidden.err)]
-    for kind in ("csv", "parquet", "mcap", "r"):
+    for kind in ("csv", "parquet", "mcap", "r", "bids"):
         steadyhand.out = steadyhand.out.with_name(f"as-{kind}")
         exported = steadyhand("export", study, "--to", kind, "--anonymise")
         written += [*texts_of(steadyhand.out), ("console", exported.out + exported.err)]
