@@ -183,8 +183,8 @@ def _config(application: Starlette, certificates: Certificates | None = None) ->
     )
 
 
-async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[asyncio.DatagramTransport]:
-    found: list[asyncio.DatagramTransport] = []
+async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[udp.Port | asyncio.DatagramTransport]:
+    found: list[udp.Port | asyncio.DatagramTransport] = []
     receivers: dict[int, udp.Limited] = {}
     for sender in made.recording.senders.values():
         if sender.udp_json is not None:

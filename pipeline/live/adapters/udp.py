@@ -19,6 +19,7 @@ from pipeline.live.units import Units, in_si, units
 _PER_SECOND = 1000.0  # datagrams of one source
 _SOURCES = 64
 _WAITING_BYTES = 4 << 20  # the system may allow less
+_AT_ONCE, _LONGEST = 64, 65_536
 _MS_PER_S = 1000.0
 
 
@@ -107,10 +108,40 @@ class Receiver(Limited):
         self.happens(Reading(datagram.stream, None, now, values, datagram.seq, sent))
 
 
-async def listen(host: str, port: int, receiver: Limited) -> asyncio.DatagramTransport:
+class Port:
+    """An open port. All that waits is read at once: with one datagram a turn of the loop, a flood fills the buffer."""
+
+    def __init__(self, opened: socket.socket, receiver: Limited) -> None:
+        self._socket, self._receiver = opened, receiver
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(opened, self._read)
+
+    def _read(self) -> None:
+        for _ in range(_AT_ONCE):
+            try:
+                data, address = self._socket.recvfrom(_LONGEST)
+            except OSError:  # nothing more is there, or the network says that an earlier answer did not arrive
+                return
+            self._receiver.datagram_received(data, address)
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._loop.remove_reader(self._socket)
+        self._socket.close()
+
+
+async def listen(host: str, port: int, receiver: Limited) -> Port | asyncio.DatagramTransport:
     """Open a port. OSError where it is taken."""
-    running = asyncio.get_running_loop()
-    transport, _ = await running.create_datagram_endpoint(lambda: receiver, local_addr=(host, port))
-    # What comes while the loop is busy waits here, a flood and the readings that come with it too.
-    transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING_BYTES)
-    return transport
+    opened = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        opened.setblocking(False)
+        opened.bind((host, port))
+        # What comes while the loop is busy waits here.
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING_BYTES)
+        return Port(opened, receiver)
+    except NotImplementedError:  # Windows' loop has no readers
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(lambda: receiver, sock=opened)
+        return transport
+    except OSError:
+        opened.close()
+        raise
