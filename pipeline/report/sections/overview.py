@@ -223,6 +223,8 @@ def _question(material: Material) -> Text:
             Strong("Do the conditions differ for the people who use them? "),
             f"{people}{compared}.",
         )
+    if not material.study.estimators:
+        return (Strong("What was measured? "), f"{people}{compared}; nothing was compared.")
     return (Strong("How accurately does each estimator follow the hand? "), f"{people}{compared}.")
 
 
