@@ -26,8 +26,9 @@ def lines(study: Study, entries: Mapping[str, Path], first_s: float) -> Iterator
     stated = study.streams[name]
     assert isinstance(stated, ReferenceStream)  # noqa: S101 - that is its kind
     sessions = {
-        session: (recording.in_space(study, entry, tracker), recording.in_space(study, entry, name))
+        session: (seen, known)
         for session, entry in entries.items()
+        for seen, known in [recording.in_space(study, entry, tracker, name)]
     }
     frame = frame_of(until(sessions, first_s))
     if frame is None:

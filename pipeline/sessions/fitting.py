@@ -17,7 +17,7 @@ from fusion_core.accuracy import interpolate, rmse
 from fusion_core.likelihood import Fitted, log_likelihood_by_replay, maximise, position_log_likelihood
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
-from pipeline.sessions.recording import SETTLED_S, Recording
+from pipeline.sessions.recording import SETTLED_S, Recording, arrived
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 
@@ -148,15 +148,8 @@ def _begin(study: Study, loaded: Recording) -> float:
     return float(frames.arrival[0]) if len(frames) else 0.0
 
 
-def _part(samples: Mapping[str, Samples], since: float, until: float) -> dict[str, Samples]:
-    """The samples that arrived from `since` until `until`, in s."""
-    part = {}
-    for name, stream in samples.items():
-        kept = (stream.arrival >= since) & (stream.arrival < until)
-        rotation = None if stream.rotation is None else stream.rotation[kept]
-        force = None if stream.force is None else stream.force[kept]
-        part[name] = Samples(stream.time[kept], stream.arrival[kept], stream.value[kept], rotation, force)
-    return part
+def _part(samples: Mapping[str, Samples], since: float, until: float) -> _Part:
+    return {name: arrived(stream, since, until) for name, stream in samples.items()}
 
 
 def _late(study: Study, samples: Mapping[str, Samples], latency_s: float | None) -> dict[str, Samples]:

@@ -12,7 +12,7 @@ about it open, and shows in an interval as wide as that.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ import numpy.typing as npt
 from fusion_core.accuracy import interpolate
 from fusion_core.samples import Samples
 from pipeline.sessions.checks.motion import Interval, compare_positions
+from pipeline.sessions.recording import arrived
 from pipeline.statistics.arrays import FloatArray
 
 _BLOCK_S = 2.0
@@ -94,12 +95,10 @@ def frame_of(sessions: Mapping[str, tuple[Samples, Samples]]) -> Frame | None:
 
 def until(sessions: Mapping[str, tuple[Samples, Samples]], first_s: float) -> dict[str, tuple[Samples, Samples]]:
     """The same with the first seconds of each session's tracker alone."""
-    return {session: (_until(tracker, first_s), reference) for session, (tracker, reference) in sessions.items()}
-
-
-def _until(samples: Samples, first_s: float) -> Samples:
-    kept = samples.arrival < (samples.arrival[0] + first_s if len(samples) else 0.0)
-    return replace(samples, time=samples.time[kept], arrival=samples.arrival[kept], value=samples.value[kept])
+    return {
+        session: (arrived(tracker, -np.inf, tracker.arrival.min(initial=np.inf) + first_s), reference)
+        for session, (tracker, reference) in sessions.items()
+    }
 
 
 def on_the_rest(

@@ -135,8 +135,7 @@ def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
 
     Phones are not read and their mounting is not corrected for, so this is quick.
     """
-    table = tables.read_arrow("positions", entry)
-    origin_ns = pc.min(table["arrival_ns"]).as_py() if len(table) else 0
+    table, origin_ns = _positions(entry)
     found = {}
     for name, stream in study.streams.items():
         if isinstance(stream, PositionStream | ReferenceStream | DisplayStream):
@@ -146,11 +145,24 @@ def positions(study: Study, entry: Path) -> tuple[int, dict[str, Samples]]:
     return origin_ns, found
 
 
-def in_space(study: Study, entry: Path, name: str) -> Samples:
-    """A stream of positions with all three axes, in the tracker's frame and clock as study.yaml states them."""
+def in_space(study: Study, entry: Path, *names: str) -> tuple[Samples, ...]:
+    """Streams of positions with all three axes, in the tracker's frame and clock as study.yaml states them."""
+    table, origin_ns = _positions(entry)
+    return tuple(_vectors(tables.of_stream(table, name), study.streams[name], origin_ns) for name in names)
+
+
+def _positions(entry: Path) -> tuple[pa.Table, int]:
+    """The table `positions`, and the origin in ns."""
     table = tables.read_arrow("positions", entry)
-    origin_ns = pc.min(table["arrival_ns"]).as_py() if len(table) else 0
-    return _vectors(tables.of_stream(table, name), study.streams[name], origin_ns)
+    return table, pc.min(table["arrival_ns"]).as_py() if len(table) else 0
+
+
+def arrived(samples: Samples, since_s: float, until_s: float) -> Samples:
+    """The readings that arrived from `since_s` until `until_s`."""
+    kept = (samples.arrival >= since_s) & (samples.arrival < until_s)
+    rotation = None if samples.rotation is None else samples.rotation[kept]
+    force = None if samples.force is None else samples.force[kept]
+    return Samples(samples.time[kept], samples.arrival[kept], samples.value[kept], rotation, force)
 
 
 def shown_axes(study: Study, name: str) -> tuple[str, ...]:

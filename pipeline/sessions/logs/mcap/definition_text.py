@@ -10,10 +10,9 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from pipeline.sessions.logs.mcap.layout import EACH, Kind, Path
+from pipeline.sessions.logs.mcap.layout import EACH, Kind, Path, within_limit
 
 _TEXT_LIMIT = 64 * 1024  # bytes; an Odometry's takes 6 KiB with every comment
-_LEAVES_LIMIT = 2000
 _DEPTH_LIMIT = 12
 
 SIZES: Mapping[str, tuple[str, int]] = {
@@ -55,14 +54,7 @@ class Definition:
 
     def leaves(self) -> dict[Path, Kind]:
         """The path and kind of every figure and text. ValueError where there are more than any sensor's message has."""
-        found: dict[Path, Kind] = {}
-        for path, kind in self._leaves(self.name, (), _DEPTH_LIMIT):
-            found[path] = kind
-            if len(found) > _LEAVES_LIMIT:
-                raise ValueError(
-                    f"its schema describes more than {_LEAVES_LIMIT} fields, which no sensor's message has"
-                )
-        return found
+        return within_limit(self._leaves(self.name, (), _DEPTH_LIMIT))
 
     def _leaves(self, message: str, before: Path, depth: int) -> Iterator[tuple[Path, Kind]]:
         if depth == 0:

@@ -17,11 +17,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from pipeline.sessions.logs.mcap.flatbuffer_tables import Buffer, field_at, references
-from pipeline.sessions.logs.mcap.layout import EACH, Kind, Path
+from pipeline.sessions.logs.mcap.layout import EACH, LEAVES_LIMIT, Kind, Path, within_limit
 
 _SCHEMA_LIMIT = 256 * 1024  # bytes; Foxglove's take two thousand
 _OBJECTS_LIMIT = 1000
-_LEAVES_LIMIT = 2000
 _DEPTH_LIMIT = 8
 
 NUMBERS: Mapping[int, str] = dict(enumerate(("?", "b", "B", "h", "H", "i", "I", "q", "Q", "f", "d"), start=2))
@@ -67,14 +66,7 @@ class Schema:
 
     def leaves(self) -> dict[Path, Kind]:
         """The path and kind of every figure and text. ValueError where there are more than any sensor's message has."""
-        found: dict[Path, Kind] = {}
-        for path, kind in self._leaves(self.root, (), _DEPTH_LIMIT):
-            found[path] = kind
-            if len(found) > _LEAVES_LIMIT:
-                raise ValueError(
-                    f"its schema describes more than {_LEAVES_LIMIT} fields, which no sensor's message has"
-                )
-        return found
+        return within_limit(self._leaves(self.root, (), _DEPTH_LIMIT))
 
     def _leaves(self, of: Object, before: Path, depth: int) -> Iterator[tuple[Path, Kind]]:
         if depth == 0:
@@ -111,7 +103,7 @@ def parse(name: str, data: bytes) -> Schema:
 def _object(buffer: Buffer, table: int) -> Object:
     places = buffer.fields(table)
     name, is_struct, size = (field_at(places, number) for number in (0, 2, 4))
-    fields = references(buffer, buffer.target(field_at(places, 1)), _LEAVES_LIMIT)
+    fields = references(buffer, buffer.target(field_at(places, 1)), LEAVES_LIMIT)
     return Object(
         buffer.text(buffer.target(name)),
         bool(_scalar(buffer, is_struct, "?", 0)),

@@ -7,7 +7,7 @@ element of an array: ("transforms", EACH, "child_frame_id") are the names of all
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -20,6 +20,7 @@ Path = tuple[Step, ...]
 NamePath = tuple[str, ...]
 
 EACH = "*"
+LEAVES_LIMIT = 2000
 
 STAMPS: Sequence[NamePath] = (("header", "stamp"), ("timestamp",), ("stamp",))
 SECONDS: Sequence[str] = ("sec", "seconds", "secs")
@@ -53,6 +54,16 @@ _NEEDED = {
     "acceleration": "sensor_msgs/msg/Imu",
 }
 _INDEX = re.compile(r"([^\[\]]+)|\[(\d+)\]")
+
+
+def within_limit(fields: Iterable[tuple[Path, Kind]]) -> dict[Path, Kind]:
+    """The path and kind of every figure and text. ValueError where there are more than any sensor's message has."""
+    found: dict[Path, Kind] = {}
+    for path, kind in fields:
+        found[path] = kind
+        if len(found) > LEAVES_LIMIT:
+            raise ValueError(f"its schema describes more than {LEAVES_LIMIT} fields, which no sensor's message has")
+    return found
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from pipeline.sessions.logs.mcap.layout import (
     COVARIANCE,
     EACH,
     FORCE,
+    LEAVES_LIMIT,
     NANOSECONDS,
     RATE,
     SECONDS,
@@ -47,7 +48,6 @@ from pipeline.sessions.logs.mcap.templates import Bytes, read_by_templates
 from pipeline.sessions.logs.mcap.tree import leave_to_one, reading
 
 _DEPTH_LIMIT = 8
-_LEAVES_LIMIT = 2000
 _SCHEMA_LIMIT = 256 * 1024  # bytes; Foxglove's take up to ten thousand
 _WHOLE_NUMBERS = frozenset(
     getattr(FieldDescriptor, f"TYPE_{name}")
@@ -149,7 +149,7 @@ def leaves_of(descriptor: Descriptor) -> dict[Path, Kind]:
         for field in inner.fields:
             own: Path = (*path, field.name, EACH) if field.is_repeated else (*path, field.name)
             if field.message_type is not None:
-                if len(own) < _DEPTH_LIMIT and len(found) < _LEAVES_LIMIT:
+                if len(own) < _DEPTH_LIMIT and len(found) < LEAVES_LIMIT:
                     descend(field.message_type, own)
             elif field.type in _FIGURES | _WHOLE_NUMBERS:
                 found[own] = "number"
