@@ -41,7 +41,7 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
         found.append("No phone is connected. Scan the code with the phone.")
     used = sorted(run.setup.uses(now[0].tasks[now[1]].condition)) if now is not None else []
     found += [
-        f"{name} is silent. Turn it on, or give a reason to start without it."
+        run.links.get(name) or f"{name} is silent. Turn it on, or give a reason to start without it."
         for name in used
         if health.is_silent(run.health[name], at_ns)
     ]
@@ -218,7 +218,9 @@ def lights(run: StudyRun, at_ns: int) -> Whole:
     found: dict[str, object] = {}
     for name, one in run.health.items():
         lost = attempt.heard[name].lost if attempt is not None else 0
-        found[name] = health.light(one, at_ns, lost)
+        light = health.light(one, at_ns, lost)
+        problem = run.links.get(name)
+        found[name] = {**light, "light": "red", "text": problem} if problem else light
     found |= {
         "senders": _senders_light(run, at_ns),
         "phone": _phone_light(run),

@@ -65,6 +65,24 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class Link:
+    """How a stream's sender is connected: `problem` is what is wrong, and what to do; empty where nothing is."""
+
+    stream: str
+    problem: str
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """What was measured of a sender's clock: recorder time is the sender's time + `offset_ms`."""
+
+    sender: str
+    offset_ms: float
+    at_ns: int
+
+
+@dataclass(frozen=True)
 class Tick:
     """Time has passed."""
 
@@ -142,7 +160,23 @@ class Examined:
     at_ns: int
 
 
-Event = Joined | Left | Said | Reading | Tick | Disk | Saved | Closed | Agreed | Woke | WallClock | Dropped | Examined
+Event = (
+    Joined
+    | Left
+    | Said
+    | Reading
+    | Link
+    | ClockOffset
+    | Tick
+    | Disk
+    | Saved
+    | Closed
+    | Agreed
+    | Woke
+    | WallClock
+    | Dropped
+    | Examined
+)
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ class _Fields:
 
     def number(self, key: str, largest: float = _FIGURE) -> float:
         """A finite number within ± `largest`."""
-        return _number(self.content.get(key), key, largest)
+        return number(self.content.get(key), key, largest)
 
     def optional(self, key: str, largest: float = _FIGURE) -> float | None:
         """The same, None where it is absent or null."""
@@ -224,7 +224,7 @@ class _Fields:
             return None
         if not isinstance(value, list) or len(value) != length:
             raise MessageError(f"{key} should be {length} numbers")
-        return tuple(_number(part, key, largest) for part in value)
+        return tuple(number(part, key, largest) for part in value)
 
     def quaternion(self, key: str) -> Four | None:
         """An orientation, whose length must be about 1."""
@@ -234,7 +234,8 @@ class _Fields:
         return q
 
 
-def _number(value: object, key: str, largest: float) -> float:
+def number(value: object, key: str, largest: float = _FIGURE) -> float:
+    """A finite number within ± `largest`. Raises MessageError for anything else."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise MessageError(f"{key} should be a number")
     if not abs(value) <= largest:  # NaN too
@@ -316,7 +317,7 @@ _KNOWN: Mapping[str, Mapping[str, Callable[[_Fields], Incoming]]] = {
 
 def parse(role: str, frame: str | bytes) -> Incoming:
     """A page's message. Raises MessageError for anything that is not one that this role may send."""
-    content = _loaded(frame, FRAME_BYTES)
+    content = loaded(frame, FRAME_BYTES)
     if not isinstance(content, dict):
         raise MessageError("a message is an object")
     read = _KNOWN[role].get(str(content.get("type")))
@@ -327,7 +328,7 @@ def parse(role: str, frame: str | bytes) -> Incoming:
 
 def parse_datagram(datagram: bytes) -> tuple[Datagram, ...]:
     """A sender's readings. Raises MessageError where the datagram holds anything else."""
-    content = _loaded(datagram, DATAGRAM_BYTES)
+    content = loaded(datagram, DATAGRAM_BYTES)
     listed = content if isinstance(content, list) else [content]
     if not 1 <= len(listed) <= _DATAGRAMS or not all(isinstance(one, dict) for one in listed):
         raise MessageError("a datagram is an object, or a short array of them")
@@ -351,7 +352,8 @@ def _datagram(fields_: _Fields) -> Datagram:
     )
 
 
-def _loaded(frame: str | bytes, longest: int) -> Any:
+def loaded(frame: str | bytes, longest: int) -> Any:
+    """JSON of at most `longest` bytes, nested at most `DEPTH` deep. Raises MessageError for anything else."""
     import orjson
 
     if len(frame) > longest or (isinstance(frame, str) and len(frame.encode("utf-8", "replace")) > longest):

@@ -9,16 +9,14 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from itertools import product
 from pathlib import Path
 
 import uvicorn
 from starlette.applications import Starlette
 
 from pipeline.errors import PipelineError
-from pipeline.live import setup
+from pipeline.live import senders, setup
 from pipeline.live.access import LOOPBACK, Access
-from pipeline.live.adapters import osc, udp
 from pipeline.live.certificates import Certificates, for_address, given, usual_folder
 from pipeline.live.clerk import Clerk
 from pipeline.live.journal import Journal, known_plan
@@ -141,7 +139,7 @@ def opened(access: Access, certificates: Certificates | None) -> Doors:
 async def serve(made: Setup, folder: Path, journal: Journal, access: Access, doors: Doors, known: Plan) -> None:
     """Run the study until the server is stopped."""
     loop = Loop(made, folder, Clerk(journal, check=None), known, Clock())
-    receivers = await _listen_for_senders(made, loop, access)
+    receivers = await senders.opened(made, loop, access)
     application = app(loop, access, doors.certificates)
     servers = [(uvicorn.Server(_config(application)), doors.inside)]
     if doors.outside is not None:
@@ -183,28 +181,6 @@ def _config(application: Starlette, certificates: Certificates | None = None) ->
     )
 
 
-async def _listen_for_senders(made: Setup, loop: Loop, access: Access) -> list[udp.Port | asyncio.DatagramTransport]:
-    found: list[udp.Port | asyncio.DatagramTransport] = []
-    receivers: dict[int, udp.Limited] = {}
-    for sender in made.recording.senders.values():
-        if sender.udp_json is not None:
-            streams = udp.expected(made, sender.udp_json.port)
-            receivers[sender.udp_json.port] = udp.Receiver(streams, access.sensors, loop.happens, loop.now_ns)
-        if sender.osc is not None:
-            addresses = osc.expected(made, sender.osc.port)
-            receivers[sender.osc.port] = osc.Receiver(addresses, loop.happens, loop.now_ns)
-    loop.refused += [receiver.refused for receiver in receivers.values()]
-    hosts = (LOOPBACK[0], access.host) if access.in_network else (access.host,)
-    for (port, receiver), host in product(sorted(receivers.items()), hosts):
-        try:
-            found.append(await udp.listen(host, port, receiver))
-        except OSError as error:
-            raise PipelineError(
-                f"port {port} of recording: senders cannot be listened on: {error.strerror or error}; choose another"
-            ) from None
-    return found
-
-
 def record(
     folder: Path,
     study: Study,
@@ -216,6 +192,7 @@ def record(
     access, certificates = secured(options, usual_folder(), datetime.now(UTC))
     simulated = "simulated by Steadyhand: a demo, the pointer was the hand" if options.demo else ""
     made = setup.set_up(study, folder, mouse=options.demo, simulated=simulated)
+    senders.check(made, str(folder / "study.yaml"))
     journal = Journal(folder, study)
     journal.hold()
     try:

@@ -33,7 +33,7 @@ class StudyRun:
 
     `phone` is the connection of the active phone, `phones` all of them, `ids` which phone each is of, `operators` those
     of operator's pages, the one that may act first. `asked` remembers what is being saved, by token: whom to tell, and
-    how.
+    how. `links` says of streams whose sender is not connected what is wrong.
     """
 
     setup: Setup
@@ -50,6 +50,7 @@ class StudyRun:
     motion: PhoneMotion = field(default_factory=PhoneMotion)
     one_way: Mapping[str, OneWay] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)
+    links: Mapping[str, str] = field(default_factory=dict)
     disk: Disk | None = None
     dropped: Dropped | None = None
     asked: Mapping[str, tuple[int, str]] = field(default_factory=dict)

@@ -18,6 +18,7 @@ from pipeline.live.events import (
     Action,
     Actions,
     Agreed,
+    ClockOffset,
     Closed,
     Disk,
     Dropped,
@@ -25,6 +26,7 @@ from pipeline.live.events import (
     Examined,
     Joined,
     Left,
+    Link,
     Reading,
     Replace,
     Said,
@@ -120,6 +122,23 @@ def _wall_clock(run: StudyRun, wall: WallClock) -> Stepped:
         run, session.Noted(f"the wall clock is {wall.off_ms:.0f} ms off now", wall.at_ns, "wall_clock")
     )
     return run, (write, *noted)
+
+
+def _clock_offset(run: StudyRun, measured: ClockOffset) -> Stepped:
+    """What a sender's clock was measured to be off goes into the log; stamps have it taken off already."""
+    if run.attempt is None or run.attempt.phase == "ended":
+        return run, NOTHING
+    content = {"sender": measured.sender, "offset_ms": measured.offset_ms}
+    return run, (Write(Message(CLOCK, "anything", measured.at_ns, measured.at_ns, event=content)),)
+
+
+def _linked(run: StudyRun, link: Link) -> Stepped:
+    """A sender's connection is lost, or back: its light says so, and the log of a task has a note."""
+    others = {name: problem for name, problem in run.links.items() if name != link.stream}
+    run = changed(run, links={**others, link.stream: link.problem} if link.problem else others)
+    if run.attempt is None or run.attempt.phase == "ended":
+        return run, NOTHING
+    return to_attempt(run, session.Noted(link.problem or f"{link.stream}: connected", link.at_ns, "sender"))
 
 
 def _closed(run: StudyRun, closed: Closed) -> Stepped:
@@ -273,6 +292,8 @@ _ANSWERS: Mapping[type, Callable[[StudyRun, Said, Any], Stepped]] = {
 }
 _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Reading: _reading,
+    Link: _linked,
+    ClockOffset: _clock_offset,
     Tick: _tick,
     Said: _said,
     Joined: _joined,

@@ -14,6 +14,7 @@ from pipeline.study.recording import M_S2, METRES, RAD_S, Sender
 
 _M_PER_MM = 1e-3
 _UNKNOWN = (math.nan,) * 4
+_IN_METRES = ("rosbridge", "foxglove")
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Units:
 
 
 def units(sender: Sender) -> Units:
-    """Those of a sender; positions are in mm, accelerations in m/s², turns in rad/s where it does not say."""
+    """Those of a sender. Where it does not say: mm, but m in ROS and Foxglove (REP 103); m/s²; rad/s."""
     import numpy as np
     from scipy.spatial.transform import Rotation
 
@@ -50,7 +51,7 @@ def units(sender: Sender) -> Units:
     back = Rotation.from_matrix(permuted.T).as_quat() if np.linalg.det(permuted) > 0 else np.full(4, np.nan)
     world = Rotation.from_quat(sender.rotation_xyzw).as_quat()
     return Units(
-        factor(METRES, "mm"),
+        factor(METRES, "m" if sender.kind in _IN_METRES else "mm"),
         factor(M_S2, "m_s2"),
         factor(RAD_S, "rad_s"),
         axes,

@@ -6,19 +6,16 @@ alone, and most senders leave it out, so a reading's stamp is its arrival.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from pipeline.live.access import LOOPBACK
+from pipeline.live.adapters.feeds import of_numbers
 from pipeline.live.adapters.udp import Limited
 from pipeline.live.events import Reading
 from pipeline.live.messages import Datagram
 from pipeline.live.setup import Setup
 from pipeline.live.units import Units, in_si, units
-
-_LARGEST = 1e6  # as of every figure in a message
-_POSITION, _MOTION, _ORIENTED = 3, 6, 10  # numbers of a reading
 
 
 @dataclass(frozen=True)
@@ -85,19 +82,4 @@ def _reading(stream: Expected, arguments: list[object]) -> Datagram | None:
     """The numbers of a message as those of a datagram; None where some are missing or none."""
     if max(stream.fields) >= len(arguments):
         return None
-    numbers = [arguments[place] for place in stream.fields]
-    figures = [float(one) for one in numbers if isinstance(one, int | float) and not isinstance(one, bool)]
-    if len(figures) != len(numbers) or not all(math.isfinite(one) and abs(one) <= _LARGEST for one in figures):
-        return None
-    if stream.content == "position" and len(figures) == _POSITION:
-        return Datagram("", stream.stream, None, None, _three(figures), None, None, None)
-    if stream.content == "acceleration" and len(figures) in (_MOTION, _ORIENTED):
-        x, y, z, w = figures[6:] if len(figures) == _ORIENTED else (0.0, 0.0, 0.0, 1.0)
-        known = len(figures) == _ORIENTED and 0.8 < x * x + y * y + z * z + w * w < 1.25
-        force, turning = _three(figures), _three(figures[3:])
-        return Datagram("", stream.stream, None, None, None, force, turning, (x, y, z, w) if known else None)
-    return None
-
-
-def _three(figures: list[float]) -> tuple[float, float, float]:
-    return figures[0], figures[1], figures[2]
+    return of_numbers(stream.stream, stream.content, [arguments[place] for place in stream.fields])

@@ -266,7 +266,7 @@ def test_a_task_over_sockets_from_start_to_questionnaire(tmp_path: Path) -> None
             await asyncio.sleep(0.3)
             await says(operator, type="do", what="start", text="", id="d1")
             await hears(operator, "done", id="d1")
-            await _press_through(phone)
+            await press_through(phone)
             questions = await hears(form, "form")
             assert questions["task"] == "Task 1"
             assert "kinect" not in json.dumps(questions)
@@ -298,7 +298,7 @@ def test_a_task_over_sockets_from_start_to_questionnaire(tmp_path: Path) -> None
     assert log.topics["/phone/imu"].values[5][:3].tolist() == pytest.approx([0, 9.80665, 0])
 
 
-async def _press_through(phone: Page) -> None:
+async def press_through(phone: Page) -> None:
     """Draw whatever comes, and press once a trial, until the task is done."""
     pressed, state = 0, ""
     while state != "done":

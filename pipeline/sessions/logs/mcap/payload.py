@@ -135,7 +135,7 @@ def _decoded(walk: Walk, messages: Messages, content: str, source: Source, failu
             failures.update(dict.fromkeys(own.tolist(), f"its topic holds more than {_TYPES_LIMIT} types of messages"))
             continue
         if key not in decoders:
-            decoders[key] = _decoder(channel, walk.schemas.get(channel.schema_id), content, source)
+            decoders[key] = decoder_of(channel, walk.schemas.get(channel.schema_id), content, source)
         decoder = decoders[key]
         if isinstance(decoder, str):
             failures.update(dict.fromkeys(own.tolist(), decoder))
@@ -157,7 +157,7 @@ def _decoded(walk: Walk, messages: Messages, content: str, source: Source, failu
     return fields
 
 
-def _decoder(channel: Channel, schema: Schema | None, content: str, source: Source) -> Decoder | str:
+def decoder_of(channel: Channel, schema: Schema | None, content: str, source: Source) -> Decoder | str:
     """The channel's decoder, by its encoding, or why there is none."""
     module = _DECODERS.get(channel.message_encoding)
     if module is None:

@@ -1,0 +1,382 @@
+"""Senders that are asked for readings, over real sockets: connections that fail, break and return; whole tasks."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import platform
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from websockets.asyncio.server import ServerConnection
+
+from pipeline.live import desk
+from pipeline.live.adapters import client, foxglove, lsl, rosbridge
+from pipeline.live.adapters.client import Client
+from pipeline.live.adapters.feeds import Feed
+from pipeline.live.adapters.talk import Talk
+from pipeline.live.events import ClockOffset, Link, Reading
+from pipeline.live.units import units
+from pipeline.sessions.logs import mcap
+from pipeline.sessions.logs.log import Wanted
+from pipeline.study.recording import Foxglove, Lsl, Rosbridge, Sender
+from tests.pipeline.helpers import exit_code
+from tests.pipeline.live import servers
+from tests.pipeline.live.servers import IMU, POSITION, point_stamped, published, serving
+from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.test_faults import Lab, notes
+from tests.pipeline.live.test_server import Running, free_port, hears, press_through, says, served
+
+SUBPROTOCOLS = ("foxglove.sdk.v1",)
+
+
+def talk(port: int, kind: str = "rosbridge") -> Talk:
+    feed = Feed("tracker", "position", units(Sender(lsl=Lsl(name="Hand"), unit="m")))
+    url = f"ws://127.0.0.1:{port}"
+    if kind == "foxglove":
+        return foxglove.Talk(feed, Foxglove(url=url, topic=POSITION))
+    return rosbridge.Talk(feed, Rosbridge(url=url, topic=POSITION, type="geometry_msgs/PointStamped"))
+
+
+def heard(of: Talk, until: Callable[[list[Any]], bool], beside: Any = None) -> tuple[list[Any], Counter[str]]:
+    """What a client says until something is so, while `beside` runs."""
+    found: list[Any] = []
+
+    async def listen() -> Counter[str]:
+        asked = Client(of, found.append, time.time_ns)
+        tasks = [asyncio.create_task(asked.run()), *([] if beside is None else [asyncio.create_task(beside())])]
+        try:
+            async with asyncio.timeout(20):
+                while not until(found):
+                    await asyncio.sleep(0.005)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        return asked.refused
+
+    refused = asyncio.run(listen())
+    return found, refused
+
+
+def problems(found: Sequence[Any]) -> list[str]:
+    return [one.problem for one in found if isinstance(one, Link)]
+
+
+def readings(found: Sequence[Any]) -> list[Reading]:
+    return [one for one in found if isinstance(one, Reading)]
+
+
+def test_a_connection_that_is_lost_is_said_and_there_again_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client, "BACK_OFF_S", (0.01, 0.02))
+    port = free_port()
+    found: list[Any] = []
+
+    async def brief(socket: ServerConnection) -> None:
+        await socket.recv()
+        await socket.send(published(POSITION, point_stamped(time.time_ns())))
+
+    async def beside() -> None:
+        while not problems(found):
+            await asyncio.sleep(0.005)
+        async with serving(brief, port):
+            await asyncio.sleep(60)
+
+    def until(said: list[Any]) -> bool:
+        found[:] = said
+        return len(readings(said)) >= 2
+
+    heard(talk(port), until, beside)
+    said = problems(found)
+    begin = f"tracker: ws://127.0.0.1:{port}"
+    assert said[0].startswith(f"{begin} cannot be connected to (Connection refused); ")
+    assert said[0].endswith("start the server, or correct the url. Trying again.")
+    assert said[1] == ""
+    assert said[2] == (
+        f"{begin} has closed the connection, or does not answer any more; see whether it runs, and the network."
+        " Trying again."
+    )
+    assert said[3] == ""
+
+
+def test_waiting_for_a_server_takes_longer_each_time_up_to_two_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+    sleep = asyncio.sleep
+
+    async def note(seconds: float) -> None:
+        slept.append(seconds)
+        await sleep(0)
+
+    async def run() -> None:
+        asked = asyncio.create_task(Client(talk(free_port()), lambda _: None, time.time_ns).run())
+        while len(slept) < 6:
+            await sleep(0.005)
+        asked.cancel()
+        with suppress(asyncio.CancelledError):
+            await asked
+
+    monkeypatch.setattr(asyncio, "sleep", note)
+    asyncio.run(run())
+    assert slept[:6] == [0.25, 0.5, 1.0, 2.0, 2.0, 2.0]
+
+
+def test_what_no_server_of_readings_says_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client, "_NOTHING_YET_S", 0.05)
+    port = free_port()
+
+    async def huge(socket: ServerConnection) -> None:
+        await socket.send("x" * 100_000)
+        await socket.wait_closed()
+
+    async def other(socket: ServerConnection) -> None:
+        await socket.send("hello")
+        await socket.send("x" * 1000)
+        await socket.send(b"\xff" * 1000)
+        await socket.wait_closed()
+
+    async def advertises(socket: ServerConnection) -> None:
+        await socket.send(servers.advertised({"id": 1, **servers.CDR_IMU}))
+        await socket.wait_closed()
+
+    async def plain(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
+        writer.close()
+
+    def over(handle: Any, subprotocols: Sequence[str] = ()) -> Any:
+        async def beside() -> None:
+            async with serving(handle, port, subprotocols):
+                await asyncio.sleep(60)
+
+        return beside
+
+    async def web() -> None:
+        async with await asyncio.start_server(plain, "127.0.0.1", port) as server:
+            await server.serve_forever()
+
+    beside: Any
+    for beside, kind, said in (
+        (over(huge), "rosbridge", "sent a frame of over 64 KiB, which no sensor's is; name another topic. Trying"),
+        (over(other), "rosbridge", "is connected, and nothing comes on /hand. See whether it is sent: `ros2 topic hz"),
+        (over(other), "foxglove", "does not speak foxglove.websocket.v1; start foxglove_bridge there, or correct"),
+        (over(advertises, SUBPROTOCOLS), "foxglove", "has no topic /hand; it has /phone. Correct the topic, or start"),
+        (web, "rosbridge", "answers with HTTP 404 and no WebSocket; correct the url. Trying again."),
+    ):
+        expected = f"tracker: ws://127.0.0.1:{port} {said}"
+
+        def is_said(found: list[Any], expected: str = expected) -> bool:
+            return any(one.startswith(expected) for one in problems(found))
+
+        found, refused = heard(talk(port, kind), is_said, beside)
+        assert readings(found) == []
+        if "nothing comes" in said:
+            assert refused == {"tracker: not understood": 3}
+
+
+@pytest.mark.parametrize("kind", ["rosbridge", "foxglove"])
+def test_how_bytes_are_cut_makes_no_difference(kind: str) -> None:
+    """A relay hands the server's bytes on in pieces, and the server sends its messages in fragments of frames."""
+    places = [(number * 0.1, 0.5, 1.0) for number in range(8)]
+
+    async def fragments(socket: ServerConnection) -> None:
+        if kind == "foxglove":
+            await socket.send(servers.advertised({"id": 1, "topic": POSITION, "encoding": "json", "schemaName": "P"}))
+        await socket.recv()
+        for number, place in enumerate(places):
+            message = point_stamped(1_000_000_000 + number, place)
+            if kind == "foxglove":
+                frame: Any = servers.data(json.dumps(message).encode())
+            else:
+                frame = published(POSITION, message)
+            size = 1 + 7 * number
+            await socket.send([frame[at : at + size] for at in range(0, len(frame), size)])
+        await socket.wait_closed()
+
+    def through(piece: int) -> list[tuple[Any, ...]]:
+        front, back = free_port(), free_port()
+
+        async def relay(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", back)
+
+            async def pump(source: asyncio.StreamReader, target: asyncio.StreamWriter, most: int) -> None:
+                with suppress(OSError):
+                    while data := await source.read(most):
+                        target.write(data)
+                        await target.drain()
+                target.close()
+
+            await asyncio.gather(pump(reader, inner_writer, 4096), pump(inner_reader, writer, piece))
+
+        async def beside() -> None:
+            spoken = SUBPROTOCOLS if kind == "foxglove" else ()
+            async with serving(fragments, back, spoken), await asyncio.start_server(relay, "127.0.0.1", front):
+                await asyncio.sleep(60)
+
+        found, refused = heard(talk(front, kind), lambda found: len(readings(found)) == len(places), beside)
+        assert not refused
+        return [(one.values, one.sent_ms) for one in readings(found)]
+
+    whole = through(65_536)
+    assert [values for values, _ in whole] == places
+    assert through(1) == through(13) == whole
+
+
+def test_a_sender_s_connection_is_a_light_a_reason_and_a_note(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.goes_on(1.0)
+    problem = "tracker: ws://h:9090 cannot be connected to (refused); start the server. Trying again."
+    lab.happens(Link("tracker", problem, lab.now))
+    lights: Any = desk.lights(lab.run, lab.now).content["lights"]
+    assert (lights["tracker"]["light"], lights["tracker"]["text"]) == ("red", problem)
+    assert lights["imu"]["light"] == "green"
+    lab.goes_on(0.5, tracker=False)
+    assert desk.red_lights(lab.run, lab.now) == [problem]
+    assert lab.happens(ClockOffset("tracker", 5.0, lab.now)) == []  # no log is open
+    lab.happens(Link("tracker", "", lab.now))
+    lab.goes_on(0.5)
+    lab.does("start")
+    lab.goes_on(0.2)
+    assert notes(lab.happens(Link("tracker", problem, lab.now))) == ["sender"]
+    assert notes(lab.happens(Link("tracker", "", lab.now))) == ["sender"]
+    (logged,) = lab.happens(ClockOffset("tracker", 5.0, lab.now))
+    assert logged.message.event == {"sender": "tracker", "offset_ms": 5.0}  # type: ignore[union-attr]
+
+
+# --- Lab Streaming Layer
+
+
+@contextmanager
+def outlet(name: str, channels: int, values: Sequence[float], rate_hz: float) -> Iterator[None]:
+    """An outlet that sends the same steadily. Skipped where the library cannot be loaded (it needs glibc 2.35)."""
+    try:
+        import pylsl
+    except (ImportError, OSError, RuntimeError) as error:
+        pytest.skip(f"LSL cannot be loaded here ({platform.libc_ver()}): {error}")
+    made = pylsl.StreamOutlet(pylsl.StreamInfo(name, "Test", channels, rate_hz, "double64", f"{name}-{time.time_ns()}"))
+    if not any(one.name() == name for one in pylsl.resolve_byprop("name", name, 1, timeout=3.0)):
+        pytest.skip("no LSL stream of this computer's own can be found here: its network passes no multicast")
+    stop = threading.Event()
+
+    def push() -> None:
+        while not stop.wait(1 / rate_hz):
+            made.push_sample(list(values))
+
+    sending = threading.Thread(target=push)
+    sending.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        sending.join()
+
+
+@given(st.lists(st.integers(1, 5), min_size=1, max_size=6))
+@settings(max_examples=25)
+def test_how_lsl_hands_samples_over_makes_no_difference(cuts: list[int]) -> None:
+    samples = [([0.0, number, 0.25, 3.0], number * 1000) for number in range(sum(cuts))]
+    taken: list[Any] = []
+
+    feed = Feed("tracker", "position", units(Sender(lsl=Lsl(name="Hand"), unit="m")))
+    of = lsl.Outlet(feed, Lsl(name="Hand", channels=(1, 2, 3)), taken.append, lambda: 10**9)
+    begin = 0
+    for cut in cuts:
+        of.take(samples[begin : begin + cut])
+        begin += cut
+    of.take([([0.0, float("nan"), 0.25, 3.0], 5), ([1.0], 6)])
+    assert of.refused == {"tracker: not of the stream's kind": 2}
+    assert taken == [Reading("tracker", at, 10**9, (float(v[1]), 0.25, 3.0)) for v, at in samples]
+
+
+def test_without_pylsl_it_is_said_how_to_install_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}", "senders: {tracker: {lsl: {name: Hand}}"))
+    monkeypatch.setitem(__import__("sys").modules, "pylsl", None)
+    assert exit_code(monkeypatch, "record", tmp_path) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert 'recording: senders.tracker: lsl: needs a further package: pip install "steadyhand[lsl]"' in said
+
+
+# --- whole tasks
+
+
+@contextmanager
+def sent_by(kind: str) -> Iterator[str]:
+    """Tracker and phone that send by that kind, and what study.yaml says of them."""
+    if kind == "lsl":
+        with (
+            outlet("SteadyhandHand", 5, (0.0, 0.0, *(part * 1e3 for part in servers.PLACE_M)), 30),
+            outlet("SteadyhandPhone", 10, (*servers.FORCE_M_S2, 0.0, 0.0, 0.0, *servers.UPRIGHT), 90),
+        ):
+            yield (
+                "tracker: {lsl: {name: SteadyhandHand, channels: [2, 3, 4]}},"
+                " imu: {lsl: {name: SteadyhandPhone, channels: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]}}"
+            )
+        return
+    port = free_port()
+    started, stop = threading.Event(), asyncio.Event()
+    running = asyncio.new_event_loop()
+    handle, spoken = (servers.rosbridge, ()) if kind == "rosbridge" else (servers.foxglove, SUBPROTOCOLS)
+
+    async def serve() -> None:
+        async with serving(handle, port, spoken):
+            started.set()
+            await stop.wait()
+
+    thread = threading.Thread(target=lambda: running.run_until_complete(serve()))
+    thread.start()
+    started.wait(5)
+    try:
+        of = {
+            "rosbridge": (", type: geometry_msgs/msg/PointStamped", ", type: sensor_msgs/Imu"),
+            "foxglove": ("", ""),
+        }[kind]
+        topics = zip(("tracker", "imu"), (POSITION, IMU), of, strict=True)
+        url = f"url: 'ws://127.0.0.1:{port}'"
+        yield ", ".join(f"{name}: {{{kind}: {{{url}, topic: {topic}{more}}}}}" for name, topic, more in topics)
+    finally:
+        running.call_soon_threadsafe(stop.set)
+        thread.join(10)
+        running.close()
+
+
+@pytest.mark.parametrize("kind", ["rosbridge", "foxglove", "lsl"])
+def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(tmp_path: Path, kind: str) -> None:
+    async def play(running: Running) -> None:
+        async with running.page("operator") as operator, running.page("phone") as phone:
+            await says(phone, type="hello", page="phone", version=1, agent="a test", wake_lock=True)
+            lights: dict[str, Any] = {}
+            while any(lights.get(name, {}).get("rate_hz") is None for name in ("tracker", "imu")):
+                lights = (await hears(operator, "lights"))["lights"]
+            await says(operator, type="do", what="start", text="a test", id="d1")
+            await hears(operator, "done", id="d1")
+            await press_through(phone)
+            state = await hears(operator, "state", phase="questionnaire")
+            while not state["agreement"]:
+                state = await hears(operator, "state")
+            assert state["agreement"]["mm"] <= 1e-9
+            assert state["agreement"]["n"] >= 3  # something was shown in each trial
+
+    with sent_by(kind) as senders:
+        text = STUDY.replace("tracker: {demo: {}}, imu: {demo: {}}", senders).replace(
+            "countdown_s: 1", "countdown_s: 0"
+        )
+        text = text.replace("shown: {kinect: kinect, fusion: fusion}", "shown: {kinect: fusion, fusion: fusion}")
+        served(tmp_path, play, text)
+    topics = [Wanted("/tracker/position", "position"), Wanted("/phone/imu", "acceleration")]
+    log = mcap.read(tmp_path / "data/P01_kinect.mcap", [*topics, Wanted("/recorder/clock", "anything")])
+    assert log.faults == ()
+    tracker, imu = (log.topics[want.key] for want in topics)
+    assert tracker.values[5].tolist() == pytest.approx(list(servers.PLACE_M))
+    assert imu.values[5].tolist() == pytest.approx([*servers.FORCE_M_S2, 0, 0, 0, *servers.UPRIGHT])
+    late_s = (imu.arrival_ns - imu.stamp_ns) / 1e9
+    assert (late_s >= 0).all() and late_s.min() < 0.1  # stamps are the sender's, in recorder time
+    assert (imu.stamp_ns[1:] > imu.stamp_ns[:-1]).all()
