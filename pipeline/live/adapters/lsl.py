@@ -51,8 +51,6 @@ class Outlet:
         self._closed.set()
         self._thread.join(_LOOK_S + _WAIT_S)
 
-    # --- in the loop
-
     def take(self, samples: Sequence[Sample]) -> None:
         """What was pulled at once; how it is cut makes no difference."""
         now = self._now_ns()
@@ -96,7 +94,6 @@ class Outlet:
     def _listen(self, pylsl: Any, info: Any) -> str:
         """Until it is closed or lost; what is wrong then."""
         inlet = pylsl.StreamInlet(info, max_buflen=2, recover=False)
-        gone = f'the LSL stream "{self._settings.name}" is gone; start it again. Looking for it.'
         corrected_ns, offset_ns = -_CORRECT_NS, 0
         try:
             inlet.open_stream(timeout=_CORRECT_S)
@@ -104,8 +101,8 @@ class Outlet:
                 if self._now_ns() - corrected_ns >= _CORRECT_NS:
                     corrected_ns = self._now_ns()
                     # LSL's clock here and recorder time count the same seconds, each from an origin of its own.
-                    own_s = pylsl.local_clock() - inlet.time_correction(timeout=_CORRECT_S)
-                    offset_ns = self._now_ns() - round(own_s * _NS_PER_S)
+                    off_s = inlet.time_correction(timeout=_CORRECT_S)  # the first takes a while
+                    offset_ns = self._now_ns() - round((pylsl.local_clock() - off_s) * _NS_PER_S)
                     measured = ClockOffset(self._feed.stream, offset_ns * _MS_PER_NS, corrected_ns)
                     self._post(self._happens, measured)
                 first, time_s = inlet.pull_sample(timeout=_WAIT_S)
@@ -115,10 +112,8 @@ class Outlet:
                 every = zip([first, *rest], [time_s, *times_s], strict=True)
                 self._post(self._say, "")
                 self._post(self.take, [(values, round(at * _NS_PER_S) + offset_ns) for values, at in every])
-        except (pylsl.LostError, pylsl.TimeoutError):
-            return gone
-        except (RuntimeError, ValueError, OSError) as error:
-            return f'the LSL stream "{self._settings.name}" cannot be read ({error}); start it again. Looking for it.'
+        except (RuntimeError, ValueError, OSError) as error:  # what pylsl raises, a lost stream among it
+            return f'the LSL stream "{self._settings.name}" is gone ({error}); start it again. Looking for it.'
         finally:
             inlet.close_stream()
-        return gone
+        return ""

@@ -295,6 +295,38 @@ def test_how_lsl_hands_samples_over_makes_no_difference(cuts: list[int]) -> None
     assert taken == [Reading("tracker", at, 10**9, (float(v[1]), 0.25, 3.0)) for v, at in samples]
 
 
+def test_an_outlet_that_is_not_there_comes_and_goes_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lsl, "_LOOK_S", 0.3)
+    found: list[Any] = []
+
+    async def listen() -> None:
+        feed = Feed("tracker", "position", units(Sender(lsl=Lsl(name="SteadyhandGone"))))
+        of = lsl.Outlet(feed, Lsl(name="SteadyhandGone"), found.append, time.time_ns)
+        of.listen()
+        try:
+            async with asyncio.timeout(20):
+                while not problems(found):
+                    await asyncio.sleep(0.01)
+                with outlet("SteadyhandGone", 3, (1.0, 2.0, 3.0), 50):
+                    while len(readings(found)) < 5:
+                        await asyncio.sleep(0.01)
+                while len(problems(found)) < 3:
+                    await asyncio.sleep(0.01)
+        finally:
+            of.close()
+
+    asyncio.run(listen())
+    said = problems(found)
+    assert said[0].startswith('tracker: no LSL stream is named "SteadyhandGone"; ')
+    assert said[1] == ""
+    assert said[2].startswith('tracker: the LSL stream "SteadyhandGone" is gone (')
+    first = readings(found)[0]
+    assert first.values == (0.001, 0.002, 0.003)
+    assert first.stamp_ns is not None and abs(first.stamp_ns - first.arrival_ns) < 10**9
+    (measured, *_) = [one for one in found if isinstance(one, ClockOffset)]
+    assert measured.sender == "tracker"
+
+
 def test_without_pylsl_it_is_said_how_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -379,4 +411,5 @@ def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(tmp_pat
     assert imu.values[5].tolist() == pytest.approx([*servers.FORCE_M_S2, 0, 0, 0, *servers.UPRIGHT])
     late_s = (imu.arrival_ns - imu.stamp_ns) / 1e9
     assert (late_s >= 0).all() and late_s.min() < 0.1  # stamps are the sender's, in recorder time
+    assert (late_s > 0).mean() > 0.5  # not arrivals
     assert (imu.stamp_ns[1:] > imu.stamp_ns[:-1]).all()
