@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from pipeline.live import checks, session, watch
+from pipeline.live import checks, session_state, watch
 from pipeline.live.changes import changed
 from pipeline.live.events import NOTHING, Action, Actions, Examine, Examined, Reading, Values
 from pipeline.live.run_state import Stepped, StudyRun, phone_phase, to_attempt, wants_checks
@@ -60,7 +60,7 @@ def examined(run: StudyRun, examined: Examined) -> Stepped:
     red = {one.id for one in before.checks if one.light == "red"}
     for one in run.checks:
         if one.light == "red" and one.id not in red:
-            run, noted = to_attempt(run, session.Noted(f"{one.id}: {one.text}", examined.at_ns, "light"))
+            run, noted = to_attempt(run, session_state.Noted(f"{one.id}: {one.text}", examined.at_ns, "light"))
             actions += noted
     return run, (*actions, *_phone_after_checks(before, run))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from pipeline.live import desk, plan, session
+from pipeline.live import desk, plan, session, session_state
 from pipeline.live.changes import changed
 from pipeline.live.events import Action, Open, Resolve, Said, Tell
 from pipeline.live.messages import Do
@@ -45,7 +45,7 @@ def _start(run: StudyRun, reason: str, at_ns: int) -> Stepped:
 
 
 def _abort(run: StudyRun, reason: str, at_ns: int) -> Stepped:
-    return to_attempt(run, session.Aborted(reason or "ended by the operator", at_ns))
+    return to_attempt(run, session_state.Aborted(reason or "ended by the operator", at_ns))
 
 
 def _resolve(run: StudyRun, kind: str, reason: str, at_ns: int) -> Stepped:
@@ -87,7 +87,7 @@ def _drop(run: StudyRun, reason: str, at_ns: int) -> Stepped:
     actions: list[Action] = []
     record = {"type": "dropped", "participant": now[0].id, "reason": reason, "at_ns": at_ns}
     if run.attempt is not None and run.attempt.phase != "ended":
-        run, ended = to_attempt(run, session.Aborted(f"dropped out: {reason}", at_ns))
+        run, ended = to_attempt(run, session_state.Aborted(f"dropped out: {reason}", at_ns))
         run, saved = save(run, record)
         return run, (*ended, *saved)
     if not now[0].begun:
@@ -99,7 +99,7 @@ def _drop(run: StudyRun, reason: str, at_ns: int) -> Stepped:
 
 
 def _note(run: StudyRun, text: str, at_ns: int) -> Stepped:
-    run, noted = to_attempt(run, session.Noted(text, at_ns))
+    run, noted = to_attempt(run, session_state.Noted(text, at_ns))
     run, saved = save(run, {"type": "note", "text": text, "at_ns": at_ns})
     return run, (*noted, *saved)
 

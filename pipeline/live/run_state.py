@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.live import checks, desk, plan, session
+from pipeline.live import checks, desk, plan, session, session_state
 from pipeline.live.changes import changed
 from pipeline.live.clock import Clock, OneWay
 from pipeline.live.events import NOTHING, Action, Actions, Agreed, Close, Closed, Disk, Dropped, Save, Tables, Tell
@@ -19,7 +19,7 @@ from pipeline.live.messages import Hello
 from pipeline.live.orientation import PhoneMotion
 from pipeline.live.outgoing import Form, FormState, PhaseOfTask
 from pipeline.live.plan import Person, Plan, Record
-from pipeline.live.session import Session
+from pipeline.live.session_state import Session
 from pipeline.live.setup import Setup
 from pipeline.live.watch import Light, Watched
 from pipeline.study.recording import pair_id
@@ -100,7 +100,7 @@ def settled(run: StudyRun) -> StudyRun:
     return changed(run, phase=phase, attempt=None)
 
 
-def to_attempt(run: StudyRun, event: session.Event) -> Stepped:
+def to_attempt(run: StudyRun, event: session_state.Event) -> Stepped:
     """Hand an event to the attempt, and go on where it ends."""
     if run.attempt is None or run.attempt.phase == "ended":
         return run, NOTHING
@@ -135,7 +135,7 @@ def tables(run: StudyRun) -> Actions:
 def activate(run: StudyRun, client: int | None, at_ns: int) -> Stepped:
     """Make a phone the active one, or none. Its clock is learned anew: it may be another phone."""
     run = changed(run, phone=client, clock=Clock(), motion=PhoneMotion(), hello=None, watched=_forgotten(run))
-    run, actions = to_attempt(run, session.PhoneIs(client, at_ns))
+    run, actions = to_attempt(run, session_state.PhoneIs(client, at_ns))
     if client is None:
         return run, actions
     return run, (Tell(client, run.setup.welcome(task_number(run))), *phone_phase(run), *actions)

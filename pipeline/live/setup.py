@@ -16,7 +16,7 @@ from pipeline.live import checks, watch
 from pipeline.live.orientation import Aligner
 from pipeline.live.outgoing import Welcome
 from pipeline.live.plan import Plan
-from pipeline.live.session import Attempt
+from pipeline.live.session_state import Attempt
 from pipeline.live.streams import LiveStream, live_streams, required
 from pipeline.sessions.estimators import build_estimator, sensor, sensors_used
 from pipeline.simulation.layout import targets

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipeline.live import checking, clock, deeds, desk, forms, health, orientation, session
+from pipeline.live import checking, clock, deeds, desk, forms, health, orientation, session_state
 from pipeline.live.changes import changed
 from pipeline.live.clock import OneWay
 from pipeline.live.events import (
@@ -102,12 +102,12 @@ def _tick(run: StudyRun, tick: Tick) -> Stepped:
 def _disk(run: StudyRun, disk: Disk) -> Stepped:
     run = changed(run, disk=disk)
     if disk.fault is not None and run.attempt is not None:
-        return to_attempt(run, session.Aborted(f"the log could not be written: {disk.fault}", disk.at_ns))
+        return to_attempt(run, session_state.Aborted(f"the log could not be written: {disk.fault}", disk.at_ns))
     return run, NOTHING
 
 
 def _woke(run: StudyRun, woke: Woke) -> Stepped:
-    return to_attempt(run, session.Aborted(f"the computer stood still for {woke.seconds:.1f} s", woke.at_ns))
+    return to_attempt(run, session_state.Aborted(f"the computer stood still for {woke.seconds:.1f} s", woke.at_ns))
 
 
 def _wall_clock(run: StudyRun, wall: WallClock) -> Stepped:
@@ -119,7 +119,7 @@ def _wall_clock(run: StudyRun, wall: WallClock) -> Stepped:
     if not wall.was_set:
         return run, (write,)
     run, noted = to_attempt(
-        run, session.Noted(f"the wall clock is {wall.off_ms:.0f} ms off now", wall.at_ns, "wall_clock")
+        run, session_state.Noted(f"the wall clock is {wall.off_ms:.0f} ms off now", wall.at_ns, "wall_clock")
     )
     return run, (write, *noted)
 
@@ -138,7 +138,7 @@ def _linked(run: StudyRun, link: Link) -> Stepped:
     run = changed(run, links={**others, link.stream: link.problem} if link.problem else others)
     if run.attempt is None or run.attempt.phase == "ended":
         return run, NOTHING
-    return to_attempt(run, session.Noted(link.problem or f"{link.stream}: connected", link.at_ns, "sender"))
+    return to_attempt(run, session_state.Noted(link.problem or f"{link.stream}: connected", link.at_ns, "sender"))
 
 
 def _closed(run: StudyRun, closed: Closed) -> Stepped:
@@ -214,7 +214,7 @@ def _pinged(run: StudyRun, event: Said, ping: Ping) -> Stepped:
         content = {"sender": "phone", **vars(ping.last), **fitted, **uncertain}
         actions.append(Write(Message(CLOCK, "anything", event.at_ns, event.at_ns, event=content)))
         if known.steps > before.steps:
-            run, noted = to_attempt(run, session.Noted("the phone's clock was set", event.at_ns, "clock_step"))
+            run, noted = to_attempt(run, session_state.Noted("the phone's clock was set", event.at_ns, "clock_step"))
             actions += noted
     return run, tuple(actions)
 
@@ -228,14 +228,14 @@ def phone_ns(run: StudyRun, t_ms: float, at_ns: int) -> int:
 def _drew(run: StudyRun, event: Said, drawn: Drawn) -> Stepped:
     at = phone_ns(run, drawn.t, event.at_ns)
     run = changed(run, drawn=(*run.drawn[-240:], event.at_ns))
-    return to_attempt(run, session.PhoneDrew(drawn.n, at, event.at_ns))
+    return to_attempt(run, session_state.PhoneDrew(drawn.n, at, event.at_ns))
 
 
 def _pressed(run: StudyRun, event: Said, select: Select) -> Stepped:
     at = phone_ns(run, select.t, event.at_ns)
     if run.attempt is None:
         return checking.tapped(run, (event.at_ns - at) / _NS_PER_MS)
-    return to_attempt(run, session.PhonePressed(select.n, at, event.at_ns))
+    return to_attempt(run, session_state.PhonePressed(select.n, at, event.at_ns))
 
 
 def _oriented(run: StudyRun, event: Said, message: Orientation) -> Stepped:

@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 from fusion_core import Samples
 from pipeline.engine.stage import Work
-from pipeline.live import session
+from pipeline.live import session, session_state
 from pipeline.live.clerk import agreement
 from pipeline.live.events import Action, Close, Reading, Show, Tell, Tick, Write
 from pipeline.live.outgoing import Say, Selected
-from pipeline.live.session import PhoneDrew, PhoneIs, PhonePressed, Session
+from pipeline.live.session_state import PhoneDrew, PhoneIs, PhonePressed, Session
+from pipeline.live.session_words import NOTES
 from pipeline.live.setup import Setup
 from pipeline.live.streams import sample_of
 from pipeline.sessions import ingest, recording
@@ -38,7 +39,7 @@ class Played:
     state: Session
     actions: list[Action] = field(default_factory=list)
 
-    def happens(self, event: session.Event) -> list[Action]:
+    def happens(self, event: session_state.Event) -> list[Action]:
         """One more event; returns what followed."""
         self.state, actions = session.step(self.state, event)
         self.actions += actions
@@ -111,7 +112,7 @@ def test_the_log_replays_to_what_was_shown_whatever_happens(
     for number, (what, on_us, stamp_us, back, figure) in enumerate(happenings):
         now += on_us * 1000
         seq = max(number - back, 0)
-        event: session.Event
+        event: session_state.Event
         if what == "tracker":
             event = Reading("tracker", now + stamp_us * 1000, now, (figure / 1e3, 0.5, 1.2), seq)
         elif what == "imu":
@@ -288,7 +289,7 @@ def test_a_silent_sensor_is_said_and_noted_and_a_phone_that_stays_away_ends_the_
         if isinstance(one, Tell) and isinstance(one.message, Say)
     ]
     assert said == ["Please wait.", ""]
-    notes = [one.event["type"] for one in played.messages if one.topic == session.NOTES and one.event]
+    notes = [one.event["type"] for one in played.messages if one.topic == NOTES and one.event]
     assert notes == ["sensor_silent", "sensor_lost", "sensor_back"]
     played.happens(PhoneIs(None, EPOCH_NS + 4_000 * MS))
     played.happens(Tick(EPOCH_NS + 5_900 * MS))
