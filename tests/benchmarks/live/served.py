@@ -139,6 +139,7 @@ def main(folder: Path, count: int) -> None:
             prepared.append((made, one, journal, access, inside, made.empty_plan()))
             cookies = {role: f"{access.cookie(role)}={token}" for role, token in access.tokens.items()}
             announce.append({"port": access.port, "udp": udp_port, "key": access.sensors, "cookies": cookies})
+        stack.enter_context(record.nothing_to_search())
         share = asyncio.run(_run(prepared, announce, memory))
     print(json.dumps({**stopwatch.percentiles_ms(), "memory_mb": memory, "core": share}), flush=True)
 
