@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 _CLOSED_AFTER_NS = 10_000_000_000
 _FORGIVEN_NS = 1_000_000_000
 
 
-@dataclass(frozen=True)
-class Flow:
+class Flow(NamedTuple):  # made anew with each datagram of a flood, and a tuple is made soonest
     """What a source may still send; `refused` counts what was over the limit, since `over_ns` without a break."""
 
     left: float

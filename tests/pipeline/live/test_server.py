@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import sys
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -21,7 +23,7 @@ from pipeline.live import server
 from pipeline.live.access import Access
 from pipeline.live.adapters import osc
 from pipeline.live.adapters.osc import Receiver as OscReceiver
-from pipeline.live.adapters.udp import Receiver, expected
+from pipeline.live.adapters.udp import Limited, Receiver, expected, listen
 from pipeline.live.certificates import Certificates
 from pipeline.live.events import Reading
 from pipeline.live.journal import Journal
@@ -340,6 +342,35 @@ def test_what_a_receiver_refuses_is_counted(tmp_path: Path) -> None:
     for number in range(100):
         receiver.datagram_received(good, (f"10.0.0.{number}", 5))
     assert receiver.refused["too many sources"] == 37
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux says how many datagrams it had no room for")
+@pytest.mark.parametrize("count", [50, 20_000])
+def test_what_comes_faster_than_it_is_read_is_counted_too(count: int) -> None:
+    class Counting(Limited):
+        taken = 0
+
+        def datagram_received(self, data: bytes, address: tuple[Any, int]) -> None:
+            self.taken += 1
+
+    async def run() -> tuple[int, Counter[str]]:
+        receiver, port = Counting(lambda _: None, lambda: 0), free_port(socket.SOCK_DGRAM)
+        opened = await listen("127.0.0.1", port, receiver)
+        with closing(opened), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for _ in range(count):  # the loop does not get its turn meanwhile
+                sender.sendto(b"x" * 1400, ("127.0.0.1", port))
+            before = -1
+            while receiver.taken != before:
+                before = receiver.taken
+                await asyncio.sleep(0.05)
+            sender.sendto(b"x", ("127.0.0.1", port))  # what did not fit is said with what comes after it
+            while receiver.taken == before:
+                await asyncio.sleep(0.01)
+        return receiver.taken, receiver.refused
+
+    taken, refused = asyncio.run(asyncio.wait_for(run(), 20))
+    assert taken + refused["came faster than they were read"] == count + 1
+    assert (not refused) == (count == 50)
 
 
 def test_osc_messages_to_an_address_are_readings(tmp_path: Path) -> None:
