@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from pipeline.live.messages import Exchange
 
@@ -119,7 +120,7 @@ class OneWay:
     off_since_ms: float | None = None
     steps: int = 0
 
-    @property
+    @cached_property
     def mapping(self) -> Mapping | None:
         """The mapping, None before the first reading."""
         if not self.least_ms:

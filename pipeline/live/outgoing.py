@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 
@@ -148,12 +148,7 @@ def to_json(message: Outgoing) -> bytes:
 
     if isinstance(message, Whole):
         return orjson.dumps({"type": message.type, **message.content})
-    return orjson.dumps(
-        {"type": message.TYPE, **{one.name: _finite(getattr(message, one.name)) for one in fields(message)}}
-    )
-
-
-def _finite(value: object) -> object:
-    if isinstance(value, float) and not math.isfinite(value):
+    content = vars(message)
+    if any(isinstance(value, float) and not math.isfinite(value) for value in content.values()):
         raise ValueError("a message holds finite numbers only")
-    return value
+    return orjson.dumps({"type": message.TYPE, **content})

@@ -23,7 +23,8 @@ def read(state: Session, reading: Reading) -> Stepped:
     arrival = max(reading.arrival_ns, state.clock_ns + 1)
     unstamped = stream.stamps_arrival or reading.stamp_ns is None
     stamp = arrival if unstamped or reading.stamp_ns is None else min(reading.stamp_ns, arrival)
-    copy = not unstamped and (stamp, reading.values) in heard.recent
+    # What is newer than all before it is the copy of none; looked for, it would be compared with hundreds.
+    copy = not unstamped and stamp <= heard.newest_ns and (stamp, reading.values) in heard.recent
     if copy or stamp < heard.newest_ns - _OLDEST_NS:
         return with_heard(state, reading.stream, changed(heard, dropped=heard.dropped + 1)), NOTHING
     used = stream.name in state.attempt.uses

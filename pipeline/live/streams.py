@@ -6,6 +6,7 @@ numbers that are logged. So what was shown is what a replay gives; a test holds 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -86,10 +87,9 @@ def sample_of(
     axes = list(stream.axes)
     if stream.content == "position":
         return Sample(time, arrival, np.array(values)[axes] * _MM_PER_M)
-    quaternion = np.array(values[6:10])
-    if not np.isfinite(quaternion).all():
+    if not all(map(math.isfinite, values[6:10])):
         return None
-    turn, force = rotation(quaternion), np.array(values[:3]) * _MM_PER_M
+    turn, force = rotation(np.array(values[6:10])), np.array(values[:3]) * _MM_PER_M
     acceleration = turn @ force + stream.gravity_mm_s2
     return Sample(time, arrival, acceleration[axes], turn[axes], force)
 
