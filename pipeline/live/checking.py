@@ -11,13 +11,13 @@ from pipeline.live import checks, session_state, watch
 from pipeline.live.changes import changed
 from pipeline.live.events import NOTHING, Action, Actions, Examine, Examined, Reading, Values
 from pipeline.live.run_state import Stepped, StudyRun, phone_phase, to_attempt, wants_checks
-from pipeline.live.watch import KEPT_NS, Request, Row
+from pipeline.live.watch import KEPT_NS, Request, Row, Watched
 
 _EXAMINE_NS, _EXAMINE_RUNNING_NS = 2_000_000_000, 10_000_000_000
 
 
-def kept(run: StudyRun, reading: Reading) -> StudyRun:
-    """With a reading kept for the checks, as it is logged."""
+def kept(run: StudyRun, reading: Reading) -> Watched:
+    """What is watched, with a reading kept for the checks, as it is logged."""
     setup, name, values = run.setup, reading.stream, reading.values
     arrival, stamp = reading.arrival_ns, reading.stamp_ns
     if stamp is None or setup.streams[name].stamps_arrival:
@@ -26,7 +26,7 @@ def kept(run: StudyRun, reading: Reading) -> StudyRun:
     watched = watch.kept(run.watched, name, Row(min(stamp, arrival), arrival, values, turned))
     if name == setup.tracker and len(watched.reached) < len(setup.corners_mm):
         watched = watch.reached(watched, setup.corners_mm, values)
-    return changed(run, watched=watched)
+    return watched
 
 
 def _orientation_of(values: Values) -> Values | None:

@@ -33,20 +33,20 @@ def read(state: Session, reading: Reading) -> Stepped:
     if used and sample is None:  # logged, a replay would carry its orientation on and use it
         heard = changed(_numbered(heard, reading.seq), arrival_ns=arrival, dropped=heard.dropped + 1)
         return with_heard(state, reading.stream, heard), NOTHING
-    heard = _numbered(heard, reading.seq)
     heard = changed(
-        heard,
+        _numbered(heard, reading.seq),
         newest_ns=max(heard.newest_ns, stamp),
         arrival_ns=arrival,
         last=reading.values,
         recent=() if unstamped else _recent(heard.recent, stamp, reading.values),
         taken=heard.taken + 1,
     )
-    state = changed(with_heard(state, reading.stream, heard), clock_ns=arrival, origin_ns=origin)
-    write = Write(Message(stream.topic, stream.content, stamp, arrival, np.array(reading.values)))
+    estimated = state.estimated
     if sample is not None:
-        estimated = state.attempt.estimator.update(state.estimated, stream.name, sample)
-        state = changed(state, estimated=estimated)
+        estimated = state.attempt.estimator.update(estimated, stream.name, sample)
+    all_heard = {**state.heard, reading.stream: heard}
+    state = changed(state, heard=all_heard, clock_ns=arrival, origin_ns=origin, estimated=estimated)
+    write = Write(Message(stream.topic, stream.content, stamp, arrival, np.array(reading.values)))
     if not stream.is_sensor:
         return state, (write,)
     state, shown = show(state, arrival)

@@ -69,20 +69,20 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
     name = reading.stream
     if name not in run.health:
         return run, NOTHING
+    news: dict[str, object] = {}
     if reading.stamp_ns is None and reading.sent_ms is not None:
         known = clock.arrived(run.one_way.get(name, OneWay()), reading.sent_ms, reading.arrival_ns / _NS_PER_MS)
         mapping = known.mapping
         stamp = None if mapping is None else mapping.to_ns(reading.sent_ms)
-        run, reading = changed(run, one_way={**run.one_way, name: known}), changed(reading, stamp_ns=stamp)
+        news["one_way"], reading = {**run.one_way, name: known}, changed(reading, stamp_ns=stamp)
     state = health.heard(run.health[name], reading.arrival_ns, reading.stamp_ns)
-    run = changed(run, health={**run.health, name: state})
+    news["health"] = {**run.health, name: state}
     if name == run.setup.tracker and run.setup.aligner is not None and run.motion.heading is not None:
         stamp = reading.arrival_ns if reading.stamp_ns is None else reading.stamp_ns
         stream = run.setup.streams[name]
         measured = (reading.arrival_ns if stream.stamps_arrival else stamp) - stream.late_ns
-        seen = orientation.seen(run.setup.aligner, run.motion, measured, reading.arrival_ns, reading.values)
-        run = changed(run, motion=seen)
-    run = checking.kept(run, reading)
+        news["motion"] = orientation.seen(run.setup.aligner, run.motion, measured, reading.arrival_ns, reading.values)
+    run = changed(run, watched=checking.kept(run, reading), **news)
     return to_attempt(run, reading) if run.attempt is not None else (run, NOTHING)
 
 
