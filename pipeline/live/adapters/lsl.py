@@ -22,7 +22,7 @@ from pipeline.live.limits import Flow, admit
 from pipeline.study.recording import Lsl
 
 _LOOK_S, _WAIT_S, _CORRECT_S = 1.0, 0.2, 2.0
-_CORRECT_NS = 5_000_000_000
+_CORRECT_NS = 2_000_000_000
 _MOST = 1024  # samples at once
 _NS_PER_S, _MS_PER_NS = 1e9, 1e-6
 
