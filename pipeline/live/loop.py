@@ -44,7 +44,7 @@ from pipeline.live.events import (
     Write,
 )
 from pipeline.live.messages import Incoming, Mouse
-from pipeline.live.outgoing import Outgoing, Whole
+from pipeline.live.outgoing import Outgoing, Shown, Whole
 from pipeline.live.plan import Plan
 from pipeline.live.setup import Setup
 from pipeline.live.watch import Light
@@ -102,6 +102,9 @@ def _always_ns() -> int:
 class Outbox:
     """What waits to be sent to one page. Of states and lights only the newest waits.
 
+    An estimate does not wait behind what the loop does for other phones: `at_once`, set by the page's connection, hands
+    it over, unless something waits before it or the page does not read; then it is False, and has done nothing.
+
     It ends when too much waits (`full`), or when the page has another connection (`replaced`).
     """
 
@@ -109,9 +112,12 @@ class Outbox:
         self._waiting: deque[Outgoing] = deque()
         self._news = asyncio.Event()
         self.full = self.replaced = False
+        self.at_once: Callable[[Outgoing], bool] | None = None
 
     def put(self, message: Outgoing) -> None:
         """One more message."""
+        if isinstance(message, Shown) and self._is_sent(message):
+            return
         if isinstance(message, Whole):
             kept = (one for one in self._waiting if not (isinstance(one, Whole) and one.type == message.type))
             self._waiting = deque(kept)
@@ -119,6 +125,9 @@ class Outbox:
         if not self.full:
             self._waiting.append(message)
         self._news.set()
+
+    def _is_sent(self, message: Outgoing) -> bool:
+        return self.at_once is not None and not self._waiting and not self.replaced and self.at_once(message)
 
     def replace(self) -> None:
         """Send nothing more."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from collections.abc import Coroutine
 from contextlib import suppress
+from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -12,7 +14,7 @@ from pipeline.live.events import Role
 from pipeline.live.limits import Flow, admit
 from pipeline.live.loop import Loop, Outbox
 from pipeline.live.messages import MessageError, parse
-from pipeline.live.outgoing import to_json
+from pipeline.live.outgoing import Outgoing, to_json
 
 _PER_SECOND = 300.0
 MOST_SOCKETS = 16
@@ -40,11 +42,35 @@ async def serve(socket: WebSocket, role: Role, loop: Loop, refused: Counter[str]
 
 
 async def _send(socket: WebSocket, outbox: Outbox) -> None:
+    under_way = False
+
+    def at_once(message: Outgoing) -> bool:
+        return not under_way and _sent_at_once(socket.send_text(to_json(message).decode()))
+
+    outbox.at_once = at_once
     while not outbox.full:
         message = await outbox.get()
         if message is None:
             return
+        under_way = True
         await socket.send_text(to_json(message).decode())
+        under_way = False
+
+
+def _sent_at_once(sending: Coroutine[Any, Any, None]) -> bool:
+    """Send without waiting; False where that cannot be, and nothing was sent.
+
+    The server waits, if at all, before it writes anything: until a page that does not read has read. So a message that
+    has to wait can be taken back.
+    """
+    try:
+        sending.send(None)
+    except StopIteration:
+        return True
+    except (WebSocketDisconnect, RuntimeError):  # it has gone: `_send` finds out in its own time
+        return False
+    sending.close()
+    return False
 
 
 async def _receive(socket: WebSocket, role: Role, client: int, loop: Loop, refused: Counter[str]) -> None:

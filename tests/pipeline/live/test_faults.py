@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
+import json
 from pathlib import Path
+from typing import cast
 
 import pytest
 import yaml
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pipeline.errors import PipelineError
 from pipeline.live import desk, run_state, study_run
+from pipeline.live.adapters import websocket
 from pipeline.live.clerk import Clerk
 from pipeline.live.events import (
     Action,
@@ -35,7 +40,7 @@ from pipeline.live.events import (
 from pipeline.live.journal import PART, Journal
 from pipeline.live.loop import Clock, Outbox
 from pipeline.live.messages import Do, Drawn, Exchange, Ping
-from pipeline.live.outgoing import Refused, Say, Whole
+from pipeline.live.outgoing import Refused, Say, Shown, Whole
 from pipeline.live.run_state import StudyRun
 from pipeline.sessions.logs.mcap import Message
 from tests.pipeline.live.studies import study_in
@@ -320,6 +325,54 @@ def test_a_page_that_does_not_read_gets_the_newest_and_holds_up_nobody(kind: str
     for _ in range(300):
         outbox.put(Say(""))
     assert outbox.full  # and its connection is closed
+
+
+def test_an_estimate_is_sent_at_once_unless_the_page_does_not_read_and_never_overtakes() -> None:
+    class Socket:
+        """Sends when the page reads, as uvicorn does: it waits before it writes anything."""
+
+        def __init__(self) -> None:
+            self.reads = asyncio.Event()
+            self.sent: list[str] = []
+            self.gone = False
+
+        async def send_text(self, text: str) -> None:
+            await self.reads.wait()
+            if self.gone:
+                raise WebSocketDisconnect(1006)
+            message = json.loads(text)
+            self.sent.append(message.get("n") or message["type"])
+
+    async def run() -> None:
+        socket, outbox = Socket(), Outbox()
+        outbox.put(Say(""))
+        sending = asyncio.create_task(websocket._send(cast(WebSocket, socket), outbox))
+        await asyncio.sleep(0)  # the first message waits for the page now
+        outbox.put(Shown(1, 0.0, 0.0, 1))
+        socket.reads.set()
+        outbox.put(Shown(2, 0.0, 0.0, 1))  # it could be sent, and does not overtake
+        while len(socket.sent) < 3:
+            await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        outbox.put(Shown(3, 0.0, 0.0, 1))
+        assert socket.sent == ["say", 1, 2, 3]  # no turn of the loop was needed
+        socket.reads.clear()
+        outbox.put(Shown(4, 0.0, 0.0, 1))
+        outbox.put(Say(""))
+        outbox.put(Shown(5, 0.0, 0.0, 1))
+        await asyncio.sleep(0)
+        assert len(socket.sent) == 4
+        socket.reads.set()
+        while len(socket.sent) < 7:
+            await asyncio.sleep(0)
+        assert socket.sent[4:] == [4, "say", 5]
+        await asyncio.sleep(0)
+        socket.gone = True
+        outbox.put(Shown(6, 0.0, 0.0, 1))
+        with pytest.raises(WebSocketDisconnect):
+            await sending
+
+    asyncio.run(run())
 
 
 def test_a_participant_who_stops_is_replaced_and_the_log_says_why(lab: Lab) -> None:
