@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Annotated, Literal
+from urllib.parse import urlsplit
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from pipeline.errors import did_you_mean
 from pipeline.study.fields import Finite, Frozen, Id, Positive, Seconds, Vector, unique
@@ -63,10 +64,25 @@ class Camera(Frozen):
     size: tuple[Annotated[int, Field(ge=160, le=7680)], Annotated[int, Field(ge=120, le=4320)]] = (1280, 720)
 
 
+def _of_a_server(url: str) -> str:
+    try:
+        parts = urlsplit(url)
+        host = (parts.hostname or "").encode("idna")
+        is_one = bool(host) and parts.scheme in ("ws", "wss") and parts.port != 0
+    except ValueError:
+        is_one = False
+    if not is_one:
+        raise ValueError("is no address of a WebSocket; write ws://HOST:PORT")
+    return url
+
+
+Url = Annotated[str, AfterValidator(_of_a_server)]
+
+
 class Rosbridge(Frozen):
     """A topic of a rosbridge server."""
 
-    url: str = Field(pattern="^wss?://")
+    url: Url
     topic: str = Field(min_length=1)
     type: str = Field(min_length=1)
 
@@ -74,7 +90,7 @@ class Rosbridge(Frozen):
 class Foxglove(Frozen):
     """A topic of a server that speaks Foxglove's WebSocket protocol."""
 
-    url: str = Field(pattern="^wss?://")
+    url: Url
     topic: str = Field(min_length=1)
 
 

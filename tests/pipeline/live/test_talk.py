@@ -174,6 +174,15 @@ def test_a_sender_that_can_never_feed_its_stream_is_refused_at_the_start(
     assert said in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    "url", ["http://h:1", "h:9090", "ws://", "ws://h:99999", "ws://h:0", "ws://[::1", f"ws://{'a' * 300}:80"]
+)
+def test_what_is_no_address_of_a_server_is_said_when_study_yaml_is_read(url: str) -> None:
+    for made in (lambda: Rosbridge(url=url, topic="/t", type="t"), lambda: Foxglove(url=url, topic="/t")):
+        with pytest.raises(ValueError, match="is no address of a WebSocket; write ws://HOST:PORT"):
+            made()
+
+
 # --- Foxglove
 
 
