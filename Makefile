@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate record explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits bench-live soak lock clean
+.PHONY: help report check replay simulate record marker explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits bench-live soak lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -30,6 +30,9 @@ simulate: .venv/installed ## write the logs of a simulated STUDY anew
 
 record: .venv/installed ## run STUDY live: ARGS="--demo" needs nothing but this computer
 	@$(steadyhand) record "$(STUDY)" $(ARGS)
+
+marker: .venv/installed ## a marker to print, for a webcam as tracker: ARGS="--id 8 --size-mm 80"
+	@$(steadyhand) marker $(ARGS)
 
 explore: STUDY = studies/peephole
 explore: .venv/installed ## a better tracker or a better filter? a simulated STUDY under many trackers

@@ -322,6 +322,18 @@ def record(
 
 
 @app.command()
+def marker(
+    number: Annotated[int, typer.Option("--id", min=0, max=49, help="Which of the 50 markers.")] = 7,
+    size_mm: Annotated[float, typer.Option(min=10, max=120, help="How wide its black square is.")] = 50.0,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where to write. Default: marker-7.pdf.")] = None,
+) -> None:
+    """Write a marker to print as a PDF, true to size: with it a webcam is a tracker."""
+    from pipeline.commands import marker as command
+
+    command.marker(number, size_mm, out)
+
+
+@app.command()
 def inspect(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="A log, or several.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows of the table `quality`.")] = False,
