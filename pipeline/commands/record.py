@@ -56,6 +56,8 @@ def record(folder: Path, options: Options, out: Path | None, bots: int | None) -
 
 
 def _ready(folder: Path) -> Any:
+    from pipeline.live.lens import USUAL_FIELD_OF_VIEW_DEG
+
     def say(setup: Setup, access: Access, certificates: Certificates | None) -> None:
         console.say(f"{setup.study.title}: into {console.short_path(folder)}. End with Ctrl-C.")
         console.say(f"Operator       {access.address('operator')}")
@@ -64,6 +66,10 @@ def _ready(folder: Path) -> Any:
             console.say(f"Questionnaire  {access.address('questionnaire')}")
         if any(sender.udp_json is not None for sender in setup.recording.senders.values()):
             console.say(f'Senders        "key": "{access.sensors}"')
+        for name, sender in setup.recording.senders.items():
+            if sender.camera is not None and not (sender.camera.calibration or sender.camera.field_of_view_deg):
+                usual = f"{USUAL_FIELD_OF_VIEW_DEG:.0f}°"
+                console.say(f"{name}: no field_of_view_deg: {usual} is assumed, so z may be a third off (docs/live.md)")
         if certificates is not None and certificates.authority is not None:
             console.say(f"Phones trust these pages once they trust this computer: {access.origin}/ca says how.")
             console.say(f"Its certificate's SHA-256: {certificates.fingerprint()}")

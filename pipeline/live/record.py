@@ -154,7 +154,7 @@ def opened(access: Access, certificates: Certificates | None) -> Doors:
 async def serve(made: Setup, folder: Path, journal: Journal, access: Access, doors: Doors, known: Plan) -> None:
     """Run the study until the server is stopped."""
     loop = Loop(made, folder, Clerk(journal, check=None), known, Clock())
-    receivers = await senders.opened(made, loop, access)
+    receivers = await senders.opened(made, loop, access, folder)
     application = app(loop, access, doors.certificates)
     servers = [(uvicorn.Server(_config(application)), doors.inside)]
     if doors.outside is not None:

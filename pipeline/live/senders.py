@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine
 from itertools import product
+from pathlib import Path
 from typing import Any, Protocol
 
 from pipeline.errors import PipelineError
+from pipeline.live import cameras
 from pipeline.live.access import LOOPBACK, Access
 from pipeline.live.adapters import foxglove, lsl, lsl_outlets, osc, rosbridge, udp
 from pipeline.live.adapters.client import Client
@@ -32,10 +34,11 @@ def check(setup: Setup, where: str) -> None:
             rosbridge.check(name, content, sender.rosbridge, where)
         if sender.lsl is not None:
             lsl_outlets.check(name, content, sender.lsl, where)
+    cameras.check(setup, where)
 
 
-async def opened(setup: Setup, loop: Loop, access: Access) -> list[Open]:
-    """All of them. Raises PipelineError where a port cannot be listened on."""
+async def opened(setup: Setup, loop: Loop, access: Access, folder: Path) -> list[Open]:
+    """All of them. Raises PipelineError where a port cannot be listened on, or a camera cannot be opened."""
     found: list[Open] = [*_asked(setup, loop)]
     receivers: dict[int, udp.Limited] = {}
     for sender in setup.recording.senders.values():
@@ -45,6 +48,10 @@ async def opened(setup: Setup, loop: Loop, access: Access) -> list[Open]:
         if sender.osc is not None:
             addresses = osc.expected(setup, sender.osc.port)
             receivers[sender.osc.port] = osc.Receiver(addresses, loop.happens, loop.now_ns)
+    for webcam in cameras.webcams(setup, folder, loop.happens, loop.now_ns):
+        await webcam.begin()
+        loop.refused.append(webcam.refused)
+        found.append(webcam)
     loop.refused += [receiver.refused for receiver in receivers.values()]
     hosts = (LOOPBACK[0], access.host) if access.in_network else (access.host,)
     for (port, receiver), host in product(sorted(receivers.items()), hosts):

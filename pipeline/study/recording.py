@@ -56,12 +56,25 @@ class Lsl(Frozen):
 
 
 class Camera(Frozen):
-    """A webcam that sees a printed ArUco marker."""
+    """A webcam that sees a printed ArUco marker.
+
+    What its lens does comes from `calibration`, a file, or from `field_of_view_deg`, from its left edge to its right.
+    `late_ms` is how long before it is handed over a picture was taken, if that is known.
+    """
 
     device: Annotated[int, Field(ge=0, le=63)] = 0
     marker: Annotated[int, Field(ge=0, le=49)] = 7
     marker_mm: Positive = 50.0
     size: tuple[Annotated[int, Field(ge=160, le=7680)], Annotated[int, Field(ge=120, le=4320)]] = (1280, 720)
+    calibration: str | None = Field(default=None, min_length=1)
+    field_of_view_deg: Annotated[float, Field(ge=10, le=150)] | None = None
+    late_ms: Annotated[float, Field(ge=0, le=1000)] = 0.0
+
+    @model_validator(mode="after")
+    def _one_lens(self) -> Camera:
+        if self.calibration is not None and self.field_of_view_deg is not None:
+            raise ValueError("calibration and field_of_view_deg both say what the lens does; keep one")
+        return self
 
 
 def _of_a_server(url: str) -> str:
