@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+_BURST_S = 2.0  # a machine that stood still for longer ends the attempt anyway
 _CLOSED_AFTER_NS = 10_000_000_000
 _FORGIVEN_NS = 1_000_000_000
 
@@ -24,8 +25,11 @@ class Flow(NamedTuple):  # made anew with each datagram of a flood, and a tuple 
 
 
 def admit(flow: Flow, per_second: float, at_ns: int) -> tuple[Flow, bool]:
-    """The flow after one more, and whether it is within the limit; a second's worth may come at once."""
-    left = min(flow.left + (at_ns - flow.at_ns) * 1e-9 * per_second, per_second)
+    """The flow after one more, and whether it is within the limit.
+
+    Two seconds' worth may come at once: what an honest sender has sent while this machine stood still.
+    """
+    left = min(flow.left + (at_ns - flow.at_ns) * 1e-9 * per_second, _BURST_S * per_second)
     if left >= 1.0:
         over = None if flow.over_ns is not None and at_ns - flow.refused_ns > _FORGIVEN_NS else flow.over_ns
         return Flow(left - 1.0, at_ns, flow.refused, over, flow.refused_ns), True
