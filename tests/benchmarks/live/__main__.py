@@ -1,4 +1,5 @@
-"""`make bench-live`: latency with 1 and 8 phones while logging, and under a flood. `make soak MINUTES=30`: it lasts.
+"""`make bench-live`: latency with 1 and 8 phones while logging, and under a flood; a camera's picture.
+`make soak MINUTES=30`: it lasts.
 
 The machine must be quiet for figures that can be compared; what else it did is in them.
 """
@@ -23,6 +24,7 @@ from mcap.stream_reader import StreamReader
 
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
+from tests.benchmarks.live.camera import camera
 from tests.benchmarks.live.load import flood, load
 from tests.conftest import CLONE
 
@@ -100,6 +102,7 @@ def latency(seconds: float = _SECONDS) -> None:
     print(_HEAD)
     for name, phones, with_flood in _RUNS:
         print(_line(name, measured(phones, seconds, with_flood)), flush=True)
+    camera()
 
 
 def soak(minutes: float, phones: int) -> int:
