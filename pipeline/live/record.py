@@ -213,7 +213,10 @@ def record(
     try:
         known = known_plan(made.empty_plan(), journal, made.digest, options.goes_on)
         access = replace(access, language=made.recording.language)
-        made = replace(made, links=tuple((role, access.address(role)) for role in ("phone", "questionnaire")))
+        links = [(role, access.address(role)) for role in ("phone", "questionnaire")]
+        if certificates is not None and certificates.authority is not None:
+            links.append(("ca", f"{access.origin}/ca"))
+        made = replace(made, links=tuple(links))
         with closing(opened(access, certificates)) as doors:
             warming()
             setup.warm_up(made)

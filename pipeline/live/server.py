@@ -72,7 +72,8 @@ def app(loop: Loop, access: Access, certificates: Certificates | None = None) ->
         return await _join(request, access)
 
     async def code(request: Request) -> Response:
-        return _code(request, access)
+        has_authority = certificates is not None and certificates.authority is not None
+        return _code(request, access, has_authority)
 
     async def authority(_: Request) -> Response:
         """The certificate that phones have to trust; no secret."""
@@ -150,15 +151,17 @@ async def _join(request: Request, access: Access) -> Response:
     return response
 
 
-def _code(request: Request, access: Access) -> Response:
-    """The code that leads a phone or a questionnaire's tablet here."""
+def _code(request: Request, access: Access, has_authority: bool) -> Response:
+    """The code that leads a phone or a questionnaire's tablet here, or to how it comes to trust this computer."""
     client, role = request.client.host if request.client else "", request.path_params["role"]
-    if role not in ("phone", "questionnaire") or not access.is_let_in("operator", request.cookies, client):
+    known = ("phone", "questionnaire", *(("ca",) if has_authority else ()))
+    if role not in known or not access.is_let_in("operator", request.cookies, client):
         return PlainTextResponse("Only the operator's page may see this.", 403)
     import io
 
     import segno
 
     picture = io.BytesIO()
-    segno.make(access.address(role)).save(picture, kind="svg", scale=6, border=3, light="#fff", xmldecl=False)
+    address = f"{access.origin}/ca" if role == "ca" else access.address(role)
+    segno.make(address).save(picture, kind="svg", scale=6, border=3, light="#fff", xmldecl=False)
     return Response(picture.getvalue(), media_type="image/svg+xml")

@@ -106,11 +106,12 @@ class Operator:
         until(lambda: value(page, "#links", "it.children.length") > 0, "the state is shown", _PATIENCE_S)
 
     def links(self) -> dict[str, str]:
-        """The phone's and the questionnaire's address."""
+        """The phone's and the questionnaire's address, and in a network where a phone learns to trust this computer."""
         found = value(
             self.page, "#links", "[...it.querySelectorAll('a')].map(a => [a.href, a.closest('li').innerText])"
         )
-        return {"questionnaire" if "tablet" in words else "phone": address for address, words in found}
+        roles = {"tablet": "questionnaire", "trusts": "ca"}
+        return {next((roles[w] for w in roles if w in words), "phone"): address for address, words in found}
 
     def start(self) -> None:
         """Start the task that is next, with a reason if one is wanted."""

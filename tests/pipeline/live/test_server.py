@@ -162,6 +162,7 @@ def test_a_key_is_exchanged_for_the_cookie_of_its_role(tmp_path: Path) -> None:
         assert headers["content-security-policy"].startswith("default-src 'self'")
         status, _, picture = await running.asks("GET", "/qr/phone.svg", **running.headers("operator"))
         assert status == 200 and picture.startswith(b"<svg")
+        assert (await running.asks("GET", "/qr/ca.svg", **running.headers("operator")))[0] == 403  # nothing to trust
         assert (await running.asks("GET", "/operator", Host="evil.example"))[0] == 421
         for path in ("/pages/../server.py", "/pages/..%2fserver.py", "/pages/texts/../en.json", "/socket/phone", "/x"):
             assert (await running.asks("GET", path))[0] in (404, 405)

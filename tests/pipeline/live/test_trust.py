@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import ssl
 import stat
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import segno
 import websockets
 from cryptography import x509
 
@@ -66,6 +68,13 @@ def in_network(
     served(folder, play, access=Access("https", _LAN, free_port(), operator_anywhere), certificates=made)
 
 
+def drawn_code(address: str) -> bytes:
+    """The QR code of an address, as the operator's page shows it."""
+    picture = io.BytesIO()
+    segno.make(address).save(picture, kind="svg", scale=6, border=3, light="#fff", xmldecl=False)
+    return picture.getvalue()
+
+
 def test_a_phone_that_trusts_the_authority_joins_and_another_does_not(tmp_path: Path, made: Certificates) -> None:
     assert made.authority is not None
     other = for_address(_LAN, tmp_path / "other", NOW).authority
@@ -94,6 +103,10 @@ def test_a_phone_that_trusts_the_authority_joins_and_another_does_not(tmp_path: 
         assert json.loads(body) == {"fingerprint": made.fingerprint()}
         assert (await asks(running, unknowing, "GET", "/ca"))[0] == 200
         assert (await asks(running, unknowing, "GET", "/authority.key"))[0] == 404
+        status, _, code = await running.asks("GET", "/qr/ca.svg", **running.headers("operator"))
+        assert status == 200
+        assert code == drawn_code(f"{origin}/ca")
+        assert (await asks(running, unknowing, "GET", "/qr/ca.svg"))[0] == 403
         assert (await running.asks("GET", "/phone"))[0] == 200  # by plain HTTP on this computer, as at a USB cable
 
     in_network(tmp_path / "study", made, play)
