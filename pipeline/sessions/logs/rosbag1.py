@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
 
 from pipeline.errors import SessionError
-from pipeline.sessions.logs.bag import Connection, add, keeps, walk_of
+from pipeline.sessions.logs.bag import Connection, Raw, keeps, take, walk_of
 from pipeline.sessions.logs.extras import needs
 from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, Wanted
-from pipeline.sessions.logs.mcap import log_of
+from pipeline.sessions.logs.mcap import log_of, takers_of
 
 
 def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
     """The wanted topics of a bag, decoded. SessionError for a file that is none, or that holds too much."""
     with needs("ros", "bags of ROS 1"):
         from rosbags.rosbag1 import Reader, ReaderError
-    wants = tuple(wanted)
+    takers = takers_of(wanted)
     if not path.stat().st_size:
         raise SessionError("the file is empty")
     reader = Reader(path)
@@ -30,20 +30,19 @@ def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) 
             Connection(one.topic, one.msgtype.replace("/msg/", "/"), "ros1", one.msgdef.data.encode(), "ros1msg")
             for one in reader.connections
         ]
-        walk = walk_of(wants, limits, connections)
-        found: list[tuple[list[int], list[bytes]]] = [([], []) for _ in connections]
-        numbers = {one.id: number for number, one in enumerate(reader.connections)}
-        wanted_bytes = [keeps(walk, one.topic) for one in connections]
-        try:
-            for connection, time, data in reader.messages():
-                number = numbers[connection.id]
-                found[number][0].append(time)
-                found[number][1].append(bytes(data) if wanted_bytes[number] else b"")
-        except (ReaderError, ValueError, LookupError, OSError, AssertionError) as error:
-            walk.note(f"the bag is damaged: {error}")
-            walk.unknown_loss = True
-    for number, (times, payloads) in enumerate(found, start=1):
-        add(walk, number, times, payloads)
+        walk = walk_of(takers, limits, connections)
+        numbers = {one.id: number for number, one in enumerate(reader.connections, start=1)}
+
+        def raw() -> Iterator[Raw]:
+            try:
+                for connection, time, data in reader.messages():
+                    number = numbers[connection.id]
+                    yield Raw(number, time, bytes(data) if keeps(walk, connection.topic) else b"")
+            except (ReaderError, ValueError, LookupError, OSError, AssertionError) as error:
+                walk.note(f"the bag is damaged: {error}")
+                walk.unknown_loss = True
+
+        take(walk, raw())
     if not any(topic.read for topic in walk.topics.values()):
         raise SessionError("; ".join(["it holds no message that can be read", *walk.faults]))
-    return log_of(walk, wants)
+    return log_of(walk, takers)

@@ -12,9 +12,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from pipeline.errors import SessionError
-from pipeline.sessions.logs.bag import Connection, add, keeps, walk_of
+from pipeline.sessions.logs.bag import Connection, Raw, keeps, take, walk_of
 from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, Wanted
-from pipeline.sessions.logs.mcap import log_of
+from pipeline.sessions.logs.mcap import log_of, takers_of
 from pipeline.sessions.logs.mcap.file import unpacked
 from pipeline.sessions.logs.mcap.walk import Walk
 
@@ -23,7 +23,7 @@ _MARK = b"SQLite format 3\0"
 
 def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
     """The wanted topics of a bag, decoded. SessionError for a file that is none, or that holds too much."""
-    wants = tuple(wanted)
+    takers = takers_of(wanted)
     with _sqlite_file(path, limits) as file, closing(_opened(file)) as bag:
         try:
             topics = bag.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id").fetchall()
@@ -33,15 +33,15 @@ def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) 
         connections = [
             Connection(name, kind, encoding, *definitions.get(kind, (b"", ""))) for _, name, kind, encoding in topics
         ]
-        walk = walk_of(wants, limits, connections)
+        walk = walk_of(takers, limits, connections)
         for number, (key, name, *_) in enumerate(topics, start=1):
-            _take(walk, bag, number, key, keeps(walk, name))
+            take(walk, _raw(walk, bag, number, key, keeps(walk, name)))
     if _has_journal(path):
         walk.note(f"its last messages may still be in {path.name}-wal: close its recorder, or convert the bag")
         walk.unknown_loss = True
     if not any(topic.read for topic in walk.topics.values()):
         raise SessionError("; ".join(["it holds no message that can be read", *walk.faults]))
-    return log_of(walk, wants)
+    return log_of(walk, takers)
 
 
 @contextmanager
@@ -76,18 +76,15 @@ def _definitions(bag: sqlite3.Connection) -> dict[str, tuple[bytes, str]]:
     return {kind: (text.encode() if isinstance(text, str) else bytes(text), written) for kind, text, written in rows}
 
 
-def _take(walk: Walk, bag: sqlite3.Connection, number: int, key: int, with_payloads: bool) -> None:
-    """Read a topic's messages in the order of the file, as far as it is sound."""
+def _raw(walk: Walk, bag: sqlite3.Connection, number: int, key: int, with_payloads: bool) -> Iterator[Raw]:
+    """A topic's messages in the order of the file, as far as it is sound."""
     what = "data" if with_payloads else "x''"
-    times, payloads = [], []
     try:
         for time, data in bag.execute(f"SELECT timestamp, {what} FROM messages WHERE topic_id = ? ORDER BY id", (key,)):  # noqa: S608
-            times.append(max(time, 0))
-            payloads.append(bytes(data))
+            yield Raw(number, max(time, 0), bytes(data))
     except (sqlite3.Error, TypeError) as error:
         walk.note(f"the bag is damaged: {error}")
         walk.unknown_loss = True
-    add(walk, number, times, payloads)
 
 
 def _has_journal(path: Path) -> bool:

@@ -1,17 +1,18 @@
 """MCAP logs with messages in CDR, protobuf, flatbuffers or JSON: reads what is readable of a damaged one, and writes.
 
 `container` walks through the file, `records` reads its records by the `mcap` package, `damage` says what is wrong with
-it. `payload` decodes messages: many at once where one shows how the others are laid out, unusual ones one by one.
+it. `decoding` decodes messages while the file is read, so that their bytes are not kept: many at once where one shows
+how the others are laid out, unusual ones one by one (`payload`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, MessageType, Wanted
+from pipeline.sessions.logs.log import DEFAULT_LIMITS, Limits, Log, MessageType, Readings, Wanted
 from pipeline.sessions.logs.mcap.container import MAGIC, walk_log
-from pipeline.sessions.logs.mcap.payload import counted, decode
+from pipeline.sessions.logs.mcap.decoding import Decoding, counted
 from pipeline.sessions.logs.mcap.schemas import content_of
 from pipeline.sessions.logs.mcap.walk import Walk
 from pipeline.sessions.logs.mcap.writer import LogWriter, Message, in_order, write
@@ -24,18 +25,30 @@ def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) 
 
     Raises SessionError for a file that is no log, is a decompression bomb, or contradicts itself.
     """
-    wants = tuple(wanted)
-    walk = walk_log(path, frozenset(want.topic for want in wants) or None, limits)
-    return log_of(walk, wants)
+    takers = takers_of(wanted)
+    return log_of(walk_log(path, takers or None, limits), takers)
 
 
-def log_of(walk: Walk, wants: Sequence[Wanted]) -> Log:
+Takers = Mapping[str, Mapping[str, Decoding]]
+"""What decodes each wanted topic, by topic and `Wanted.key`."""
+
+
+def takers_of(wanted: Iterable[Wanted]) -> Takers:
+    """What decodes the wanted topics while a log is read."""
+    takers: dict[str, dict[str, Decoding]] = {}
+    for want in wanted:
+        takers.setdefault(want.topic, {})[want.key] = Decoding(want.content, want.source)
+    return takers
+
+
+def log_of(walk: Walk, takers: Takers) -> Log:
     """The wanted topics of a log that was walked through; with nothing wanted, all of them, counted only."""
-    if wants:
-        topics = {
-            want.key: decode(walk, want.topic, want.content, want.source) for want in wants if want.topic in walk.topics
-        }
-    else:
+    topics: dict[str, Readings] = {}
+    for topic, own in takers.items():
+        if topic in walk.topics:
+            walk.hand_on(topic)
+            topics |= {key: decoding.readings(walk, topic) for key, decoding in own.items()}
+    if not takers:
         topics = {topic: counted(walk, topic) for topic in walk.topics}
     return Log(walk.facts, topics, tuple(walk.faults), _types(walk))
 

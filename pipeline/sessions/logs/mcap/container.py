@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,7 +21,7 @@ from pipeline.sessions.logs.mcap.file import unpacked
 from pipeline.sessions.logs.mcap.inflate import CHUNK_LIMIT
 from pipeline.sessions.logs.mcap.records import HOW_TO_LIFT, RECORD_HEAD, share_out, take_loose, take_record
 from pipeline.sessions.logs.mcap.resume import next_place
-from pipeline.sessions.logs.mcap.walk import Walk
+from pipeline.sessions.logs.mcap.walk import Taker, Walk
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -45,11 +46,12 @@ _USED = frozenset(
 )
 
 
-def walk_log(path: Path, wanted: frozenset[str] | None, limits: Limits = DEFAULT_LIMITS) -> Walk:
+def walk_log(path: Path, wanted: Mapping[str, Mapping[str, Taker]] | None, limits: Limits = DEFAULT_LIMITS) -> Walk:
     """Everything of a log: its facts, its channels, and the messages of the wanted topics (of others the number only).
 
-    With None, every topic is wanted whose schema says what it holds. SessionError if the file is no MCAP log, would
-    unpack to far more bytes than any session has (a decompression bomb), or contradicts itself.
+    Those of wanted topics are handed to their takers as they are read. With None, every topic is wanted whose schema
+    says what it holds. SessionError if the file is no MCAP log, would unpack to far more bytes than any session has
+    (a decompression bomb), or contradicts itself.
     """
     size = path.stat().st_size
     walk = Walk(

@@ -33,6 +33,8 @@ BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError, Ove
 
 RECORD_HEAD = struct.Struct("<BQ")
 _BLOCK = 2**20
+DECODED_AT_ONCE = 2**22
+"""Bytes of a topic's messages, so many that it is quick."""
 HOW_TO_LIFT = (
     "that is mostly a damaged or malicious file; if it is sound, write `log_limits: {unpacked_mib: N}` in study.yaml"
 )
@@ -125,6 +127,7 @@ def share_out(walk: Walk) -> None:
             own_topic = walk.topics[topic]
             keep = own_topic.content is not None if walk.wanted is None else topic in walk.wanted
             own_topic.parts.append(messages.chosen(which, keep))
+            walk.hand_on(topic, DECODED_AT_ONCE)
 
 
 def _take_definition(walk: Walk, opcode: int, body: bytes) -> None:

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from mcap.records import Channel, Schema
 
 from pipeline.sessions.logs.log import Content
-from pipeline.sessions.logs.mcap.messages import Messages
+from pipeline.sessions.logs.mcap.messages import Messages, joined
 
 _FAULTS_LIMIT = 20
 
 
+class Taker(Protocol):
+    """What takes a topic's messages while the log is read, so that their bytes need not be kept."""
+
+    @property
+    def at_the_end(self) -> bool:
+        """Whether it has to be given all messages at once, when the log has been read."""
+
+    def add(self, walk: Walk, messages: Messages) -> None:
+        """Take the topic's next messages."""
+
+
 @dataclass
 class Topic:
-    """What has been collected of one topic so far."""
+    """What has been collected of one topic so far: `taken` messages are with its takers, those of `parts` are not."""
 
     parts: list[Messages] = field(default_factory=list)
+    taken: int = 0
     channels: list[int] = field(default_factory=list)
     content: Content | None = None  # None while no schema of its channels says what it holds
     in_damaged_chunks: int = 0
@@ -24,20 +38,21 @@ class Topic:
     @property
     def read(self) -> int:
         """How many of its messages have been read."""
-        return sum(map(len, self.parts))
+        return self.taken + sum(map(len, self.parts))
 
 
 @dataclass
 class Walk:
     """What is known so far.
 
+    `wanted` are topics by name, with what takes their messages; None: all that the log says what they hold.
     `unshared` messages are not given to their topics yet, because many at once are faster; `orphans` have a channel
     that no record has defined yet; `loose` holds records outside of any chunk, not read yet. `stated` are the numbers
     of messages by channel that the log's statistics state. `unknown_loss` is true where nobody can say how much is
     lost; of a damaged chunk the message indexes behind it say so.
     """
 
-    wanted: frozenset[str] | None
+    wanted: Mapping[str, Mapping[str, Taker]] | None
     inflated_limit: int
     messages_limit: int
     chunk_limit: int
@@ -58,6 +73,27 @@ class Walk:
     unknown_loss: bool = False
     in_summary: bool = False
     complete: bool = False
+
+    def hand_on(self, name: str, least_bytes: int = 0) -> None:
+        """Give a wanted topic's messages to its takers, if they are so many bytes and the log has defined their types.
+
+        Their bytes are kept no longer.
+        """
+        topic, takers = self.topics[name], (self.wanted or {}).get(name, {}).values()
+        if not takers or sum(len(part.data) for part in topic.parts) < least_bytes:
+            return
+        if least_bytes and (any(taker.at_the_end for taker in takers) or not self._types_known(topic)):
+            return
+        messages = joined(topic.parts)
+        topic.parts.clear()
+        topic.taken += len(messages)
+        for taker in takers:
+            taker.add(self, messages)
+
+    def _types_known(self, topic: Topic) -> bool:
+        """A type's definition may have been lost in a damaged chunk, and stand in the summary again."""
+        needed = {self.channels[number].schema_id for number in topic.channels}
+        return needed - {0} <= self.schemas.keys()
 
     def note(self, fault: str) -> None:
         """Note a fault of the file; after the first few, faults are only counted."""
