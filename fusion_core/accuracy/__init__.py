@@ -81,7 +81,9 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     usable = _surrounded(known, time)
     if not usable.any() or np.ptp(time[usable]) < 1.0:
         return NO_INTERVAL
-    time, estimate = time[usable], np.ascontiguousarray(estimate[usable], dtype=np.float64)
+    if not usable.all():
+        time, estimate = time[usable], estimate[usable]
+    estimate = np.ascontiguousarray(estimate, dtype=np.float64)
     block = min(max(1, round(_BLOCK_S / float(np.median(np.diff(time))))), len(time))
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
     every = -(-len(time) // _BLOCKS_MAX)
@@ -120,19 +122,31 @@ def _segments(known: FloatArray, value: FloatArray) -> lag_steps.Segments:
     )
 
 
-def cross_correlation(first: FloatArray, second: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def cross_correlation(
+    first: FloatArray, second: FloatArray, farthest: int | None = None
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Unbiased cross-correlation of two (n, d) signals, summed over axes, after subtracting each axis's mean.
 
-    Returns shifts in samples, −(n−1) … n−1, and at each the mean of first[t]·second[t + shift] over the overlap:
-    the peak sits at a positive shift where `first` is ahead of `second` (paper, Fig. 9).
+    Returns shifts in samples, −(n−1) … n−1, or those up to `farthest`, and at each the mean of first[t]·second[t +
+    shift] over the overlap: the peak sits at a positive shift where `first` is ahead of `second` (paper, Fig. 9).
     """
     from scipy import fft
 
     n = len(first)
     length = fft.next_fast_len(2 * n - 1, real=True)
-    a, b = (fft.rfft((signal - signal.mean(axis=0)).T, length) for signal in (first, second))
-    circular = fft.irfft(np.sum(a.conj() * b, axis=0), length)  # summed over axes; negative shifts are at its end
-    shifts = np.arange(-(n - 1), n)
+    means = first.mean(axis=0), second.mean(axis=0)
+    spectrum = np.zeros(0)
+    for axis in range(first.shape[1]):  # one after the other: the spectra take six times the memory of the signals
+        a, b = (
+            fft.rfft(signal[:, axis] - mean[axis], length) for signal, mean in zip((first, second), means, strict=True)
+        )
+        np.conj(a, out=a)
+        a *= b
+        spectrum = a if axis == 0 else np.add(spectrum, a, out=spectrum)
+        del a, b
+    circular = fft.irfft(spectrum, length)  # negative shifts are at its end
+    most = n - 1 if farthest is None else min(n - 1, farthest)
+    shifts = np.arange(-most, most + 1)
     return shifts, np.asarray(circular[shifts] / (n - np.abs(shifts)), dtype=np.float64)
 
 
@@ -154,7 +168,10 @@ def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: S
 
 
 def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tuple[FloatArray, FloatArray] | None:
-    """The curve behind `lead_by_cross_correlation`: leads in s and correlations in mm²; None without overlap."""
+    """The curve behind `lead_by_cross_correlation`: leads in s and correlations in mm²; None without overlap.
+
+    Of leads of up to 0.5 s and a step more.
+    """
     if len(time) < 3 or len(tracker) < 2:
         return None
     step = float(np.median(np.diff(time)))
@@ -164,7 +181,7 @@ def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tupl
     grid = np.arange(begin, end, step)
     track = estimate[np.searchsorted(time, grid + step * 1e-3, side="right") - 1]
     arrived = tracker.value[np.searchsorted(tracker.arrival, grid + step * 1e-3, side="right") - 1]
-    shifts, correlation = cross_correlation(track, arrived)
+    shifts, correlation = cross_correlation(track, arrived, int(LAG_RANGE_S / step) + 1)
     return np.asarray(shifts * step, dtype=np.float64), correlation
 
 

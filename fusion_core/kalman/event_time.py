@@ -187,9 +187,15 @@ class EventTime:
         constants: tuple[FloatArray, FloatArray],
     ) -> tuple[FloatArray, FloatArray]:
         """Mean and SD (n, d) at `times`, in any order; fills `constants` unless they are empty (rising times only)."""
+        room, wanted = self._room(readings), np.asarray(times, dtype=np.float64)
+        if (wanted[1:] >= wanted[:-1]).all():
+            found: tuple[FloatArray, FloatArray] = event_replay.replay(
+                self.model, readings, arrival, wanted, room, self.history_s, constants
+            )
+            return found
         order = np.argsort(times, kind="stable")
         mean, sd = np.full((2, len(times), self.dimension), np.nan)
-        room, rising = self._room(readings), np.asarray(times, dtype=np.float64)[order]
+        rising = wanted[order]
         mean[order], sd[order] = event_replay.replay(
             self.model, readings, arrival, rising, room, self.history_s, constants
         )
@@ -238,24 +244,28 @@ class EventTime:
         self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray] | None = None
     ) -> tuple[Readings, FloatArray]:
         """All readings in order of arrival from the first position on, followed by those that waited for it."""
-        names = [name for name in self.sensors if name in samples and len(samples[name])]
-        count, begin = sum(len(samples[name]) for name in names), 0
-        value, coupling = (
-            np.empty((count, self.dimension)),
-            np.empty((count, self.dimension, len(self.model.constants))),
-        )
-        rows, arrival = Readings(np.empty(count), np.empty(count, np.int64), value, coupling), np.empty(count)
-        for name in names:
-            stream, part = samples[name], slice(begin, begin + len(samples[name]))
-            begin = part.stop
-            rows.time[part], rows.sensor[part], arrival[part] = stream.time, self._index[name], stream.arrival
-            rows.value[part] = self._on_all_axes(name, stream.value)
-            rows.coupling[part] = couplings[name] if couplings else self._coupling(name, stream.rotation)
+        streams = {name: samples[name] for name in self.sensors if name in samples and len(samples[name])}
+        time = np.concatenate([np.zeros(0), *(stream.time for stream in streams.values())])
+        arrival = np.concatenate([np.zeros(0), *(stream.arrival for stream in streams.values())])
+        numbers = [np.full(len(stream), self._index[name], np.int64) for name, stream in streams.items()]
+        sensor = np.concatenate([np.zeros(0, np.int64), *numbers])
         order = np.argsort(arrival, kind="stable")
-        order = self._from_first(rows.time[order], rows.sensor[order], order)
-        chosen = Readings._make(column[order] for column in rows)
+        order = self._from_first(time[order], sensor[order], order)
+        # Each stream goes to its places at once: the couplings of a long recording are not held twice.
+        places = np.full(len(time), -1)
+        places[order] = np.arange(len(order))
+        value = np.empty((len(order), self.dimension))
+        coupling = np.empty((len(order), self.dimension, len(self.model.constants)))
+        begin = 0
+        for name, stream in streams.items():
+            place = places[begin : begin + len(stream)]
+            begin += len(stream)
+            kept = slice(None) if (place >= 0).all() else place >= 0
+            of_stream = couplings[name] if couplings else self._coupling(name, stream.rotation)
+            value[place[kept]] = self._on_all_axes(name, stream.value)[kept]
+            coupling[place[kept]] = of_stream if of_stream.ndim == 2 else of_stream[kept]
         begins = arrival[order[0]] if len(order) else np.inf
-        return chosen, np.maximum(arrival[order], begins)
+        return Readings(time[order], sensor[order], value, coupling), np.maximum(arrival[order], begins)
 
     def _from_first(self, time: FloatArray, sensor: Any, order: Any) -> Any:
         """`order` from the first position on; readings that arrived before it are kept if measured after it."""

@@ -41,7 +41,8 @@ class Body:
 
     def acceleration(self) -> Samples:
         """Accelerations (n, 3) in mm/s² in the tracker's frame: a = R f + g. At rest f points up and a is zero."""
-        value = np.einsum("nij,nj->ni", self.rotation, self.force_mm_s2) + self.gravity_mm_s2
+        value = np.einsum("nij,nj->ni", self.rotation, self.force_mm_s2)
+        value += self.gravity_mm_s2
         return Samples(self.time, self.arrival, value, self.rotation, self.force_mm_s2)
 
 

@@ -15,6 +15,7 @@ from fusion_core.sensors import Sensor
 _HEADING_WALK_PER_SQRT_S = 0.02  # of the heading's cosine and sine: a gyroscope drifts
 _LEVEL_BIAS_SD_MM_S2 = 300.0  # 2° of tilt, or an accelerometer's own
 _LEVEL_BIAS_WALK_MM_S2 = 30.0
+_AT_ONCE = 2**16
 
 
 def rotate(quaternion_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
@@ -35,8 +36,12 @@ def rotate(quaternion_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
 
 def rotations(quaternion_xyzw: FloatArray) -> FloatArray:
     """Rotation matrices (n, 3, 3) of quaternions (n, 4): each turns a column from the body's to the tracker's frame."""
-    columns = [rotate(quaternion_xyzw, np.broadcast_to(unit, (len(quaternion_xyzw), 3))) for unit in np.eye(3)]
-    return np.stack(columns, axis=2)
+    found = np.empty((len(quaternion_xyzw), 3, 3))
+    for begin in range(0, len(quaternion_xyzw), _AT_ONCE):  # what is in between takes twice the memory of the result
+        part = quaternion_xyzw[begin : begin + _AT_ONCE]
+        for column, unit in enumerate(np.eye(3)):
+            found[begin : begin + _AT_ONCE, :, column] = rotate(part, np.broadcast_to(unit, (len(part), 3)))
+    return found
 
 
 def rotation(quaternion_xyzw: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +16,13 @@ from pipeline.engine.stage import Outcome, Work
 from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors
 from pipeline.sessions.fusion_checks import fusion_check_rows
+from pipeline.sessions.growing import Growing
 from pipeline.sessions.phone import described
 from pipeline.sessions.recording import Recording, Shown, where_judged
 from pipeline.sessions.sensors_found import sensors_found_rows
 from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
@@ -36,7 +37,7 @@ def run(work: Work) -> Outcome:
     study, session = work.study, work.session
     ingested = work.entry("ingest")
     loaded = recording.load(study, ingested)
-    tracks = _tracks(study, tables.read_arrow("tracks", work.entry("fuse")))
+    tracks = _tracks(study, tables.read_parts("tracks", work.entry("fuse")))
     reference = recording.reference(study, loaded)
     rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
     known = [row for row in rows if row]
@@ -60,21 +61,30 @@ def run(work: Work) -> Outcome:
     tables.write("excerpts", excerpts.excerpt(study, session.id, loaded, tracks), work.out)
     tables.write("lead_curves", excerpts.lead_curves(study, session.id, loaded, tracks), work.out)
     tables.write("stream_rates", tables.of_rows("stream_rates", list(excerpts.rates(ingested))), work.out)
+    instants = len(loaded.times)
+    del loaded, tracks
+    tables.give_back(instants)
     return Outcome()
 
 
-def _tracks(study: Study, table: pa.Table) -> dict[str, Shown]:
-    """What each estimator would have shown, by its name."""
-    shown = {}
-    for name in study.estimators:
-        rows = table.filter(pc.equal(table["estimator"], name))
-        if len(rows):
-            mean, sd = (
-                np.column_stack([rows[column.format(axis)].to_numpy() for axis in study.axes])
-                for column in ("{}_mm", "sd_{}_mm")
-            )
-            shown[name] = Shown(rows["time_ns"].to_numpy(), mean, sd)
-    return shown
+def _tracks(study: Study, parts: Iterable[pa.Table]) -> dict[str, Shown]:
+    """What each estimator would have shown, by its name, from parts of the table `tracks`."""
+    axes = len(study.axes)
+    found = {
+        name: (Growing(np.int64), Growing(np.float64, axes), Growing(np.float64, axes)) for name in study.estimators
+    }
+    for part in parts:
+        for name in pc.unique(part["estimator"]).to_pylist():
+            if name not in found:
+                continue
+            rows = tables.matching(part, "estimator", name)
+            time_ns, mean, sd = found[name]
+            time_ns.add(rows["time_ns"])
+            for column, values in (("{}_mm", mean), ("sd_{}_mm", sd)):
+                values.add(np.column_stack([rows[column.format(axis)] for axis in study.axes]))
+    tables.give_back(sum(len(columns[0]) for columns in found.values()))
+    arrays = {name: [column.whole() for column in columns] for name, columns in found.items()}
+    return {name: Shown(*columns) for name, columns in arrays.items() if len(columns[0])}
 
 
 def accuracy_row(
@@ -114,7 +124,8 @@ def _on_grid(
     if judged is None:
         return None
     on_grid, truth = judged
-    return time[on_grid], shown.mean[on_grid], shown.sd[on_grid], truth
+    where = run_of(on_grid)
+    return time[where], shown.mean[where], shown.sd[where], truth
 
 
 def calibration_rows(

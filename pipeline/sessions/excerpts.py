@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.compute as pc
 
 from fusion_core import Samples, accuracy
+from pipeline.sessions.growing import Growing
+from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.recording import SETTLED_S, Recording, Shown
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
@@ -98,7 +101,7 @@ def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[s
     tracker = loaded.samples[name]
     for estimator, shown in tracks.items():
         time, mean = loaded.to_s(shown.time_ns), shown.mean
-        settled = time >= tracker.arrival[0] + SETTLED_S
+        settled = run_of(time >= tracker.arrival[0] + SETTLED_S)
         curve = accuracy.lead_curve(time[settled], mean[settled], tracker)
         if curve is None or not np.max(np.abs(curve[1])) > 0:
             continue
@@ -110,15 +113,14 @@ def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[s
 
 def rates(ingested: Path) -> Iterator[dict[str, Any]]:
     """Rows of `stream_rates`: how many messages of each stream arrived in each stretch of the session."""
-    columns = ["session", "stream", "arrival_ns"]
-    arrived = pd.concat([tables.read(name, ingested)[columns] for name in ("positions", "readings", "imu")])
-    if arrived.empty:
+    arrivals = _arrivals(ingested)
+    if not arrivals:
         return
-    first, last = int(arrived["arrival_ns"].min()), int(arrived["arrival_ns"].max())
+    first = min(int(arrival[0]) for arrival in arrivals.values())
+    last = max(int(arrival[-1]) for arrival in arrivals.values())
     count = int(np.clip((last - first) // _STRETCH_NS, 1, _STRETCHES))
     edges = first + (last + 1 - first) * np.arange(count + 1) // count
-    for (session, stream), rows in arrived.groupby(["session", "stream"], sort=False):
-        arrival = np.sort(rows["arrival_ns"].to_numpy(np.int64))
+    for (session, stream), arrival in arrivals.items():
         stretch = np.searchsorted(edges, arrival, side="right") - 1
         silence = np.zeros(count)
         np.maximum.at(silence, stretch, np.diff(arrival, prepend=first) * S_PER_NS)
@@ -131,3 +133,14 @@ def rates(ingested: Path) -> Iterator[dict[str, Any]]:
                 "messages": int(messages),
                 "gap_max_s": float(silence[index]),
             }
+
+
+def _arrivals(ingested: Path) -> dict[tuple[str, str], IntArray]:
+    """The sorted arrivals of each session's streams in ns, in the order of the tables."""
+    found: dict[tuple[str, str], Growing] = {}
+    for name in ("positions", "readings", "imu"):
+        for part in tables.read_parts(name, ingested):
+            for stream in pc.unique(part["stream"]).to_pylist():
+                own = found.setdefault((part["session"][0].as_py(), stream), Growing(np.int64))
+                own.add(tables.matching(part, "stream", stream)["arrival_ns"])
+    return {key: np.sort(arrival.whole()) for key, arrival in found.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,9 @@ from pipeline.errors import PipelineError, SessionError, did_you_mean
 from pipeline.sessions.checks import check_rows
 from pipeline.sessions.checks.of_log import of_log
 from pipeline.sessions.logs import read_logs
-from pipeline.sessions.logs.log import Limits, Log, Readings
+from pipeline.sessions.logs.log import IntArray, Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
+from pipeline.sessions.usable import usable, within_a_day
 from pipeline.sessions.wanted import of_events, of_stream, wanted_by
 from pipeline.study.memory import free_bytes, shortage
 from pipeline.study.pseudonyms import SOMEONE_ELSE, Pseudonyms
@@ -30,7 +31,6 @@ MM_PER_M = 1000.0
 MEMORY_PER_BYTE = 20.0
 """Bytes of memory that a session takes for each of its log, by docs/limits.md."""
 _NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
-_DAY_NS = 86_400e9
 _SAME_CLOCK_S = 3600.0
 _TOPICS_MAX = 40  # named in a message
 _LATE_S = 0.5  # what an estimator remembers by default
@@ -46,7 +46,7 @@ def run(work: Work) -> Outcome:
     in_part = list(log.faults)
     quality: list[Row] = []
     left_out: list[Row] = []
-    found: dict[str, list[pa.Table]] = {"positions": [], "readings": [], "imu": []}
+    found: dict[str, list[tuple[str, Stream, Readings]]] = {"positions": [], "readings": [], "imu": []}
     for name, stream in study.streams.items():
         readings = _stream(log, name, stream, in_part)
         if readings is None:
@@ -61,15 +61,19 @@ def run(work: Work) -> Outcome:
         if finite.read < readings.read:
             left_out.append(quality[-1])
         table = {"acceleration": "imu", "velocity": "readings", "linear": "readings"}.get(stream.kind, "positions")
-        found[table].append(_table(session.id, name, stream, finite))
+        found[table].append((name, stream, finite))
     events, row, repeated = _events(log, study, session.id, in_part)
     if row is not None:
         quality.append(row)
         if repeated:
             left_out.append(row)
-    for name, parts in found.items():
-        if parts:
-            tables.write(name, pa.concat_tables(parts).combine_chunks(), work.out)
+    for table, streams in found.items():
+        if streams:
+            parts = (part for named in streams for part in _parts(session.id, *named))
+            tables.write_parts(table, parts, work.out)
+    rows = sum(readings.read for streams in found.values() for *_, readings in streams)
+    del found
+    tables.give_back(rows)
     tables.write("events", events, work.out)
     tables.write("quality", tables.of_rows("quality", quality), work.out)
     tables.write("checks", tables.of_rows("checks", check_rows(session.id, of_log(log, study))), work.out)
@@ -178,8 +182,7 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
     notes = [] if finite.all() else [f"{int((~finite).sum())} samples left out: NaN or infinite"]
     in_time = np.ones(readings.read, bool)
     for times in (readings.stamp_ns, readings.arrival_ns):
-        off = np.abs(times.astype(np.float64) - float(np.median(times)))
-        in_time &= off <= _DAY_NS
+        in_time &= within_a_day(times)
     if not in_time.all():
         notes.append(f"{int((~in_time).sum())} samples left out: their time is more than a day off")
     late_s = float(np.median(readings.arrival_ns - readings.stamp_ns)) * S_PER_NS
@@ -187,7 +190,7 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
         raise SessionError(f"topic {stream.topic}: {_of_two_clocks(readings, late_s)}")
     keep = finite & in_time
     delay_s = (readings.arrival_ns - readings.stamp_ns)[keep] * S_PER_NS
-    delay_s = delay_s + (stream.latency_s if stream.stamped_on_arrival else 0.0)
+    delay_s += stream.latency_s if stream.stamped_on_arrival else 0.0
     if np.any(delay_s > _LATE_S):
         notes.append(
             f"{int((delay_s > _LATE_S).sum())} samples arrive over {_LATE_S:g} s late, and may come too late to fuse"
@@ -196,7 +199,7 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
         unknown = int(np.isnan(readings.values[keep, 6]).sum())
         if unknown:
             notes.append(f"{unknown} samples without an orientation in the log")
-    return Readings(readings.stamp_ns[keep], readings.arrival_ns[keep], readings.values[keep]), notes
+    return usable(readings, keep), notes
 
 
 def _of_two_clocks(readings: Readings, late_s: float) -> str:
@@ -209,16 +212,21 @@ def _of_two_clocks(readings: Readings, late_s: float) -> str:
     )
 
 
-def _table(session: str, name: str, stream: Stream, readings: Readings) -> pa.Table:
-    """A stream's rows of its table, in order of arrival, in millimetres."""
+def _parts(session: str, name: str, stream: Stream, readings: Readings) -> Iterator[pa.Table]:
+    """A stream's rows of its table, in order of arrival, in millimetres, some at a time."""
     order = np.lexsort((readings.stamp_ns, readings.arrival_ns))
+    for begin in range(0, max(len(order), 1), tables.ROWS_AT_ONCE):
+        yield _part(session, name, stream, readings, order[begin : begin + tables.ROWS_AT_ONCE])
+
+
+def _part(session: str, name: str, stream: Stream, readings: Readings, which: IntArray) -> pa.Table:
     columns: dict[str, Any] = {
         "session": session,
         "stream": name,
-        "time_ns": readings.stamp_ns[order],
-        "arrival_ns": readings.arrival_ns[order],
+        "time_ns": readings.stamp_ns[which],
+        "arrival_ns": readings.arrival_ns[which],
     }
-    values = np.ascontiguousarray(readings.values[order].T)
+    values = np.ascontiguousarray(readings.values[which].T)
     own = stream.kind in ("velocity", "linear")
     for index, axis in enumerate("xyz"):
         column = f"a{axis}_mm_s2" if stream.kind == "acceleration" else axis if own else f"{axis}_mm"
@@ -226,8 +234,8 @@ def _table(session: str, name: str, stream: Stream, readings: Readings) -> pa.Ta
     if stream.kind == "acceleration":
         columns |= {f"g{axis}_rad_s": values[3 + index] for index, axis in enumerate("xyz")}
         columns |= {f"q{axis}": values[6 + index] for index, axis in enumerate("xyzw")}
-        return tables.of_columns("imu", len(order), columns)
-    return tables.of_columns("readings" if own else "positions", len(order), columns)
+        return tables.of_columns("imu", len(which), columns)
+    return tables.of_columns("readings" if own else "positions", len(which), columns)
 
 
 def _events(log: Log, study: Study, session: str, in_part: list[str]) -> tuple[pa.Table, Row | None, int]:

@@ -18,7 +18,7 @@ from fusion_core.phone.orientation import (
     turn_about_vertical,
 )
 from pipeline.sessions.tilt import tilts
-from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables.table import Columns
 
@@ -81,9 +81,10 @@ def aligned(imu: Imu, logged: FloatArray, stream: AccelerationStream, tracker: T
     """
     gravity = np.array(stream.gravity_mm_s2)
     turned, origins = _orientations(imu, logged, gravity, tracker)
-    known = np.isfinite(turned).all(axis=1)
-    rotation = rotations(turned[known]) if known.any() else np.empty((0, 3, 3))
-    body = Body(imu.time[known], imu.arrival[known], imu.force_mm_s2[known], rotation, gravity)
+    known: npt.NDArray[np.bool_] = np.all(np.isfinite(turned), axis=1)
+    where = run_of(known)
+    rotation = rotations(turned[where]) if known.any() else np.empty((0, 3, 3))
+    body = Body(imu.time[where], imu.arrival[where], imu.force_mm_s2[where], rotation, gravity)
     return _with_mounting(Phone(body, origins, int((~known).sum())), stream, imu.sensor, tracker)
 
 
@@ -95,6 +96,8 @@ def _orientations(
     Up to the first one in the log they are found from the motion; after it, gaps are carried on by the gyroscope.
     """
     in_log = np.isfinite(logged).all(axis=1)
+    if len(logged) and in_log.all():
+        return logged, {IN_LOG: len(logged), CARRIED: 0}
     first = int(np.argmax(in_log)) if in_log.any() else len(logged)
     turned = logged.copy()
     turned[:first] = _orientation_from_motion(imu.until(first), gravity, tracker)

@@ -17,8 +17,8 @@ from fusion_core.accuracy import interpolate
 from fusion_core.phone.calibration import Body
 from fusion_core.phone.orientation import nearest, rotate
 from pipeline.sessions.estimators import build_estimator, sensor, sensors
-from pipeline.sessions.phone import Phone, aligned, phone
-from pipeline.statistics.arrays import FloatArray
+from pipeline.sessions.phone import Imu, Phone, aligned, phone
+from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.settings import Study
 from pipeline.study.streams import (
     AccelerationStream,
@@ -101,7 +101,7 @@ def where_judged(
         return None
     truth = interpolate(reference[1], time)
     judged = (time >= loaded.samples[tracker].arrival[0] + SETTLED_S) & np.isfinite(truth).all(axis=1)
-    return (judged, truth[judged]) if judged.any() else None
+    return (judged, truth[run_of(judged)]) if judged.any() else None
 
 
 def load(study: Study, entry: Path) -> Recording:
@@ -114,7 +114,12 @@ def load(study: Study, entry: Path) -> Recording:
         if not isinstance(stream, AccelerationStream):
             table = readings if isinstance(stream, VelocityStream | LinearStream) else positions
             whole[name] = _vectors(tables.of_stream(table, name), stream, origin_ns)
-    phones = _phones(study, imu, origin_ns, whole)
+    raw = _raw_phones(study, imu, origin_ns)
+    times = _instants(study, imu, positions, origin_ns)
+    rows = len(imu) + len(positions)
+    del imu, positions, readings  # a phone's orientations take as much memory again
+    tables.give_back(rows)
+    phones = _phones(study, raw, whole)
     samples = {
         name: _of_axes(phones[name].body.acceleration() if name in phones else whole[name], study, name)
         for name in study.sensor_streams
@@ -122,7 +127,7 @@ def load(study: Study, entry: Path) -> Recording:
     return Recording(
         origin_ns,
         samples,
-        _instants(study, imu, positions, origin_ns),
+        times,
         _only_stream_of(study, ReferenceStream, whole),
         _only_stream_of(study, DisplayStream, whole),
         phones,
@@ -184,7 +189,20 @@ def _times(rows: Columns, latency_s: float) -> tuple[Any, Any]:
     return rows["time_ns"] - round(latency_s / S_PER_NS), rows["arrival_ns"]
 
 
-def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Samples]) -> dict[str, Phone]:
+def _raw_phones(study: Study, imu: pa.Table, origin_ns: int) -> dict[str, tuple[Imu, FloatArray]]:
+    """Every stream of accelerations with the orientations in the log (n, 4), in the phone's own frame."""
+    found = {}
+    for name, stream in study.sensor_streams.items():
+        if isinstance(stream, AccelerationStream):
+            rows = tables.of_stream(imu, name)
+            time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamped_on_arrival else 0.0)
+            times = (time_ns - origin_ns) * S_PER_NS, (arrival_ns - origin_ns) * S_PER_NS
+            logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])
+            found[name] = phone(rows, times, _of_space(sensor(study, stream))), logged
+    return found
+
+
+def _phones(study: Study, raw: dict[str, tuple[Imu, FloatArray]], whole: dict[str, Samples]) -> dict[str, Phone]:
     """The phone of every stream of accelerations, with all three axes."""
     tracker = None
     if study.tracker is not None:
@@ -192,12 +210,7 @@ def _phones(study: Study, imu: pa.Table, origin_ns: int, whole: dict[str, Sample
     found = {}
     for name, stream in study.sensor_streams.items():
         if isinstance(stream, AccelerationStream):
-            rows = tables.of_stream(imu, name)
-            time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamped_on_arrival else 0.0)
-            times = (time_ns - origin_ns) * S_PER_NS, (arrival_ns - origin_ns) * S_PER_NS
-            imu_readings = phone(rows, times, _of_space(sensor(study, stream)))
-            logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])
-            found[name] = aligned(imu_readings, logged, stream, tracker)
+            found[name] = aligned(*raw.pop(name), stream, tracker)
     return found
 
 
@@ -209,6 +222,8 @@ def _of_space(of_axes: Sensor) -> Sensor:
 def _of_axes(samples: Samples, study: Study, name: str) -> Samples:
     """A sensor's readings, with those of its axes that are analysed."""
     index = [_AXES.index(axis) for axis in study.axes_of(name)]
+    if index == list(range(samples.value.shape[1])):
+        return samples
     rotation = None if samples.rotation is None else samples.rotation[:, index]
     return Samples(samples.time, samples.arrival, samples.value[:, index], rotation, samples.force)
 
@@ -265,8 +280,9 @@ def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track
 def tracked(study: Study, name: str, loaded: Recording) -> Shown:
     """What the estimator would have shown at every instant of the recording, from its first estimate on."""
     track = show(study, name, loaded, loaded.times)
-    known = np.isfinite(track.mean).all(axis=1)
-    return Shown(loaded.to_ns(track.time[known]), track.mean[known], track.sd[known])
+    known: np.ndarray[Any, np.dtype[np.bool_]] = np.all(np.isfinite(track.mean), axis=1)
+    where = run_of(known)
+    return Shown(loaded.to_ns(track.time[where]), track.mean[where], track.sd[where])
 
 
 def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
@@ -292,7 +308,9 @@ def _instants(study: Study, imu: pa.Table, positions: pa.Table, origin_ns: int) 
     """The arrivals of the accelerations; of the frames where there is no IMU."""
     accelerations, frames = study.stream_of_kind("acceleration"), study.stream_of_kind("position")
     rows = tables.of_stream(imu, accelerations) if accelerations else tables.of_stream(positions, frames or "")
-    arrival = np.unique(rows["arrival_ns"])
+    arrival = rows["arrival_ns"]
+    if (arrival[1:] <= arrival[:-1]).any():
+        arrival = np.unique(arrival)
     times: FloatArray = (arrival - origin_ns) * S_PER_NS
     return times
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,9 @@ pa.set_memory_pool(pa.system_memory_pool())  # the default pool would keep the m
 _NULLABLE = {TEXT: pd.StringDtype(), COUNT: pd.Int64Dtype()}
 _PANDAS = {**_NULLABLE, FLOAT: np.dtype("float64")}  # as a frame holds them
 _SMALL = 512  # rows
+_SMALL_BYTES = 2**24
+ROWS_AT_ONCE = 2**18
+"""Rows of a part of a large table: some tens of megabytes."""
 _PARTS = 256  # tables that are read before they are merged: each takes far more memory than its few rows
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins like this
 
@@ -114,22 +117,45 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
         data = TABLES[name].schema.empty_table()
     elif isinstance(data, pd.DataFrame):
         data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name].schema, preserve_index=False)
+    with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
+        pq.write_table(data.replace_schema_metadata(None), file, **_as_file(name, len(data) <= _SMALL))
+
+
+def write_parts(name: str, parts: Iterable[pa.Table], folder: Path) -> None:
+    """Write a table that is given part by part: of a large one no more than some parts are in memory."""
+    waiting, rows, coming = [TABLES[name].schema.empty_table()], 0, iter(parts)
+    for part in coming:
+        waiting.append(part)
+        rows += len(part)
+        if rows > ROWS_AT_ONCE:
+            break
+    else:
+        write(name, pa.concat_tables(waiting).combine_chunks(), folder)
+        return
+    with (
+        pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file,
+        pq.ParquetWriter(file, TABLES[name].schema, **_as_file(name, small=False)) as writer,
+    ):
+        writer.write_table(pa.concat_tables(waiting).combine_chunks(), row_group_size=ROWS_AT_ONCE)
+        del waiting
+        for part in coming:
+            writer.write_table(part, row_group_size=ROWS_AT_ONCE)
+
+
+def _as_file(name: str, small: bool) -> dict[str, Any]:
+    """How a table is encoded in its file."""
     columns = TABLES[name].columns
     floats = [column.name for column in columns if column.kind == FLOAT]
     times = [column.name for column in columns if column.name.endswith("_ns")]
     encodings = dict.fromkeys(floats, "BYTE_STREAM_SPLIT") | dict.fromkeys(times, "DELTA_BINARY_PACKED")
     plain = [name for name in TABLES[name].names if name not in encodings]
-    small = len(data) <= _SMALL
-    with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
-        pq.write_table(
-            data.replace_schema_metadata(None),
-            file,
-            compression="none" if small else "zstd",
-            use_dictionary=False if small else plain,
-            column_encoding=None if small else encodings,
-            store_schema=False,
-            write_page_checksum=True,
-        )
+    return {
+        "compression": "none" if small else "zstd",
+        "use_dictionary": False if small else plain,
+        "column_encoding": None if small else encodings,
+        "store_schema": False,
+        "write_page_checksum": True,
+    }
 
 
 def write_csv(name: str, data: pd.DataFrame, folder: Path) -> None:
@@ -160,23 +186,54 @@ def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
     return pa.concat_tables([*merged, *parts]) if merged or parts else TABLES[name].schema.empty_table()
 
 
+def read_parts(name: str, folder: Path) -> Iterator[pa.Table]:
+    """As `read_arrow` of one folder, some rows after the other: of a large table they are never in memory together."""
+    with suppress(FileNotFoundError), _opened(name, folder / f"{name}.parquet") as file:
+        left = file.metadata.num_rows
+        for group in range(file.num_row_groups):
+            part = file.read_row_group(group, use_threads=False)
+            left -= len(part)
+            yield part
+        if left:
+            raise DamagedTableError(folder / f"{name}.parquet")
+
+
 def _read_file(name: str, path: Path) -> pa.Table:
+    with _opened(name, path) as file:
+        table = file.read(use_threads=False)
+        if len(table) != file.metadata.num_rows:
+            raise DamagedTableError(path)
+        return table
+
+
+@contextmanager
+def _opened(name: str, path: Path) -> Iterator[pq.ParquetFile]:
     """Raises DamagedTableError where a checksum, the columns or the number of rows differ from what was written.
 
     The pages have checksums. What stands beside them in the file has none, but where a bit of it changes, the file
     cannot be read, or the columns are others, or the two numbers of rows in it differ.
     """
     try:
-        content = pa.BufferReader(path.read_bytes())  # opening it as a file takes longer than reading a small table
-        file = pq.ParquetFile(content, page_checksum_verification=True)
-        table = file.read(use_threads=False)
+        # Opening a file takes longer than reading a small table from memory.
+        small = path.stat().st_size <= _SMALL_BYTES
+        with pa.BufferReader(path.read_bytes()) if small else pa.OSFile(str(path)) as content:
+            file = pq.ParquetFile(content, page_checksum_verification=True)
+            if file.schema_arrow != TABLES[name].schema:
+                raise DamagedTableError(path)
+            yield file
     except FileNotFoundError:
         raise
     except (OSError, ValueError, pa.ArrowException):
         raise DamagedTableError(path) from None
-    if table.schema != TABLES[name].schema or len(table) != file.metadata.num_rows:
-        raise DamagedTableError(path)
-    return table
+
+
+def give_back(rows: int) -> None:
+    """Let the system have the memory of what was freed, after work with so many rows.
+
+    Else it stays with the process, as pieces between others, and a long session takes half as much again.
+    """
+    if rows > ROWS_AT_ONCE:
+        pa.default_memory_pool().release_unused()
 
 
 Columns = Mapping[str, np.ndarray[Any, Any]]
@@ -184,10 +241,33 @@ Columns = Mapping[str, np.ndarray[Any, Any]]
 
 
 def of_stream(table: pa.Table, stream: str) -> Columns:
-    """The numbers in one stream's rows as arrays (n,), NaN where they are null; times are in ns."""
-    rows = table.filter(pc.equal(table["stream"], stream))
-    names = [column.name for column in table.schema if column.type != TEXT]
-    return {name: rows[name].to_numpy() for name in names}
+    """The numbers in one stream's rows as arrays (n,), NaN where they are null; times are in ns.
+
+    Each is made when it is asked for: together they take as much memory as the table does.
+    """
+    return matching(table, "stream", stream)
+
+
+def matching(table: pa.Table, column: str, value: str) -> Columns:
+    """As `of_stream`, of the rows that have this value in a column."""
+    numbers = table.select([column.name for column in table.schema if column.type != TEXT])
+    own = pc.equal(table[column], value)
+    return _Numbers(numbers if pc.all(own).as_py() else numbers.filter(own))
+
+
+class _Numbers(Mapping[str, "np.ndarray[Any, Any]"]):
+    def __init__(self, table: pa.Table) -> None:
+        self._table = table
+
+    def __getitem__(self, name: str) -> np.ndarray[Any, Any]:
+        column: np.ndarray[Any, Any] = self._table[name].to_numpy()
+        return column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._table.column_names)
+
+    def __len__(self) -> int:
+        return len(self._table.column_names)
 
 
 def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:

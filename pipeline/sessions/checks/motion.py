@@ -127,8 +127,8 @@ def _compared(
     integrations: int,
     heading_known: bool,
 ) -> Compared | None:
-    tracker_s, position_mm = _rising(tracker_s, position_mm)
-    other_s, other = _rising(other_s, other)
+    tracker_s, position_mm = rising(tracker_s, position_mm)
+    other_s, other = rising(other_s, other)
     grid = _grid(tracker_s, other_s)
     rows = _blocks(grid, tracker_s, other_s) if len(grid) else np.zeros((0, _BLOCK), np.int64)
     if len(rows) < _BLOCKS_MIN:
@@ -155,8 +155,8 @@ def distant_lag_s(
     For movements that do not fit at any lag near zero. The accelerations are whitened, so that the sum of the squared
     cross-correlations of all axes is what the best A accounts for.
     """
-    tracker_s, position_mm = _rising(tracker_s, position_mm)
-    imu_s, acceleration_mm_s2 = _rising(imu_s, acceleration_mm_s2)
+    tracker_s, position_mm = rising(tracker_s, position_mm)
+    imu_s, acceleration_mm_s2 = rising(imu_s, acceleration_mm_s2)
     grid = _grid(tracker_s, imu_s)
     if len(grid) < _BLOCKS_MIN * _BLOCK:
         return None
@@ -175,7 +175,10 @@ def distant_lag_s(
     return float(shifts[at] * _STEP_S) if explained[at] > _FITS else None
 
 
-def _rising(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+def rising(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times and values in the order of time, the first of each time; no copy where they are that already."""
+    if (time[1:] > time[:-1]).all():
+        return time, value
     time, first = np.unique(time, return_index=True)
     return time, value[first]
 
@@ -186,7 +189,11 @@ def _averaged(grid: FloatArray, time: FloatArray, value: FloatArray) -> FloatArr
     Of the straight lines between readings, by differences of their running integral.
     """
     lasting = np.diff(time)[:, None]
-    area = np.vstack([np.zeros(value.shape[1]), np.cumsum(lasting * (value[1:] + value[:-1]) / 2, axis=0)])
+    area = np.zeros(value.shape)
+    under = value[1:] + value[:-1]
+    under *= lasting
+    under /= 2
+    np.cumsum(under, axis=0, out=area[1:])
     edges = np.append(grid - _STEP_S / 2, grid[-1] + _STEP_S / 2)
     at = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, len(time) - 2)
     since = np.clip((edges - time[at])[:, None], 0.0, lasting[at])

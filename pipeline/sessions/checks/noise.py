@@ -20,6 +20,7 @@ import numpy as np
 
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.force import LARGE_M_S2
+from pipeline.sessions.checks.motion import rising
 from pipeline.sessions.checks.recorded import Recorded, Times
 from pipeline.statistics.arrays import FloatArray
 
@@ -111,24 +112,26 @@ def noise_sd(times: Times, value: FloatArray) -> float | None:
 
 def _quiet(times: Times, value: FloatArray, like_noise: float) -> tuple[float, int] | None:
     """The same SD, and how many windows are enough like noise; the quietest quarter is taken of these."""
-    stamp_s, first = np.unique(times.stamp_s, return_index=True)
-    value = value[first]
+    stamp_s, value = rising(times.stamp_s, value)
     fresh = np.concatenate([[True], np.any(np.diff(value, axis=0) != 0, axis=1)])
-    stamp_s, value = stamp_s[fresh], value[fresh]
+    if not fresh.all():
+        stamp_s, value = stamp_s[fresh], value[fresh]
     if len(stamp_s) < 100:
         return None
     steps = np.diff(stamp_s)
     usual = float(np.median(steps))
     even = np.abs(steps - usual) < _EVEN * usual
-    third = np.diff(value, 3, axis=0)
     sound = even[:-2] & even[1:-1] & even[2:]
-    left = third[sound] / _SCALE
+    moved = np.diff(value, axis=0)
+    left = np.diff(moved, 2, axis=0)[sound]
+    left /= _SCALE
+    moved = moved[1:-1][sound]
     alive = np.any(left != 0, axis=0)  # an axis that is constant has no noise to be judged
     count = len(left) // _WINDOW
     if count < 3 or not alive.any():
         return None
-    variance = _by_window(left[:, alive], count)
-    moved = _by_window((np.diff(value, axis=0)[1:-1][sound])[:, alive], count)
+    variance = _by_window(left if alive.all() else left[:, alive], count)
+    moved = _by_window(moved if alive.all() else moved[:, alive], count)
     variance = variance[variance > like_noise**2 * moved]
     if len(variance) < 3:
         return None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
 from pipeline.sessions.checks.turns import turned
 from pipeline.sessions.logs.log import BoolArray, Log, Readings
+from pipeline.sessions.usable import usable, within_a_day
 from pipeline.sessions.wanted import of_events, of_stream
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
@@ -15,8 +18,8 @@ from pipeline.study.streams import AccelerationStream, DisplayStream, PositionSt
 from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
-_DAY_NS = 86_400e9
 _RING_STEP_MM = 5.0
+AnyArray = np.ndarray[Any, Any]
 Placed = PositionStream | ReferenceStream | DisplayStream
 
 
@@ -77,7 +80,7 @@ def of_positions(
 ) -> Positions:
     """A stream of positions, those that are not finite left out."""
     whole = _sound(readings, 3)
-    kept = _kept(readings, whole)
+    kept = usable(readings, whole)
     value_mm = kept.values * _MM_PER_M
     if isinstance(stream, ReferenceStream):
         value_mm = turned(_unit(stream.rotation_xyzw), value_mm) + np.array(stream.translation_mm)
@@ -94,11 +97,13 @@ def of_positions(
 def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStream | None = None) -> Imu:
     """A stream of accelerations, those that are not finite left out."""
     whole = _sound(readings, 6)
-    kept, claims = _kept(readings, whole), readings.claims
+    kept, claims = usable(readings, whole), readings.claims
     count = kept.read
 
-    def of(column: FloatArray, otherwise: float) -> FloatArray:
-        return column[whole] if len(column) else np.full(count, otherwise)
+    def of(column: AnyArray, otherwise: float | bool) -> AnyArray:
+        if not len(column):
+            return np.full(count, otherwise)
+        return column if count == readings.read else column[whole]
 
     return Imu(
         name,
@@ -107,8 +112,8 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
         kept.values[:, 3:6],
         kept.values[:, 6:10],
         of(claims.orientation_length, np.nan),
-        of(claims.force_disclaimed.astype(float), 0.0) > 0,
-        of(claims.gyroscope_disclaimed.astype(float), 0.0) > 0,
+        of(claims.force_disclaimed, False),
+        of(claims.gyroscope_disclaimed, False),
         None if stream is None else stream.gravity_mm_s2,
         None if stream is None else stream.noise_sd_mm_s2,
         stream is not None and stream.calibrate_s > 0,
@@ -126,17 +131,15 @@ def _sound(readings: Readings, figures: int) -> BoolArray:
     """Which readings (n,) are usable: their first `figures` values are finite, and their times within a day of most."""
     found: BoolArray = np.all(np.isfinite(readings.values[:, :figures]), axis=1)
     for one in (readings.stamp_ns, readings.arrival_ns):
-        found &= np.abs(one.astype(np.float64) - float(np.median(one))) <= _DAY_NS
+        found &= within_a_day(one)
     return found
-
-
-def _kept(readings: Readings, whole: BoolArray) -> Readings:
-    return Readings(readings.stamp_ns[whole], readings.arrival_ns[whole], readings.values[whole])
 
 
 def _frames(readings: Readings, whole: BoolArray) -> Frames:
     claims = readings.claims
-    return Frames(claims.frames, claims.frame[whole]) if len(claims.frame) else Frames()
+    if not len(claims.frame):
+        return Frames()
+    return Frames(claims.frames, claims.frame if whole.all() else claims.frame[whole])
 
 
 def events(readings: Readings, origin_ns: int) -> Events:

@@ -103,6 +103,8 @@ class Imu:
     @cached_property
     def upright_m_s2(self) -> FloatArray:
         """The specific force where the orientation is known (k, 3), turned by it into the tracker's frame."""
+        if self.oriented.all():
+            return turned(self.orientation_xyzw, self.force_m_s2)
         return turned(self.orientation_xyzw[self.oriented], self.force_m_s2[self.oriented])
 
 

@@ -6,12 +6,18 @@ import numpy as np
 
 from pipeline.statistics.arrays import FloatArray
 
+_AT_ONCE = 2**16
+
 
 def turned(orientation_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Vectors (n, 3) turned by quaternions (n, 4) of about unit length."""
-    axis, scalar = orientation_xyzw[:, :3], orientation_xyzw[:, 3:]
-    twice = 2 * np.cross(axis, vectors)
-    found: FloatArray = vectors + scalar * twice + np.cross(axis, twice)
+    """Vectors (n, 3) turned by quaternions (n, 4) of about unit length, or all by one (1, 4)."""
+    found = np.empty((len(vectors), 3))
+    for begin in range(0, len(vectors), _AT_ONCE):  # what is in between takes five times the memory of the result
+        part = slice(begin, begin + _AT_ONCE)
+        quaternions, own = orientation_xyzw if len(orientation_xyzw) == 1 else orientation_xyzw[part], vectors[part]
+        axis, scalar = quaternions[:, :3], quaternions[:, 3:]
+        twice = 2 * np.cross(axis, own)
+        found[part] = own + scalar * twice + np.cross(axis, twice)
     return found
 
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from mcap.records import Channel
 
+from pipeline.sessions.growing import Growing, MostlyAlike
 from pipeline.sessions.logs.log import BoolArray, Claims, IntArray
 from pipeline.sessions.logs.mcap.fields import Fields
-from pipeline.sessions.logs.mcap.growing import Growing, MostlyAlike
 from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 from pipeline.sessions.logs.mcap.walk import Walk

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.errors import SessionError
+from pipeline.sessions.growing import Growing
 from pipeline.sessions.logs.log import USUAL, Content, IntArray, Readings, Source
 from pipeline.sessions.logs.mcap.claims import ClaimsSoFar
 from pipeline.sessions.logs.mcap.fields import Fields
-from pipeline.sessions.logs.mcap.growing import Growing
 from pipeline.sessions.logs.mcap.messages import Messages, joined
 from pipeline.sessions.logs.mcap.packed import inflated
 from pipeline.sessions.logs.mcap.payload import Decoders, Failures, decoded, events_of, plausible, shortened

@@ -19,6 +19,9 @@ class Growing:
         self._rows: Array = np.empty((0, *width), kind)
         self._count = 0
 
+    def __len__(self) -> int:
+        return self._count
+
     def add(self, rows: Array) -> None:
         """Copy rows to the end."""
         begin, end = self._count, self._count + len(rows)
