@@ -44,28 +44,33 @@ def run(work: Work) -> Outcome:
     """Write the study's trials, measures and exclusions; raises PipelineError for a table that cannot be used."""
     study = work.study
     typed = typed_trials(work)
+    tables.give_back(0 if typed is None else len(typed))
     (trials, selections), movements = all_trials(work, typed), all_movements(work, typed)
     del typed
+    tables.give_back(len(trials))
     every_trial = trials
     given, exclusions = without_practice(study, Tables(trials, selections, movements, measures_table(work)))
     trials, selections, movements, tabled = given.trials, given.selections, given.movements, given.measures
-    values = pd.concat(
+    values = _together(
         [
-            selection_values(study, trials, selections),
+            *selection_values(study, trials, selections),
             completion_values(work, exclusions),
             *movement_values(movements),
             *rated_values(work),
             *tabled_values(work, tabled),
         ]
-    ).reset_index(drop=True)
+    )
     _check_sources(values)
     checked = [*_table_checks(work, values, selections), *further_columns.check_rows(study, every_trial)]
-    scored_by = instruments(study, sorted(set(values["measure"])))
+    tables.give_back(len(values))
+    scored_by = instruments(study, sorted(values["measure"].unique()))
     scores_by_item = items_of(scored_by)
     agreement = list(reliability(scored_by, values))
     scores = score_values(scored_by, values, exclusions)
     score_names = {name for instrument in scored_by for name in instrument.scores}
-    values = pd.concat([values[~values["measure"].isin(_only_items(scores_by_item))], scores]).reset_index(drop=True)
+    if len(scores) or scores_by_item:
+        values = pd.concat([values[~values["measure"].isin(_only_items(scores_by_item))], scores])
+        values = values.reset_index(drop=True)
     known, all_values = excludable(work, values, every_trial) if study.exclusions else values[:0], values
     for excluded in study.exclusions:
         check_exclusion(excluded, known)
@@ -76,6 +81,10 @@ def run(work: Work) -> Outcome:
     if any(excluded.trial is not None and excluded.measure is None for excluded in study.exclusions):
         values = _with_sequences_of(movements, values)
     exclusions += incomplete_trials(trials, movements)
+    for name, rows in (("trials", trials), ("selections", selections), ("movements", movements)):
+        tables.write(name, rows, work.out)
+    del every_trial, given, trials, selections, movements, rows
+    tables.give_back(len(values))
     values = finite_values(values, exclusions)
     measures = _with_totals(study, _cells(values, CELL), CELL, score_names)
     exclusions += gaps(work, measures)
@@ -93,11 +102,20 @@ def run(work: Work) -> Outcome:
         )
     tables.write("orders", order_rows, work.out)
     tables.write("reliability", tables.frame("reliability", agreement), work.out)
-    tables.write("trials", trials, work.out)
-    tables.write("selections", selections, work.out)
-    tables.write("movements", movements, work.out)
     tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
     return Outcome()
+
+
+def _together(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """All rows; those of a study that has but one kind of them keep their types, which take a third of the memory.
+
+    The parts are let go: they are as large as the result.
+    """
+    columns = dict.fromkeys(name for part in parts for name in part)
+    together = pd.concat([part for part in parts if len(part)] or parts).reset_index(drop=True)
+    parts.clear()
+    tables.give_back(len(together))
+    return together.assign(**{str(name): None for name in columns if name not in together})
 
 
 def _listed(excluded: Exclusion) -> Row:
@@ -119,11 +137,13 @@ def _table_checks(work: Work, values: pd.DataFrame, selections: pd.DataFrame) ->
     """Rows of `checks` for what people typed or exported; what comes from logs was checked with them."""
     typed = {str(name) for name in (work.study.questionnaires, work.study.measures) if name is not None}
     file = given_table(work, "trials")
+    values = values[["participant", "measure", "value", "source"]]
     if file is None:
         return table_checks.check_rows(values[values["source"].isin(typed)], None, work.study.scoring)
     theirs = {ours: given for given, ours in file.headers.items()}
     timed = (values["source"] == "the trials") & (values["measure"] == "trial_time_s")
-    trials = values[values["source"].isin(typed) | timed].replace({"source": {"the trials": file.path.name}})
+    trials = values[values["source"].isin(typed) | timed]
+    trials = trials.assign(source=trials["source"].where(trials["source"] != "the trials", file.path.name))
     times = (theirs.get("start_s", "start_s"), theirs.get("selection_s", "selection_s"))
     return table_checks.check_rows(trials, selections, work.study.scoring, times)
 
@@ -151,7 +171,8 @@ def _write_values(
     observed = [*CELL, "session", "period", "sequence"]
     tables.write("measures", measures, folder)
     tables.write("observations", _with_totals(study, _cells(values, observed), observed, scores), folder)
-    by_target = values[values["target"].notna()]
+    known = values["target"].notna()
+    by_target = values if known.all() else values[known]
     factors = {place: json.dumps({"target": place}) for place in by_target["target"].unique()}
     by_target = by_target.assign(factors=by_target["target"].map(factors))
     tables.write("target_observations", _cells(by_target, observed), folder)
@@ -171,8 +192,13 @@ def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[
 
 def _cells(values: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
     """The mean and the number of values of each cell, further factor and measure: one row each."""
-    grouped: Any = values.groupby([*cell, "factors", "measure"], dropna=False, sort=False)["value"]
-    return pd.DataFrame(grouped.agg(["mean", "size"]).reset_index()).rename(columns={"mean": "value", "size": "n"})
+    keys = [*cell, "factors", "measure"]
+    empty = {key: values[key].iloc[:1] for key in keys if len(values) and values[key].isna().all()}  # costs a key each
+    by = [key for key in keys if key not in empty]
+    grouped: Any = values.groupby(by, dropna=False, sort=False)["value"]
+    found = pd.DataFrame(grouped.agg(["mean", "size"]).reset_index())
+    found = found.assign(**{key: one.repeat(len(found)).to_numpy() for key, one in empty.items()})
+    return found[[*keys, "mean", "size"]].rename(columns={"mean": "value", "size": "n"})
 
 
 def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:

@@ -97,6 +97,8 @@ def incomplete_trials(trials: pd.DataFrame, movements: pd.DataFrame) -> list[Row
 def finite_values(values: pd.DataFrame, exclusions: list[Row]) -> pd.DataFrame:
     """The values that are finite; the others are added to `exclusions`."""
     bad = values[~np.isfinite(values["value"])]
+    if bad.empty:
+        return values
     for row in bad.itertuples():
         what = "missing value" if pd.isna(row.value) else "infinite value"
         at = f" ({row.factors})" if isinstance(row.factors, str) else ""

@@ -81,12 +81,12 @@ def _differ(trials: pd.DataFrame) -> bool:
 
 
 def _tested(trials: pd.DataFrame, conditions: Sequence[str]) -> list[Result]:
-    codes = [conditions.index(name) for name in trials["condition"]]
+    codes = pd.Categorical(trials["condition"], categories=list(conditions)).codes
     return learning(
         trials["duration_s"].to_numpy(np.float64),
         trials["order"].to_numpy(np.float64),
-        list(trials["participant"]),
-        np.array(codes, dtype=np.int64),
+        trials["participant"].to_numpy(object).tolist(),
+        codes.astype(np.int64),
         conditions,
     )
 

@@ -131,7 +131,7 @@ def missing_code(name: str, source: str, value: FloatArray, participants: pd.Ser
 
 def _by_questionnaire(values: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """The rows of each questionnaire: of what stands before the slash in a measure's name."""
-    of_each = pd.Series([str(name).partition("/")[0] for name in values["measure"]], values.index, dtype="object")
+    of_each = values["measure"].map({name: str(name).partition("/")[0] for name in values["measure"].unique()})
     for questionnaire, rows in values.groupby(of_each, sort=False):
         yield str(questionnaire), rows
 
@@ -235,8 +235,9 @@ def targets(selections: pd.DataFrame) -> Iterator[Finding]:
     both = selections[[*(f"target_{axis}_mm" for axis in axes), *(f"{axis}_mm" for axis in axes)]].dropna()
     if len(both) < _OTHERS_MIN:
         return
-    aimed, chosen = (np.abs(both.to_numpy(np.float64)[:, half]) for half in (np.s_[: len(axes)], np.s_[len(axes) :]))
-    size, reached = float(np.percentile(aimed, 95)), float(np.percentile(chosen, 95))
+    places = both.to_numpy(np.float64)
+    halves = places[:, : len(axes)], places[:, len(axes) :]
+    size, reached = (float(np.percentile(np.abs(half), 95)) for half in halves)
     found, expected = f"targets to {size:.3g} mm, selections to {reached:.3g} mm", "alike"
     cause = ""
     if max(size, reached) > _UNITS_APART * min(size, reached) > 0:
@@ -245,7 +246,7 @@ def targets(selections: pd.DataFrame) -> Iterator[Finding]:
     elif max(size, reached) > _FARTHEST_MM:
         cause = "no hand reaches so far: the unit is probably not millimetres; give millimetres"
     elif len(axes) > 1:
-        cause = _of_axes(both.to_numpy(np.float64), len(axes))
+        cause = _of_axes(places, len(axes))
     message = (
         f"in the table of trials targets reach {size:.3g} mm and selections {reached:.3g} mm: {cause}" if cause else ""
     )
@@ -257,14 +258,17 @@ def _of_axes(both: FloatArray, axes: int) -> str:
     aimed, chosen = both[:, :2], both[:, axes : axes + 2]
     here = float(np.median(np.linalg.norm(aimed - chosen, axis=1)))
     shift = np.median(aimed - chosen, axis=0)
-    tried = {
-        "the targets' x and y are exchanged; give them in the order of the selections": aimed[:, ::-1],
-        "the targets' y points the other way; give it in the frame of the selections": aimed * np.array([1.0, -1.0]),
-        "the targets' x points the other way; give it in the frame of the selections": aimed * np.array([-1.0, 1.0]),
-        f"all targets are off by ({shift[0]:.0f}, {shift[1]:.0f}) mm; give them in the frame of the selections": aimed
-        - shift,
-    }
-    left = {cause: float(np.median(np.linalg.norm(points - chosen, axis=1))) for cause, points in tried.items()}
+
+    def tried() -> Iterator[tuple[str, FloatArray]]:
+        yield "the targets' x and y are exchanged; give them in the order of the selections", aimed[:, ::-1]
+        turned_y = "the targets' y points the other way; give it in the frame of the selections"
+        yield turned_y, aimed * np.array([1.0, -1.0])
+        turned_x = "the targets' x points the other way; give it in the frame of the selections"
+        yield turned_x, aimed * np.array([-1.0, 1.0])
+        off = f"({shift[0]:.0f}, {shift[1]:.0f}) mm"
+        yield f"all targets are off by {off}; give them in the frame of the selections", aimed - shift
+
+    left = {cause: float(np.median(np.linalg.norm(points - chosen, axis=1))) for cause, points in tried()}
     likely = min(left, key=lambda one: left[one])
     return likely if here > _FAR_FROM_TARGET_MM and left[likely] < _UNDONE * here else ""
 

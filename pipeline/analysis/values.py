@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from pipeline.errors import PipelineError
 from pipeline.sessions import movements
 from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, with_movements
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study import csv_tables as study_tables
 from pipeline.study.settings import Study
 from pipeline.study.table_file import TableFile, table_file
@@ -22,6 +24,9 @@ from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Row
 
 CELL = ["participant", "condition"]
+
+_FIGURES = ("duration_s", "amplitude_mm", "width_mm", "moved_mm", "along_mm")
+"""Of a movement from one trial of a table to the next."""
 
 
 def given_table(work: Work, table: str) -> TableFile | None:
@@ -83,14 +88,28 @@ def all_movements(work: Work, table: pd.DataFrame | None) -> pd.DataFrame:
     """The movements of all sessions, or of `table`, the trials of trials.csv, in the order of their starts."""
     if table is None:
         return tables.read("movements", work.entries["assess"])
-    table = table.sort_values("start_s", kind="stable")
-    table["factors"] = factors_of_rows(work.study, table)
-    table["left_s"] = table["selection_s"]
-    for axis in "xyz":
-        table[f"left_{axis}_mm"] = table[f"selected_{axis}_mm"]
-    cells = [_with_widths(work.study, with_movements(rows)) for _, rows in table.groupby([*CELL, "session"], sort=True)]
-    from_trials = pd.concat(cells).assign(session=lambda rows: rows["session"].replace("", None))
-    return tables.as_table("movements", from_trials).assign(factors=from_trials["factors"])
+    by_start = np.argsort(table["start_s"].to_numpy(np.float64), kind="stable")
+    cell = table.groupby([*CELL, "session"], sort=True).ngroup().to_numpy()[by_start]
+    order = by_start[np.argsort(cell, kind="stable")]
+    # Cell by cell into whole columns: as frames, of which each cell has one, they would be held three times.
+    figures = {name: np.empty(len(table)) for name in _FIGURES}
+    places = np.empty(len(table), np.int64)
+    edges = [0, *np.cumsum(np.bincount(cell)).tolist()]
+    for begin, end in pairwise(edges):
+        moved = _with_widths(work.study, with_movements(_as_left(table.iloc[order[begin:end]])))
+        places[begin:end] = moved["order"].to_numpy(np.int64)
+        for name, column in figures.items():
+            column[begin:end] = moved[name].to_numpy(np.float64)
+    who = table[[*CELL, "session", "trial"]].iloc[order]
+    from_trials = who.assign(session=who["session"].replace("", None), order=places, **figures)
+    factors = factors_of_rows(work.study, table).iloc[order]
+    return tables.as_table("movements", from_trials).assign(factors=factors)
+
+
+def _as_left(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials that end with their selection, which is the only one that a table has."""
+    left = {f"left_{axis}_mm": trials[f"selected_{axis}_mm"] for axis in "xyz"}
+    return trials.assign(left_s=trials["selection_s"], **left)
 
 
 def _with_widths(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
@@ -115,22 +134,29 @@ def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.Da
             "trial": rows.get("trial", pd.NA),
             "factors": rows.get("factors"),
             "period": pd.NA,
-            "measure": measure,
+            "measure": _of_all(measure, rows),
             "value": rows[column].astype("float64"),
-            "source": source,
+            "source": _of_all(source, rows),
         }
     ).astype({"factors": "object", "period": "Int64", "trial": "Int64"})
 
 
-def selection_values(study: Study, trials: pd.DataFrame, selections: pd.DataFrame) -> pd.DataFrame:
+def _of_all(text: str, rows: pd.DataFrame) -> np.ndarray:
+    """A text for every row, of which there is one in memory."""
+    return np.full(len(rows), text, dtype=object)
+
+
+def selection_values(study: Study, trials: pd.DataFrame, selections: pd.DataFrame) -> list[pd.DataFrame]:
     """Squared selection errors (mm², px²) and durations (s), one row per trial, with the trial's `target` by its place.
+
+    Each by itself.
 
     A place in mm is what two trials have in common if they are of one target; None where the target is not known.
     """
-    recorded = trials[trials["estimator"] == "recorded"]
+    recorded = _chosen(trials, trials["estimator"] == "recorded")
     recorded = recorded.assign(target=_targets(recorded, selections))
-    selected = recorded[recorded["squared_error_mm2"].notna()]
-    timed = recorded[recorded["duration_s"].notna()]
+    selected = _chosen(recorded, recorded["squared_error_mm2"].notna())
+    timed = _chosen(recorded, recorded["duration_s"].notna())
     parts = [
         _values(selected, "selection_mse_mm2", "squared_error_mm2", "the trials"),
         _values(timed, "trial_time_s", "duration_s", "the trials"),
@@ -138,20 +164,37 @@ def selection_values(study: Study, trials: pd.DataFrame, selections: pd.DataFram
     if study.display is not None and study.display.unit == "px":
         in_px = parts[0].assign(measure="selection_mse_px2")
         parts.append(in_px.assign(value=in_px["value"] * study.display.px_per_mm**2))
-    return pd.concat([part.assign(target=recorded["target"].reindex(part.index)) for part in parts])
+    return [part.assign(target=recorded["target"].reindex(part.index)) for part in parts]
+
+
+def _chosen(rows: pd.DataFrame, which: pd.Series) -> pd.DataFrame:
+    """Some rows; no copy of a large table of which all are."""
+    return rows if which.all() else rows[which]
 
 
 def _targets(trials: pd.DataFrame, selections: pd.DataFrame) -> pd.Series:
     """`(550, 500)`, the place in mm of each trial's target, with the index of the trials."""
     key, places = [*CELL, "session", "trial"], [f"target_{axis}_mm" for axis in "xyz"]
-    label = [
-        "(" + ", ".join(f"{value:.6g}" for value in place if not np.isnan(value)) + ")"
-        for place in selections[places].to_numpy(np.float64)
-    ]
+    label = _labels(selections[places].to_numpy(np.float64))
+    of_one_table = selections.index.equals(trials.index) and selections[key].equals(trials[key])
+    if of_one_table and (label != "()").all() and not trials.duplicated(key).any():
+        return pd.Series(label, index=trials.index)
     known = selections[key].assign(target=label)
     known = known[known["target"] != "()"].drop_duplicates(key)
     joined = trials[key].merge(known, on=key, how="left")
     return pd.Series(joined["target"].to_numpy(object), index=trials.index).where(lambda place: place.notna(), None)
+
+
+def _labels(places: FloatArray) -> np.ndarray:
+    """The texts (n,) of places (n, d) in mm, of which the same ones are one object."""
+    number = np.zeros(len(places), np.int64)
+    for column in places.T:
+        codes, values = pd.factorize(column, use_na_sentinel=False)
+        number = pd.factorize(number * len(values) + codes)[0]
+    _, first = np.unique(number, return_index=True)
+    texts = ["(" + ", ".join(f"{value:.6g}" for value in place if not np.isnan(value)) + ")" for place in places[first]]
+    labels: np.ndarray = np.array(texts, dtype=object)[number]
+    return labels
 
 
 def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:

@@ -55,11 +55,13 @@ def _curves(
     """
     if not ((values > 0).all() and (orders > 0).all()):
         return NOT_POSITIVE
-    people = list(dict.fromkeys(participants))
-    person = np.array([people.index(name) for name in participants], dtype=np.int64)
+    people = {name: index for index, name in enumerate(dict.fromkeys(participants))}
+    cell = np.array([people[name] for name in participants], dtype=np.int64) * k + conditions
     slopes, starts = np.full((2, len(people), k), np.nan)
-    for at in {(int(p), int(c)) for p, c in zip(person, conditions, strict=True)}:
-        rows = (person == at[0]) & (conditions == at[1])
+    in_order = np.argsort(cell, kind="stable")
+    cells, begins = np.unique(cell[in_order], return_index=True)
+    for number, rows in zip(cells.tolist(), np.split(in_order, begins[1:]), strict=False):
+        at = divmod(number, k)
         x, y = np.log(orders[rows]), np.log(values[rows])
         if np.ptp(x) > 0:
             slopes[at] = np.sum((x - x.mean()) * (y - y.mean())) / np.sum((x - x.mean()) ** 2)

@@ -49,7 +49,7 @@ def by_column(path: Path, form: TableFormat, large_bytes: int = _LARGE_BYTES) ->
     if not content or any(mark in content for mark in (b'"', b"\0", b"\n\n", b"\n\r")) or content[:1] in b"\r\n":
         return None
     first = content.partition(b"\n")[0]
-    if b"\r" in content.replace(b"\r\n", b"\n"):
+    if b"\r" in content and b"\r" in content.replace(b"\r\n", b"\n"):
         return None
     try:
         header = [str(identifier(name.strip())) for name in first.decode().rstrip("\r").split(",")]
@@ -63,8 +63,13 @@ def by_column(path: Path, form: TableFormat, large_bytes: int = _LARGE_BYTES) ->
         )
     except (pa.ArrowException, UnicodeError):
         return None
-    columns = [pc.utf8_trim_whitespace(column.combine_chunks()) for column in table.columns]
-    if "" in header or not len(table) or pc.any(pc.equal(columns[0], "")).as_py():
+    del content
+    given = table.columns
+    del table
+    columns = []
+    while given:  # one after the other, so that the text is not held twice
+        columns.append(pc.utf8_trim_whitespace(given.pop(0).combine_chunks()))
+    if "" in header or not len(columns[0]) or pc.any(pc.equal(columns[0], "")).as_py():
         return None
     return ByColumn(header, columns)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -27,6 +28,7 @@ _SMALL_BYTES = 2**24
 ROWS_AT_ONCE = 2**18
 """Rows of a part of a large table: some tens of megabytes."""
 _PARTS = 256  # tables that are read before they are merged: each takes far more memory than its few rows
+_LINES_AT_ONCE = 2**16
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins like this
 
 
@@ -96,9 +98,15 @@ def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
         return data.copy(deep=False)
     converted = {}
     for column in columns:
-        values = data[column.name] if column.name in data else pd.Series([None] * len(data), index=data.index)
-        converted[column.name] = _typed(values, column.kind)
+        known = column.name in data
+        converted[column.name] = _typed(data[column.name], column.kind) if known else _missing(column.kind, data.index)
     return pd.DataFrame(converted, index=data.index)
+
+
+def _missing(kind: pa.DataType, index: pd.Index) -> pd.Series:
+    if kind == FLOAT:
+        return pd.Series(np.nan, index=index, dtype="float64")
+    return pd.Series(pd.NA, index=index, dtype="string" if kind == TEXT else "Int64")
 
 
 def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
@@ -164,7 +172,28 @@ def write_csv(name: str, data: pd.DataFrame, folder: Path) -> None:
     for column in table.columns[[str(kind) == "string" for kind in table.dtypes]]:
         risky = table[column].str.startswith(_FORMULA).fillna(False).astype(bool)
         table[column] = table[column].where(~risky, "'" + table[column])
-    table.to_csv(folder / f"{name}.csv", index=False)
+    with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")  # half of the time of pandas, and the same bytes
+        rows.writerow(table.columns)
+        for begin in range(0, len(table), _LINES_AT_ONCE):
+            part = table.iloc[begin : begin + _LINES_AT_ONCE]
+            rows.writerows(zip(*(_cells(part[column]) for column in part), strict=True))
+
+
+def _cells(column: pd.Series) -> list[Any]:
+    """A column's values as Python's, None where there is none."""
+    cells: np.ndarray[Any, Any]
+    if column.dtype == np.float64:
+        cells = column.to_numpy()
+        missing = np.isnan(cells)
+        if missing.any():
+            cells = cells.astype(object)
+            cells[missing] = None
+    else:
+        cells = np.array(column, dtype=object)
+        cells[column.isna().to_numpy()] = None
+    listed: list[Any] = cells.tolist()
+    return listed
 
 
 def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
