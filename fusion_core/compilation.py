@@ -25,13 +25,13 @@ _numba_settings = Lock()
 
 
 class Compiler:
-    """A decorator: `@compiled`, or `@compiled(fastmath=True)` with further options of `numba.njit`.
+    """A decorator: `@compiled`, `@compiled(inner=True)`, or with further options of `numba.njit`.
 
     It is for the functions of one package, which is a folder. They may call each other and those of fusion_core. They
     must not use functions or constants from anywhere else, since a change there would not be noticed.
 
-    A function whose name begins with an underscore is called by compiled functions alone: no entry from Python is made
-    for it, and for none one from C. Entries take a quarter of the time that compiling takes.
+    A function that is `inner`, or whose name begins with an underscore, is called by compiled functions alone: no entry
+    from Python is made for it, and for none one from C. Entries take a quarter of the time that compiling takes.
     """
 
     def __init__(self, package: Path) -> None:
@@ -40,14 +40,14 @@ class Compiler:
     @overload
     def __call__(self, function: Function) -> Function: ...
     @overload
-    def __call__(self, **options: Any) -> Callable[[Function], Function]: ...
-    def __call__(self, function: Function | None = None, **options: Any) -> Any:
+    def __call__(self, *, inner: bool = False, **options: Any) -> Callable[[Function], Function]: ...
+    def __call__(self, function: Function | None = None, *, inner: bool = False, **options: Any) -> Any:
         if function is None:
-            return lambda wanted: self._compile(wanted, options)
-        return self._compile(function, options)
+            return lambda wanted: self._compile(wanted, inner, options)
+        return self._compile(function, inner, options)
 
-    def _compile(self, function: Callable[..., Any], options: dict[str, Any]) -> Any:
-        inner = function.__name__.startswith("_")
+    def _compile(self, function: Callable[..., Any], inner: bool, options: dict[str, Any]) -> Any:
+        inner = inner or function.__name__.startswith("_")
         options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": inner, **options}
         folder = code_folder(self._package, numba.config.CACHE_DIR)  # type: ignore[attr-defined]
         if folder is None:

@@ -87,7 +87,7 @@ class Readings(NamedTuple):
     force_mm_s2: FloatArray
 
 
-@compiled
+@compiled(inner=True, inline="always")
 def show(live: Live, readings: Readings, instants: FloatArray, index: int, shown: FloatArray) -> None:
     """Writes the position displayed at `instants[index]` into `shown[index]` (d,) in mm; NaN before the first frame."""
     if live.kind == _WINDOW:
@@ -114,16 +114,18 @@ def _show_position(live: Live, readings: Readings, now: float, shown: FloatArray
                 dt = arrival[upcoming] - arrival[upcoming - 1]
                 mean, covariance = position_steps.predict(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)
                 position_steps.correct(mean, covariance, value, kalman.noise_variance)
-            kalman.mean[:], kalman.covariance[:] = mean, covariance
+            for row in range(3):
+                _copy(mean[row], kalman.mean[row])
+                _copy(covariance[row], kalman.covariance[row])
         upcoming += 1
     live.at[_UPCOMING] = upcoming
     if upcoming == 0:
         shown[:] = np.nan
     elif live.kind == _RAW:
-        shown[:] = readings.frame_mm[upcoming - 1]
+        _copy(readings.frame_mm[upcoming - 1], shown)
     else:
         dt = max(now - arrival[upcoming - 1], 0.0) + kalman.ahead_s
-        shown[:] = position_steps.predict_position(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)[0]
+        _copy(position_steps.predict_position(kalman.mean, kalman.covariance, dt, kalman.jerk_psd_mm2_s5)[0], shown)
 
 
 @compiled
@@ -169,7 +171,14 @@ def _show_event_time(live: Live, readings: Readings, now: float, shown: FloatArr
     if span[1] == 0:
         shown[:] = np.nan
         return
-    shown[:] = predict_position(event.model, event.history, span[1] - 1, now)[0]
+    _copy(predict_position(event.model, event.history, span[1] - 1, now)[0], shown)
+
+
+@compiled
+def _copy(values: FloatArray, into: FloatArray) -> None:
+    """Element by element: an assignment of slices takes long to compile, for the message about unlike shapes."""
+    for index in range(len(values)):
+        into[index] = values[index]
 
 
 def live(

@@ -50,7 +50,7 @@ _ACCELERATION_SD = 5000.0  # mm/s²: the acceleration itself, of members that do
 _PP, _PV, _PR, _PN, _VV, _VR, _VN, _RR, _RN, _NN = range(10)
 
 
-@compiled
+@compiled(inner=True)
 def begin(model: Model, state: State, position: FloatArray) -> None:
     """All members at the first position."""
     for member in range(MEMBERS):
@@ -59,7 +59,7 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
     judge(model, state)
 
 
-@compiled
+@compiled(inner=True)
 def begin_again(model: Model, state: State, position: FloatArray) -> None:
     """The motion begins anew at a position; weights stay."""
     mean, own = state.bank_mean, state.bank_covariance
@@ -76,7 +76,7 @@ def begin_again(model: Model, state: State, position: FloatArray) -> None:
         own[_VV, member], own[_RR, member], own[_PN, member] = model.prior[VELOCITY], rate * rate, -drift
 
 
-@compiled
+@compiled(inner=True)
 def considered(model: Model, state: State, turned: FloatArray, coupling: FloatArray, dt: float) -> tuple[float, float]:
     """Variance of positions and density of accelerations, an axis, that come of what is not known yet.
 
@@ -99,7 +99,7 @@ def considered(model: Model, state: State, turned: FloatArray, coupling: FloatAr
     return position / model.dimension, acceleration * _CORRELATED_S / model.dimension
 
 
-@compiled
+@compiled(inner=True)
 def move(model: Model, state: State, dt: float, net: FloatArray, more_psd: float) -> None:
     """All members moved over `dt` seconds, with the first and second integrals `net` (2, 3) of the accelerations.
 
@@ -141,7 +141,7 @@ def _move_means(model: Model, state: State, dt: float, net: FloatArray) -> None:
             mean[9 + axis, member] *= state.kept[member]
 
 
-@compiled
+@compiled(inner=True)
 def take_in(model: Model, state: State, position: FloatArray, more_variance: float, dt: float) -> None:
     """A position taken in by all members, and their weights moved by how likely it was to each."""
     since = state.fact[AT] - state.fact[BEGAN]
@@ -187,7 +187,7 @@ def _correct(dimension: int, mean: FloatArray, own: FloatArray, apart: FloatArra
         own[_NN, member] -= share * n * n
 
 
-@compiled
+@compiled(inner=True)
 def weighed(model: Model, squared: float, variance: float) -> float:
     """The log density of a position, of normal noise, beyond `surprise` falling only as a power."""
     log_density = -0.5 * model.dimension * np.log(variance)
@@ -197,7 +197,7 @@ def weighed(model: Model, squared: float, variance: float) -> float:
     return float(log_density - 0.5 * squared)
 
 
-@compiled
+@compiled(inner=True)
 def judge(model: Model, state: State) -> None:
     """The scales as the members that use the phone see them, averages of logarithms by weight.
 
@@ -232,7 +232,7 @@ def _to_shares(model: Model, state: State, begin: int, end: int) -> None:
         state.share[member] /= total
 
 
-@compiled
+@compiled(inner=True)
 def by_positions(model: Model, state: State, ahead_s: float, answers: FloatArray) -> None:
     """What members that do not use the phone say of the position, `ahead_s` gone on and held, into `answers`."""
     mean = state.bank_mean

@@ -44,7 +44,7 @@ _LEAST_SD_S = 0.002  # the past is forgotten so far as to leave no more certaint
 _RATE_SD, _RATE_PSD = 1000.0, 900.0  # of the acceleration error, as in the bank
 
 
-@compiled
+@compiled(inner=True)
 def begin(model: Model, state: State, position: FloatArray) -> None:
     """At the first position."""
     for one in range(OFFSETS):
@@ -53,7 +53,7 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
     judge(state)
 
 
-@compiled
+@compiled(inner=True)
 def begin_again(model: Model, state: State, position: FloatArray) -> None:
     """The motion begins anew at a position; weights stay."""
     own, drift = state.clock_covariance, state.fact[NOISE_DRIFT]
@@ -70,7 +70,7 @@ def begin_again(model: Model, state: State, position: FloatArray) -> None:
                 state.clock_mean[one, 0, axis] = position[axis]
 
 
-@compiled
+@compiled(inner=True)
 def take_in(
     model: Model,
     state: State,
@@ -162,7 +162,7 @@ def _correct(model: Model, state: State, apart: FloatArray, more: float, dt: flo
             own[row, column] -= shared[row] * shared[column] / variance
 
 
-@compiled
+@compiled(inner=True)
 def judge(state: State) -> None:
     """The offset and its variance: the parabola of the log weights about the highest, with the prior."""
     broad, best, highest = 1.0 / _PRIOR_SD_S**2, 0, -np.inf

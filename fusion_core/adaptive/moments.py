@@ -14,7 +14,7 @@ from fusion_core.samples import FloatArray
 _MOVED = 6  # position and velocity
 
 
-@compiled
+@compiled(inner=True)
 def inputs_of(state: State, total: FloatArray, coupling: FloatArray, net: FloatArray) -> None:
     """Integrals (2, ROW) of the readings less what the input states put into them, into `net` (2, 3)."""
     for order in range(2):
@@ -25,7 +25,7 @@ def inputs_of(state: State, total: FloatArray, coupling: FloatArray, net: FloatA
             net[order, axis] = left
 
 
-@compiled
+@compiled(inner=True)
 def move(model: Model, state: State, dt: float, net: FloatArray, coupling: FloatArray, psd: float) -> None:
     """Both moved over `dt` seconds. `net` (2, 3) and `coupling` (2, 3, INPUTS) are of first and second integrals.
 
@@ -75,7 +75,7 @@ def _add_noise(model: Model, state: State, dt: float, psd: float) -> None:
         covariance[one, one] += model.walk[one] * dt
 
 
-@compiled
+@compiled(inner=True)
 def fade(state: State, dt: float, variance: float, time_s: float) -> None:
     """The tracker's correlated noise, a first-order autoregression, moved over `dt` seconds."""
     mean, covariance = state.mean, state.covariance
@@ -91,7 +91,7 @@ def fade(state: State, dt: float, variance: float, time_s: float) -> None:
         covariance[row, row] += (1.0 - kept * kept) * variance
 
 
-@compiled
+@compiled(inner=True)
 def to_phone(state: State, turned: FloatArray) -> None:
     """From the tracked point to the phone, once its rotation (3, 3) is known: p − R r, with r the lever arm."""
     mean, covariance = state.mean, state.covariance
@@ -107,7 +107,7 @@ def to_phone(state: State, turned: FloatArray) -> None:
                 covariance[row, POSITION + axis] -= turned[axis, arm] * covariance[row, ARM + arm]
 
 
-@compiled
+@compiled(inner=True)
 def correct(model: Model, state: State, ago: float, turned: FloatArray, position: FloatArray, variance: float) -> None:
     """A position taken in that was measured `ago` seconds before the state's time.
 
@@ -191,7 +191,7 @@ def _gain(
             covariance[one, other] = covariance[other, one] = left
 
 
-@compiled
+@compiled(inner=True)
 def begin(model: Model, state: State, position: FloatArray) -> None:
     """Both at the first position."""
     mean, covariance = state.mean, state.covariance
@@ -204,7 +204,7 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
         mean[POSITION + axis] = position[axis]
 
 
-@compiled
+@compiled(inner=True)
 def begin_again(model: Model, state: State, position: FloatArray) -> None:
     """The motion is forgotten and begins at a position; what is known of phone and tracker stays."""
     mean, covariance = state.mean, state.covariance

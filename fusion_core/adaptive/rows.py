@@ -58,7 +58,7 @@ _CLIPS_AFTER = 2  # readings as large as the largest: of a coarse one two may ag
 _ROUND_OFF = 1e-9
 
 
-@compiled
+@compiled(inner=True)
 def put_in(model: Model, state: State, phone: Phone, reading: FloatArray) -> int:
     """A reading put in at its time; returns where, −1 if there is one of that time. There must be room."""
     count, time = state.count[ROWS], reading[TIME] - state.fact[PHONE_AHEAD]
@@ -120,7 +120,7 @@ def _copy_row(phone: Phone, of: int, to: int) -> None:
         phone.shown[to, column] = phone.shown[of, column]
 
 
-@compiled
+@compiled(inner=True)
 def let_go(state: State, phone: Phone, first: int) -> None:
     """The rows before `first` are no longer kept."""
     count = state.count[ROWS]
@@ -129,7 +129,7 @@ def let_go(state: State, phone: Phone, first: int) -> None:
     state.count[ROWS] = count - first
 
 
-@compiled
+@compiled(inner=True)
 def row_before(phone: Phone, count: int, time: float) -> int:
     """The newest row that is not after a time; the first if all are."""
     return _before(phone.time, count, time)
@@ -143,7 +143,7 @@ def _before(times: FloatArray, count: int, time: float) -> int:
     return at
 
 
-@compiled
+@compiled(inner=True)
 def integrate(times: FloatArray, count: int, values: FloatArray, begin: float, end: float, total: FloatArray) -> float:
     """First and second integrals of the first k columns of `values` from `begin` to `end` into `total` (2, k).
 
@@ -202,7 +202,7 @@ def _held(
     return (dt - held) * SILENT_PSD
 
 
-@compiled
+@compiled(inner=True)
 def between(phone: Phone, count: int, time: float, arm: FloatArray) -> None:
     """The corrected lever arm (3,) at a time, by a straight line between rows; the first or last outside."""
     if count == 0:
@@ -217,7 +217,7 @@ def between(phone: Phone, count: int, time: float, arm: FloatArray) -> None:
         arm[axis] = (1.0 - share) * phone.corrected[row, 3 + axis] + share * phone.corrected[following, 3 + axis]
 
 
-@compiled
+@compiled(inner=True)
 def correct(state: State, phone: Phone, first: int, dimension: int) -> None:
     """From the row `first` on: accelerations less what the input states put into them, and lever arms."""
     mean, up, level, felt, count = state.mean, np.zeros(3), np.zeros(3), False, state.count[ROWS]
@@ -244,7 +244,7 @@ def correct(state: State, phone: Phone, first: int, dimension: int) -> None:
                 phone.corrected[at, axis] -= mean[TURN] * level[axis] + mean[TURN + 1] * across
 
 
-@compiled
+@compiled(inner=True)
 def couple(
     state: State, phone: Phone, total: FloatArray, order: int, span: float, dimension: int, coupling: FloatArray
 ) -> None:
@@ -287,7 +287,7 @@ def _upward(phone: Phone, row: int, up: FloatArray) -> None:
             up[axis] /= np.sqrt(squared)
 
 
-@compiled
+@compiled(inner=True)
 def turned_at(state: State, phone: Phone, time: float, turned: FloatArray) -> bool:
     """The phone's rotation at a time into `turned` (3, 3), between rows by a straight line; false where unknown."""
     count = state.count[ROWS]

@@ -65,7 +65,7 @@ _MOST_SURPRISE = 9.0  # of one frame, three SDs: a stray one says little about t
 _LEAST_OF_NOISE = 0.2  # of the noise's variance, in positions alone: five frames averaged
 
 
-@compiled
+@compiled(inner=True)
 def fused(model: Model, state: State, phone: Phone, time: float, answers: FloatArray) -> float:
     """The fusion's position at a time, into `answers`; returns its variance, the mean over axes."""
     dimension, newest, at = model.dimension, state.count[ROWS] - 1, state.fact[AT]
@@ -103,7 +103,7 @@ def fused(model: Model, state: State, phone: Phone, time: float, answers: FloatA
     return float(variance / dimension + psd_dt2 * dt / 3.0 + of_silence)
 
 
-@compiled
+@compiled(inner=True)
 def answer(model: Model, state: State, phone: Phone, time: float, answers: FloatArray) -> None:
     """What is shown at a time, and what it is mixed of, as a row of `Phone.shown`."""
     for axis in range(3):
@@ -153,7 +153,7 @@ def _weights(model: Model, state: State, weight: FloatArray) -> None:
         weight[one] /= total
 
 
-@compiled
+@compiled(inner=True)
 def score(model: Model, state: State, phone: Phone, time: float, position: FloatArray) -> None:
     """What was shown for `time` held against the position that has now come."""
     row, shown = row_before(phone, state.count[ROWS], time), phone.shown
@@ -199,7 +199,7 @@ def _of_either_clock(model: Model, state: State) -> float:
     return float(0.5 * squared * state.fact[CLOCK_S] ** 2)
 
 
-@compiled
+@compiled(inner=True)
 def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArray, sd: FloatArray, at: int) -> None:
     """Position and SD at a time, into row `at` of `mean` and `sd`; NaN before the first position."""
     if state.count[TAKEN] == 0:

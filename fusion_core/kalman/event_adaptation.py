@@ -19,7 +19,7 @@ _JERK_HORIZON_S = 1.0
 _REJECTED_IN_A_ROW = 3  # then the hand really has moved that far, and the next reading is accepted
 
 
-@compiled
+@compiled(inner=True)
 def measure_jerk(
     axes: tuple[int, ...],
     adapted: FloatArray,
@@ -54,7 +54,7 @@ def measure_jerk(
         adapted[row, JERK_PSD] = least * (max(measured, least) / least) ** share if share > 0.0 else least
 
 
-@compiled
+@compiled(inner=True)
 def judge(adapted: FloatArray, row: int, squared: float, seen: int, gate: float, adaptation: float) -> bool:
     """Whether a position is accepted by the gate; also adapts the accelerations' noise to its squared innovation.
 

@@ -13,7 +13,7 @@ from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
 
-@compiled
+@compiled(inner=True)
 def observe(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -50,7 +50,7 @@ def observe(
     return variance, expected
 
 
-@compiled
+@compiled(inner=True)
 def correct(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -76,7 +76,7 @@ def correct(
             covariance[row, state, other] = covariance[row, other, state] = both
 
 
-@compiled
+@compiled(inner=True)
 def squared_innovation(
     states: tuple[int, ...],
     axes: tuple[int, ...],

@@ -87,7 +87,7 @@ def empty_history(capacity: int, dimension: int, constants: int, states: int) ->
     )
 
 
-@compiled
+@compiled(inner=True)
 def copy_rows(of: History, into: History, first: int, count: int, at: int) -> None:
     """The rows first:count of a history into another from row `at` on; or further up into the same.
 
@@ -109,7 +109,7 @@ def copy_rows(of: History, into: History, first: int, count: int, at: int) -> No
             into.adapted[to, fact] = of.adapted[row, fact]
 
 
-@compiled
+@compiled(inner=True)
 def write_reading(
     history: History, row: int, time: float, sensor: int, value: FloatArray, coupling: FloatArray
 ) -> None:

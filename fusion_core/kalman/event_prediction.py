@@ -9,7 +9,7 @@ from fusion_core.kalman.motion import Motion, add_wiener_noise, step
 from fusion_core.samples import FloatArray
 
 
-@compiled
+@compiled(inner=True)
 def move_wiener(
     axes: tuple[int, ...],
     constants: tuple[int, ...],
@@ -48,7 +48,7 @@ def move_wiener(
         add_wiener_noise(density, dt, covariance[row], dimension, axis)
 
 
-@compiled
+@compiled(inner=True)
 def whole_step(motion: Motion, dimension: int, size: int, dt: float, density: float) -> tuple[FloatArray, FloatArray]:
     """Transition and process noise (size, size) of all states of all axes over `dt` seconds; constants stay."""
     states = len(motion.stationary)
@@ -63,7 +63,7 @@ def whole_step(motion: Motion, dimension: int, size: int, dt: float, density: fl
     return transition, noise
 
 
-@compiled
+@compiled(inner=True)
 def move_anchored(
     motion: Motion, dimension: int, mean: FloatArray, covariance: FloatArray, row: int, dt: float, density: float
 ) -> None:

@@ -11,7 +11,7 @@ from fusion_core.kalman.motion import position_step
 from fusion_core.samples import FloatArray
 
 
-@compiled
+@compiled(inner=True)
 def insert_reading(
     model: Model,
     history: History,

@@ -164,7 +164,7 @@ def update_rows(model: Model, history: History, first: int, count: int) -> None:
                 correct(states, axes, constants, mean, covariance, row, column, precision, innovation)
 
 
-@compiled
+@compiled(inner=True)
 def insert(
     model: Model,
     history: History,
@@ -196,7 +196,7 @@ def insert(
     return at
 
 
-@compiled
+@compiled(inner=True)
 def write_prediction(
     states: tuple[int, ...],
     axes: tuple[int, ...],
@@ -234,7 +234,7 @@ def predict_position(model: Model, history: History, row: int, time: float) -> t
     return mean[0], sd[0]
 
 
-@compiled
+@compiled(inner=True)
 def oldest_needed(time: FloatArray, oldest: int, count: int, history_s: float) -> int:
     """The oldest row that a late reading may still be inserted after: the newest of those older than `history_s`."""
     since = time[count - 1] - history_s

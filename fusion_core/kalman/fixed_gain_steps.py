@@ -164,7 +164,7 @@ def insert_into_copy(gains: Gains, rows: Rows, copy: Rows, time: float, is_frame
     return at
 
 
-@compiled(inline="always")
+@compiled(inner=True, inline="always")
 def write_prediction(
     gains: Gains, rows: Rows, row: int, time: float, mean: FloatArray, sd: FloatArray, index: int
 ) -> None:

@@ -119,7 +119,7 @@ def _series(nilpotent: FloatArray) -> FloatArray:
     return np.array(powers, dtype=np.float64)
 
 
-@compiled
+@compiled(inner=True)
 def add_wiener_noise(density: float, dt: float, noise: FloatArray, apart: int, axis: int) -> None:
     """Adds the process noise over `dt` s to position, velocity and acceleration of one axis, in place.
 
@@ -138,7 +138,7 @@ def add_wiener_noise(density: float, dt: float, noise: FloatArray, apart: int, a
     noise[rate, rate] += density * dt
 
 
-@compiled
+@compiled(inner=True)
 def step(motion: Motion, dt: float, jerk_psd: float, transition: FloatArray, noise: FloatArray) -> None:
     """Writes the transition and the process noise over `dt` seconds, (states, states) each, for one axis.
 
@@ -157,7 +157,7 @@ def step(motion: Motion, dt: float, jerk_psd: float, transition: FloatArray, noi
     add_wiener_noise(max(motion.jerk_psd_mm2_s5, jerk_psd), dt, noise, 1, 0)
 
 
-@compiled
+@compiled(inner=True)
 def position_step(motion: Motion, dt: float, jerk_psd: float, of_position: FloatArray) -> float:
     """Writes the position's row (states,) of the transition over `dt` seconds; returns the position's process noise."""
     if not motion.anchored:

@@ -1,4 +1,8 @@
-"""The position-only Kalman filter, compiled. All axes have the same sensor and so share one covariance."""
+"""The position-only Kalman filter, compiled. All axes have the same sensor and so share one covariance.
+
+Arrays are copied element by element: an assignment of slices, with the message about shapes that do not fit, takes
+longer to compile than the whole filter.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,8 @@ def begin(
 ) -> tuple[FloatArray, FloatArray]:
     """Mean (3, d) and covariance (3, 3) of position, velocity and acceleration at the first frame."""
     mean, covariance = np.zeros((3, len(value))), np.zeros((3, 3))
-    mean[0] = value
+    for axis in range(len(value)):
+        mean[0, axis] = value[axis]
     covariance[0, 0], covariance[1, 1], covariance[2, 2] = noise_variance, speed_sd**2, acceleration_sd**2
     return mean, covariance
 
@@ -36,14 +41,18 @@ def predict(
 @compiled
 def correct(mean: FloatArray, covariance: FloatArray, value: FloatArray, noise_variance: float) -> None:
     """Corrects mean and covariance by a frame, in place. Joseph's form keeps the covariance symmetric and positive."""
-    gain = covariance[:, 0] / (covariance[0, 0] + noise_variance)
-    innovation = value - mean[0]
-    keep = np.eye(3)
+    keep, gain, variance = np.eye(3), np.empty(3), covariance[0, 0] + noise_variance
     for row in range(3):
+        gain[row] = covariance[row, 0] / variance
         keep[row, 0] -= gain[row]
-        for axis in range(len(value)):
-            mean[row, axis] += gain[row] * innovation[axis]
-    covariance[:] = keep @ covariance @ keep.T + noise_variance * np.outer(gain, gain)
+    for axis in range(len(value)):
+        innovation = value[axis] - mean[0, axis]
+        for row in range(3):
+            mean[row, axis] += gain[row] * innovation
+    kept = keep @ covariance @ keep.T
+    for row in range(3):
+        for column in range(3):
+            covariance[row, column] = kept[row, column] + noise_variance * (gain[row] * gain[column])
 
 
 @compiled
@@ -79,5 +88,7 @@ def replay(
             upcoming += 1
         if upcoming > 0:
             dt = max(times[index] - arrival[upcoming - 1], 0.0) + ahead_s
-            shown[index], sd[index] = predict_position(mean, covariance, dt, jerk_psd_mm2_s5)
+            position, sd_mm = predict_position(mean, covariance, dt, jerk_psd_mm2_s5)
+            for axis in range(len(position)):
+                shown[index, axis], sd[index, axis] = position[axis], sd_mm
     return shown, sd

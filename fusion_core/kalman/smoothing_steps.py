@@ -23,7 +23,7 @@ def _step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatAr
     return transition, noise
 
 
-@compiled
+@compiled(inner=True)
 def step_back(
     model: Model,
     mean: FloatArray,
@@ -60,7 +60,7 @@ def _at(
     return mean[: len(model.axes)].copy(), np.sqrt(np.diag(covariance)[: len(model.axes)])
 
 
-@compiled
+@compiled(inner=True)
 def smoothed_at(model: Model, history: History, oldest: int, count: int, time: float) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (dimension,) of the position at `time`, within the rows from `oldest` to `count`."""
     mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()

@@ -56,7 +56,7 @@ def _polynomial(order: int, inverse_scale_s2: float) -> FloatArray:
     return polynomial
 
 
-@compiled
+@compiled(inner=True)
 def covariance(
     inverse_scale_s2: float,
     begins: IntArray,

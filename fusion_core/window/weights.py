@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import objmode
 
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
@@ -76,6 +77,15 @@ def _covariances(
         with_now[row] = covariance(inverse_scale, begins, shift, polynomial, shared, own, position, at - now)
 
 
+def _least_squares(
+    among: FloatArray, first: FloatArray, second: FloatArray, of_first: FloatArray, of_second: FloatArray
+) -> None:
+    """The shortest solutions; `among` is known by its lower triangle."""
+    whole = np.tril(among) + np.tril(among, -1).T
+    solution = np.linalg.lstsq(whole, np.column_stack([first, second]), rcond=np.finfo(np.float64).eps)[0]
+    of_first[:], of_second[:] = solution.T
+
+
 @compiled(fastmath={"reassoc", "contract"})  # otherwise the additions could not run in parallel
 def _solve(
     among: FloatArray, first: FloatArray, second: FloatArray, of_first: FloatArray, of_second: FloatArray
@@ -94,8 +104,8 @@ def _solve(
             elif rest > 0.0:
                 factor[row, row] = np.sqrt(rest)
             else:
-                whole = np.tril(among) + np.tril(among, -1).T
-                of_first[:], of_second[:] = np.linalg.lstsq(whole, first)[0], np.linalg.lstsq(whole, second)[0]
+                with objmode():  # seldom needed, and the compiled form takes a fifth of what compiling a window takes
+                    _least_squares(among, first, second, of_first, of_second)
                 return
     for right, solution in ((first, of_first), (second, of_second)):
         for row in range(size):

@@ -328,7 +328,7 @@ def _move(person: Person, tremor: Sway, drift: Sway, hand: Hand, now: float, dra
         sway(drift, hand.drift, axis, draws.standard_normal())
 
 
-@compiled(forceinline=True)
+@compiled(inner=True, forceinline=True)
 def advance(
     person: Person,
     layout: Layout,

@@ -7,13 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numba
 import pytest
 
 import fusion_core
-import pipeline
+from tests.conftest import CLONE
 
 # The position filter's step is in one file and calls the process noise, in another. What it prints: the noise that a
 # second adds to the position, and how often the step was taken from kept machine code.
@@ -75,28 +76,58 @@ def test_a_package_that_cannot_be_written_to_compiles_in_memory(package: Path) -
     assert sorted(package.parent.rglob("*")) == before
 
 
-def is_compiled(function: ast.FunctionDef) -> bool:
-    names = (mark.func if isinstance(mark, ast.Call) else mark for mark in function.decorator_list)
-    return any(isinstance(name, ast.Name) and name.id == "compiled" for name in names)
+def options_of(function: ast.FunctionDef) -> set[str] | None:
+    """Those of `@compiled` that are true; None for a function that is not compiled."""
+    for mark in function.decorator_list:
+        name = mark.func if isinstance(mark, ast.Call) else mark
+        if isinstance(name, ast.Name) and name.id == "compiled":
+            return {str(option.arg) for option in mark.keywords} if isinstance(mark, ast.Call) else set()
+    return None
 
 
-SOURCES = sorted(
-    path for package in (fusion_core, pipeline) for path in Path(str(package.__file__)).parent.rglob("*.py")
-)
+def functions_in(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, bool, bool]]:
+    """Each function, whether it is compiled, and whether it has no entry from Python."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            options = options_of(node)
+            compiled = options is not None
+            yield node, compiled, compiled and (node.name.startswith("_") or "inner" in (options or ()))
+
+
+SOURCES = {
+    ".".join(path.relative_to(CLONE).with_suffix("").parts).removesuffix(".__init__"): path
+    for package in ("fusion_core", "pipeline", "tests")
+    for path in sorted((CLONE / package).rglob("*.py"))
+}
 
 
 def test_python_calls_no_function_that_has_no_entry_from_python() -> None:
-    """That would end the process: a compiled function whose name begins with an underscore is for compiled ones."""
+    """That would end the process: an inner compiled function is for compiled ones."""
+    texts = {module: path.read_text(encoding="utf-8") for module, path in SOURCES.items()}
+    compiling = ("fusion_core", "pipeline.simulation")  # the packages with compiled functions
+    trees = {module: ast.parse(text) for module, text in texts.items() if any(package in text for package in compiling)}
+    inner = {
+        (module, function.name)
+        for module, tree in trees.items()
+        for function, _, is_inner in functions_in(tree)
+        if is_inner
+    }
+    assert ("fusion_core.kalman.event_steps", "insert") in inner
+    assert ("fusion_core.kalman.event_steps", "_subtract_constants") in inner
     calls = []
-    for path in SOURCES:
-        functions = [
-            node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.FunctionDef)
-        ]
-        inner = {function.name for function in functions if is_compiled(function) and function.name.startswith("_")}
-        for function in functions:
-            if not is_compiled(function):
-                used = {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
-                calls += [(path.name, function.name, name) for name in sorted(used & inner)]
+    for module, tree in trees.items():
+        names = {name: (of, name) for of, name in inner if of == module}
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        names |= {one.asname or one.name: (str(node.module), one.name) for node in imports for one in node.names}
+        for function, compiled, _ in functions_in(tree):
+            for node in ast.walk(function) if not compiled else ():
+                if isinstance(node, ast.Name):
+                    used = names.get(node.id, ("", ""))
+                elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                    used = ".".join(names.get(node.value.id, ("", ""))), node.attr
+                else:
+                    continue
+                calls += [(module, function.name, used)] if used in inner else []
     assert calls == []
 
 
