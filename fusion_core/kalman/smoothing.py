@@ -28,7 +28,9 @@ def smooth(estimator: FusionKalman, samples: Mapping[str, Samples], times: Float
     history = steps.filtered(samples)
     if history is not None:
         rising = np.asarray(times, dtype=np.float64)[order]
-        mean[order], sd[order] = smoothing_steps.smooth(steps.model, history, rising)
+        mean[order], sd[order] = smoothing_steps.smooth(
+            steps.model.motion, steps.dimension, steps.model.constant_psd, history, rising
+        )
     return Track(times, mean, sd)
 
 

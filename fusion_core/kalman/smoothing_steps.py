@@ -1,4 +1,9 @@
-"""Smoothing, compiled: what later readings say about an earlier instant (Rauch, Tung and Striebel 1965)."""
+"""Smoothing, compiled: what later readings say about an earlier instant (Rauch, Tung and Striebel 1965).
+
+The steps back take the motion, the number of axes and the constants' random walks in place of the whole `Model`, whose
+tuples would have them compiled anew for every number of axes and constants: they take long to compile, and are products
+of whole matrices, which gain nothing from loops of known length.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +14,27 @@ from fusion_core.kalman.event_history import JERK_PSD, History, Model, Readings
 from fusion_core.kalman.event_prediction import whole_step
 from fusion_core.kalman.event_replay import insert_reading
 from fusion_core.kalman.event_steps import write_prediction
-from fusion_core.kalman.motion import position_step
+from fusion_core.kalman.motion import Motion, position_step
 from fusion_core.samples import FloatArray
 
 
 @compiled
-def _step(model: Model, dt: float, jerk_psd: float) -> tuple[FloatArray, FloatArray]:
+def _step(
+    motion: Motion, dimension: int, constant_psd: FloatArray, dt: float, jerk_psd: float
+) -> tuple[FloatArray, FloatArray]:
     """Transition and process noise over `dt` seconds, (size, size); constants are slow random walks."""
-    dimension, moving = len(model.axes), len(model.states) * len(model.axes)
-    transition, noise = whole_step(model.motion, dimension, moving + len(model.constants), dt, jerk_psd)
-    for constant in range(len(model.constants)):
-        noise[moving + constant, moving + constant] = model.constant_psd[constant] * dt
+    moving = len(motion.stationary) * dimension
+    transition, noise = whole_step(motion, dimension, moving + len(constant_psd), dt, jerk_psd)
+    for constant in range(len(constant_psd)):
+        noise[moving + constant, moving + constant] = constant_psd[constant] * dt
     return transition, noise
 
 
 @compiled(inner=True)
 def step_back(
-    model: Model,
+    motion: Motion,
+    dimension: int,
+    constant_psd: FloatArray,
     mean: FloatArray,
     covariance: FloatArray,
     dt: float,
@@ -34,7 +43,7 @@ def step_back(
     later_covariance: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Smoothed mean and covariance of a row, from its filtered ones and the smoothed ones `dt` seconds later."""
-    transition, noise = _step(model, dt, jerk_psd)
+    transition, noise = _step(motion, dimension, constant_psd, dt, jerk_psd)
     expected = transition @ covariance @ transition.T + noise
     for state in range(len(mean)):
         expected[state, state] += 1e-12 * (
@@ -48,30 +57,55 @@ def step_back(
 
 @compiled
 def _at(
-    model: Model, history: History, row: int, time: float, later_mean: FloatArray, later_covariance: FloatArray
+    motion: Motion,
+    dimension: int,
+    constant_psd: FloatArray,
+    history: History,
+    row: int,
+    time: float,
+    later_mean: FloatArray,
+    later_covariance: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Mean and SD of the position at `time`, between a row and the next, whose smoothed moments are given."""
     jerk_psd = history.adapted[row, JERK_PSD]
-    transition, noise = _step(model, time - history.time[row], jerk_psd)
+    transition, noise = _step(motion, dimension, constant_psd, time - history.time[row], jerk_psd)
     mean = transition @ history.mean[row]
     covariance = transition @ history.covariance[row] @ transition.T + noise
     rest = history.time[row + 1] - time
-    mean, covariance = step_back(model, mean, covariance, rest, jerk_psd, later_mean, later_covariance)
-    return mean[: len(model.axes)].copy(), np.sqrt(np.diag(covariance)[: len(model.axes)])
+    mean, covariance = step_back(
+        motion, dimension, constant_psd, mean, covariance, rest, jerk_psd, later_mean, later_covariance
+    )
+    return mean[:dimension].copy(), np.sqrt(np.diag(covariance)[:dimension])
 
 
 @compiled(inner=True)
-def smoothed_at(model: Model, history: History, oldest: int, count: int, time: float) -> tuple[FloatArray, FloatArray]:
+def smoothed_at(
+    motion: Motion,
+    dimension: int,
+    constant_psd: FloatArray,
+    history: History,
+    oldest: int,
+    count: int,
+    time: float,
+) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (dimension,) of the position at `time`, within the rows from `oldest` to `count`."""
     mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
     row = count - 2
     while row > oldest and history.time[row] > time:
         dt = history.time[row + 1] - history.time[row]
         mean, covariance = step_back(
-            model, history.mean[row], history.covariance[row], dt, history.adapted[row, JERK_PSD], mean, covariance
+            motion,
+            dimension,
+            constant_psd,
+            history.mean[row],
+            history.covariance[row],
+            dt,
+            history.adapted[row, JERK_PSD],
+            mean,
+            covariance,
         )
         row -= 1
-    return _at(model, history, row, time, mean, covariance)
+    return _at(motion, dimension, constant_psd, history, row, time, mean, covariance)
 
 
 @compiled
@@ -108,27 +142,41 @@ def replay_late(
                 model.states, model.axes, history.mean, history.covariance, row, of_position, noise, mean, sd, index
             )
         elif count > 0 and wanted >= history.time[oldest]:
-            mean[index], sd[index] = smoothed_at(model, history, oldest, count, wanted)
+            there, sd_there = smoothed_at(model.motion, dimension, model.constant_psd, history, oldest, count, wanted)
+            for axis in range(dimension):
+                mean[index, axis], sd[index, axis] = there[axis], sd_there[axis]
     return mean, sd
 
 
 @compiled
-def smooth(model: Model, history: History, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+def smooth(
+    motion: Motion, dimension: int, constant_psd: FloatArray, history: History, times: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Mean and SD (n, dimension) at rising `times`, given all rows; NaN outside them."""
-    dimension = len(model.axes)
     position, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
     count, index = len(history.time), len(times) - 1
     mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
     while index >= 0 and times[index] >= history.time[count - 1]:
         if times[index] == history.time[count - 1]:
-            position[index], sd[index] = mean[:dimension], np.sqrt(np.diag(covariance)[:dimension])
+            for axis in range(dimension):
+                position[index, axis], sd[index, axis] = mean[axis], np.sqrt(covariance[axis, axis])
         index -= 1
     for row in range(count - 2, -1, -1):
         while index >= 0 and times[index] >= history.time[row]:
-            position[index], sd[index] = _at(model, history, row, times[index], mean, covariance)
+            there, sd_there = _at(motion, dimension, constant_psd, history, row, times[index], mean, covariance)
+            for axis in range(dimension):
+                position[index, axis], sd[index, axis] = there[axis], sd_there[axis]
             index -= 1
         dt = history.time[row + 1] - history.time[row]
         mean, covariance = step_back(
-            model, history.mean[row], history.covariance[row], dt, history.adapted[row, JERK_PSD], mean, covariance
+            motion,
+            dimension,
+            constant_psd,
+            history.mean[row],
+            history.covariance[row],
+            dt,
+            history.adapted[row, JERK_PSD],
+            mean,
+            covariance,
         )
     return position, sd
