@@ -44,6 +44,8 @@ power: .venv/installed ## how many participants? ARGS="--effect 0.5"
 plan: .venv/installed ## counterbalanced orders: ARGS="kinect fusion --participants 12"
 	@$(steadyhand) plan $(ARGS)
 
+# Python's own bytecode is kept, whatever the shell says: some tests start processes, and each would translate all anew.
+test compiled: export PYTHONDONTWRITEBYTECODE =
 test: .venv/installed ## lint, then every test; ARGS=-mfast leaves out the slow ones
 	@$(MAKE) --no-print-directory -j2 lint compiled
 	@$(python) -m pytest -n auto --dist worksteal $(ARGS)

@@ -37,10 +37,15 @@ events: {topic: /events}
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever is not marked as slow is fast, so that `-m fast` chooses it."""
+    """Whatever is not marked as slow is fast, so that `-m fast` chooses it; files with slow tests come first.
+
+    Else one of the tests' processes would still be at a long test when the others have nothing left to do.
+    """
+    slow_files = {item.path for item in items if item.get_closest_marker("slow") is not None}
     for item in items:
         if item.get_closest_marker("slow") is None:
             item.add_marker("fast")
+    items.sort(key=lambda item: item.path not in slow_files)
 
 
 def pytest_collection_finish() -> None:
