@@ -26,6 +26,7 @@ from pipeline.study.streams import AccelerationStream, PositionStream
 from pipeline.tables.columns import S_PER_NS
 
 _USUAL_S = 120.0  # most sessions are done by then; a longer one is run again from its begin with more room
+_MOMENT_S = 1.0
 _TREMOR_HZ, _TREMOR_DAMPING = 8.0, 0.1
 _DRIFT_HZ, _DRIFT_DAMPING = 0.3, 0.7
 
@@ -183,11 +184,27 @@ class Outcome:
 
 def simulate(setting: Setting, participant: str, condition: str, *, compiled: bool = True) -> Outcome:
     """One session, independent of all other sessions. `compiled=False`: by the plain loop."""
-    length_s = min(_USUAL_S, setting.simulation.longest_s)
-    outcome, done = _attempt(setting, participant, condition, length_s, compiled)
-    if not done and length_s < setting.simulation.longest_s:
-        outcome, done = _attempt(setting, participant, condition, setting.simulation.longest_s, compiled)
+    longest_s = setting.simulation.longest_s
+    length_s = min(_USUAL_S, longest_s)
+    outcome, done = _attempt(setting, prepare(setting, participant, condition, length_s), condition, compiled)
+    if not done and length_s < longest_s:
+        outcome, done = _attempt(setting, prepare(setting, participant, condition, longest_s), condition, compiled)
     return outcome
+
+
+def compile_loop(setting: Setting) -> None:
+    """Run a moment of a session in each condition, of which nothing but the machine code is kept.
+
+    Its participant knows no lag, since finding the lags takes other machine code.
+    """
+    for condition in setting.study.conditions:
+        _attempt(setting, prepare(setting, "", condition, _MOMENT_S, lag_s=0.0), condition, compiled=True)
+
+
+def find_lags(setting: Setting) -> None:
+    """Find every condition's lag, of which the machine code is kept too."""
+    for condition in setting.study.conditions:
+        setting.lag_s(condition)
 
 
 @dataclass(frozen=True)
@@ -220,8 +237,10 @@ class Prepared:
         return session
 
 
-def prepare(setting: Setting, participant: str, condition: str, length_s: float) -> Prepared:
-    """A session of at most `length_s`, ready to run."""
+def prepare(
+    setting: Setting, participant: str, condition: str, length_s: float, lag_s: float | None = None
+) -> Prepared:
+    """A session of at most `length_s`, ready to run; people are used to `lag_s`, or else to the display's own."""
     settings, (names, tracker, imu_name, imu) = setting.simulation, setting.streams
     draws = partial(seeded, str(settings.seed), participant, condition)
     frames = sensing.frames(tracker, settings.instruments, length_s, draws)
@@ -248,7 +267,8 @@ def prepare(setting: Setting, participant: str, condition: str, length_s: float)
     sensed = Sensing(
         frames.time_ns, np.ascontiguousarray(frames.noise_mm[:, :dimension]), phone.time_ns, turn, offset, instant_ns
     )
-    person = people.used_to_lag(people.person(settings, participant), setting.lag_s(condition))
+    lag_s = setting.lag_s(condition) if lag_s is None else lag_s
+    person = people.used_to_lag(people.person(settings, participant), lag_s)
     begin = layouts.start(setting.layout)
     session.trace[0, :2] = begin
     hand = hand_at(begin, settings.still_before_s)
@@ -257,10 +277,8 @@ def prepare(setting: Setting, participant: str, condition: str, length_s: float)
     return Prepared((names, imu_name), frames, phone, readings, rotation, instant_ns, instants, walking)
 
 
-def _attempt(
-    setting: Setting, participant: str, condition: str, length_s: float, compiled: bool
-) -> tuple[Outcome, bool]:
-    ready = prepare(setting, participant, condition, length_s)
+def _attempt(setting: Setting, ready: Prepared, condition: str, compiled: bool) -> tuple[Outcome, bool]:
+    """What comes of a session, and whether its task was done by its end."""
     estimator, gravity_mm_s2 = setting.shown(condition), np.array(setting.streams[3].gravity_mm_s2)
     shows = live(estimator, ready.names, ready.readings, ready.rotation, ready.instants) if compiled else None
     if shows is not None:

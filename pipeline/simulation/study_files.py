@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.engine.cache import digest_of
 from pipeline.errors import PipelineError
 from pipeline.simulation.log import write_log
-from pipeline.simulation.session import Outcome, Setting, simulate
+from pipeline.simulation.session import Outcome, Setting, compile_loop, find_lags, simulate
 from pipeline.simulation.up_to_date import MADE, files_made, made_from
 from pipeline.simulation.workload import ratings
 from pipeline.statistics.counterbalancing import assigned
@@ -55,6 +55,9 @@ def simulate_study(folder: Path, study: Study, executor: Executor, begin: Begin,
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir()
     try:
+        # First, side by side, what every session needs: else each process would compile all of it for itself.
+        for ready in [executor.submit(compile_loop, setting), executor.submit(find_lags, setting)]:
+            ready.result()
         futures: dict[Any, Any] = {executor.submit(make, setting, one, beside): one for one in sessions}
         again: dict[Any, int] = {executor.submit(repeat, setting, n): n for n in range(settings.repeats)}
         measured, repeats = {}, {}
