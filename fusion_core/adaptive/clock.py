@@ -95,7 +95,7 @@ def take_in(
         judge(state)
 
 
-@compiled
+@compiled(inner=True)
 def _move_means(
     model: Model, state: State, phone: Phone, before: float, stamp: float, value: FloatArray, apart: FloatArray
 ) -> None:
@@ -115,7 +115,7 @@ def _move_means(
             apart[one, axis] = value[axis] - mean[one, 0, axis] - mean[one, 3, axis] - arm[axis]
 
 
-@compiled
+@compiled(inner=True)
 def _move(state: State, dt: float, more_psd: float) -> None:
     """The covariance of all moved over `dt` seconds, as that of a member of the bank."""
     own = state.clock_covariance
@@ -137,7 +137,7 @@ def _move(state: State, dt: float, more_psd: float) -> None:
     own[3, 3] += (1.0 - kept * kept) * state.fact[NOISE_DRIFT]
 
 
-@compiled
+@compiled(inner=True)
 def _correct(model: Model, state: State, apart: FloatArray, more: float, dt: float) -> None:
     """A position taken in by all, with one gain, and their weights moved by how likely it was to each."""
     kept = np.exp(-dt / min(_FORGET_S, 1.0 + (state.fact[AT] - state.fact[BEGAN]) / 2.0))
@@ -182,7 +182,7 @@ def judge(state: State) -> None:
     state.fact[CLOCK_S] = min(max(state.fact[CLOCK_S], offset - STEP_S), offset + STEP_S)
 
 
-@compiled
+@compiled(inner=True)
 def _add_prior(state: State, bend: float, pull: float) -> None:
     """Mean and variance of an offset o whose log likelihood is pull·o − bend·o²/2, by a prior of two normals.
 

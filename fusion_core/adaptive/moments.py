@@ -8,10 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from fusion_core.adaptive.layout import ARM, BIAS, DRIFT, INPUTS, POSITION, SIZE, VELOCITY, Model, State
+from fusion_core.adaptive.rows import SILENT_PSD
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
 _MOVED = 6  # position and velocity
+COAST_S = 0.3  # a third of a reach: so long a velocity lasts of which nothing more is known
+_COAST_VARIANCE = SILENT_PSD * COAST_S / 2.0
 
 
 @compiled(inner=True)
@@ -62,7 +65,7 @@ def move(model: Model, state: State, dt: float, net: FloatArray, coupling: Float
     _add_noise(model, state, dt, psd)
 
 
-@compiled
+@compiled(inner=True)
 def _add_noise(model: Model, state: State, dt: float, psd: float) -> None:
     covariance = state.covariance
     for axis in range(3):
@@ -89,6 +92,46 @@ def fade(state: State, dt: float, variance: float, time_s: float) -> None:
         for other in range(3):
             covariance[row, DRIFT + other] *= kept * kept
         covariance[row, row] += (1.0 - kept * kept) * variance
+
+
+@compiled(inner=True)
+def coast(state: State, seconds: float) -> None:
+    """The last `seconds` of a move had no acceleration: the velocity dies away, and is as uncertain as any hand's.
+
+    A velocity of Ornstein and Uhlenbeck's kind, whose acceleration has the density `rows.SILENT_PSD` at first.
+    """
+    mean, covariance, left = state.mean, state.covariance, left_of_speed(seconds)
+    lost = seconds - COAST_S * (1.0 - left)
+    for axis in range(3):
+        place, speed = POSITION + axis, VELOCITY + axis
+        mean[place] -= lost * mean[speed]
+        mean[speed] *= left
+        for column in range(SIZE):
+            covariance[place, column] -= lost * covariance[speed, column]
+            covariance[speed, column] *= left
+    for axis in range(3):
+        place, speed = POSITION + axis, VELOCITY + axis
+        for row in range(SIZE):
+            covariance[row, place] -= lost * covariance[row, speed]
+            covariance[row, speed] *= left
+        both = _COAST_VARIANCE * COAST_S * (1.0 - left) ** 2
+        covariance[place, place] += coasted(seconds)
+        covariance[speed, speed] += _COAST_VARIANCE * (1.0 - left * left)
+        covariance[place, speed] += both
+        covariance[speed, place] += both
+
+
+@compiled(inner=True)
+def left_of_speed(seconds: float) -> float:
+    """The share of a velocity that is left after seconds without acceleration."""
+    return float(np.exp(-seconds / COAST_S))
+
+
+@compiled(inner=True)
+def coasted(seconds: float) -> float:
+    """The variance, an axis, that seconds without acceleration add to the position."""
+    left = left_of_speed(seconds)
+    return float(_COAST_VARIANCE * COAST_S**2 * (2.0 * seconds / COAST_S - 3.0 + 4.0 * left - left * left))
 
 
 @compiled(inner=True)
@@ -142,7 +185,7 @@ def correct(model: Model, state: State, ago: float, turned: FloatArray, position
     _gain(dimension, mean, covariance, shared, factor, white)
 
 
-@compiled
+@compiled(inner=True)
 def _whiten(
     dimension: int,
     spread: FloatArray,
@@ -167,7 +210,7 @@ def _whiten(
     return squared
 
 
-@compiled
+@compiled(inner=True)
 def _gain(
     dimension: int,
     mean: FloatArray,

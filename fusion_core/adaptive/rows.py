@@ -52,6 +52,7 @@ _GAP_S = 0.03  # beyond it the hand's own jerk is what is not known between two 
 _JERK_PSD = 1e8  # mm²/s⁵, of a quick hand
 _SAME_S = 1e-6
 SILENT_PSD = 1e6  # mm²/s³: a hand's acceleration, about which the phone says nothing
+LONG_S = 0.35  # between two readings: from there on a straight line would be known less well than nothing
 CLIPPED_PSD = 3e7  # mm²/s³: 2 g more than is shown, for 0.04 s at each peak
 _MAY_CLIP_MM_S2 = 15000.0  # accelerometers go to 2 g at least; a phone at rest shows 1 g over and over
 _CLIPS_AFTER = 2  # readings as large as the largest: of a coarse one two may agree by chance
@@ -79,7 +80,7 @@ def put_in(model: Model, state: State, phone: Phone, reading: FloatArray) -> int
     return int(at)
 
 
-@compiled
+@compiled(inner=True)
 def _is_clipped(state: State, reading: FloatArray) -> bool:
     """Is a component the very largest there was, and not for the first times? A motion's peaks differ, a range ends."""
     largest = 0.0
@@ -94,7 +95,7 @@ def _is_clipped(state: State, reading: FloatArray) -> bool:
     return bool(largest > _MAY_CLIP_MM_S2 and state.fact[AT_LARGEST] >= _CLIPS_AFTER)
 
 
-@compiled
+@compiled(inner=True)
 def _write_row(row: FloatArray, at: int, reading: FloatArray, dimension: int) -> None:
     for column in range(COLUMNS):
         row[at, column] = 0.0
@@ -111,7 +112,7 @@ def _write_row(row: FloatArray, at: int, reading: FloatArray, dimension: int) ->
             row[at, CROSSED + 3 * axis + 2] = x * b - y * a
 
 
-@compiled
+@compiled(inner=True)
 def _copy_row(phone: Phone, of: int, to: int) -> None:
     phone.time[to] = phone.time[of]
     for column in range(COLUMNS):
@@ -135,7 +136,7 @@ def row_before(phone: Phone, count: int, time: float) -> int:
     return _before(phone.time, count, time)
 
 
-@compiled
+@compiled(inner=True)
 def _before(times: FloatArray, count: int, time: float) -> int:
     at = max(count - 1, 0)
     while at > 0 and times[at] > time:
@@ -168,12 +169,14 @@ def integrate(times: FloatArray, count: int, values: FloatArray, begin: float, e
     return unknown / (end - begin)
 
 
-@compiled
+@compiled(inner=True)
 def _straight(
     times: FloatArray, values: FloatArray, row: int, at: float, until: float, end: float, total: FloatArray
 ) -> float:
     """A piece between two rows: x(s) straight, ∫x = dt (x₀ + x₁) / 2 and ∫∫x = dt² (2 x₀ + x₁) / 6."""
     begin, step = times[row], times[row + 1] - times[row]
+    if step > LONG_S:
+        return _held(times, values, row, at, until, end, total)
     dt, rest = until - at, end - until
     first, last = (at - begin) / step, (until - begin) / step
     share, early = (first + last) / 2.0, (2.0 * first + last) / 3.0
@@ -186,20 +189,33 @@ def _straight(
     return dt * _JERK_PSD * step * step / 12.0 if step > _GAP_S else 0.0
 
 
-@compiled
+@compiled(inner=True)
 def _held(
     times: FloatArray, values: FloatArray, row: int, at: float, until: float, end: float, total: FloatArray
 ) -> float:
-    """A piece before the first row or after the last: the reading held for a while, then no acceleration."""
+    """A piece before the first row, after the last or in a long gap: the reading held a while, then no acceleration."""
     source = max(row, 0)
     dt, rest = until - at, end - until
     held = dt if row < 0 else min(max(times[source] + HOLD_S - at, 0.0), dt)
     for column in range(total.shape[1]):
-        of = held if column < TURNED else dt  # what turns the bias goes on
         here = values[source, column]
-        total[0, column] += of * here
-        total[1, column] += (rest + dt - of) * of * here + of * of / 2.0 * here
+        total[0, column] += held * here
+        total[1, column] += (rest + dt - held / 2.0) * held * here
     return (dt - held) * SILENT_PSD
+
+
+@compiled(inner=True)
+def silence(times: FloatArray, count: int, begin: float, end: float) -> float:
+    """For how many seconds from `begin` to `end` no reading says how the phone was accelerated."""
+    if count == 0:
+        return max(end - begin, 0.0)
+    row, total = _before(times, count, begin), 0.0
+    while row < count and times[row] < end:
+        following = times[row + 1] if row + 1 < count else np.inf
+        if following - times[row] > LONG_S:
+            total += max(min(following, end) - max(times[row] + HOLD_S, begin), 0.0)
+        row += 1
+    return total
 
 
 @compiled(inner=True)
@@ -273,7 +289,7 @@ def couple(
         coupling[order, axis, TURN - BIAS + 1] = up[one] * level[two] - up[two] * level[one]
 
 
-@compiled
+@compiled(inner=True)
 def _upward(phone: Phone, row: int, up: FloatArray) -> None:
     """Against gravity, which was added to R f to make the row's acceleration; zeros where there was none."""
     own, squared = phone.row[row], 0.0

@@ -51,7 +51,8 @@ from fusion_core.adaptive.layout import (
     Phone,
     State,
 )
-from fusion_core.adaptive.rows import HOLD_S, SILENT_PSD, couple, row_before
+from fusion_core.adaptive.moments import COAST_S, coasted, left_of_speed
+from fusion_core.adaptive.rows import HOLD_S, couple, row_before
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
@@ -71,21 +72,23 @@ def fused(model: Model, state: State, phone: Phone, time: float, answers: FloatA
     dimension, newest, at = model.dimension, state.count[ROWS] - 1, state.fact[AT]
     dt = max(time - at, 0.0)
     total, coupling, row = np.zeros((1, ROW)), np.zeros((1, 3, INPUTS)), np.empty(DRIFT)
-    silent = dt
+    silent, held = dt, 0.0
     if newest >= 0:
         silent = max(time - max(phone.time[newest], at), 0.0)
         held = min(silent, HOLD_S)
+    unheard = silent - held
+    gone = held + COAST_S * (1.0 - left_of_speed(unheard))  # as if the velocity had lasted so many seconds
+    if newest >= 0:
         for column in range(ROW):
-            of = held if column < TURNED else silent
-            total[0, column] = state.head[1, column] + silent * state.head[0, column]
-            total[0, column] += (silent - of / 2.0) * of * phone.row[newest, column]
+            total[0, column] = state.head[1, column] + gone * state.head[0, column]
+            total[0, column] += (gone - held / 2.0) * held * phone.row[newest, column]
         couple(state, phone, total, 0, dt * dt / 2.0, dimension, coupling)
     turned = newest >= 0 and state.count[KNOWS_ARM] and phone.row[newest, KNOWN] >= ORIENTED
     variance = 0.0
     for axis in range(dimension):
         for one in range(DRIFT):
             row[one] = 0.0
-        row[POSITION + axis], row[VELOCITY + axis] = 1.0, dt
+        row[POSITION + axis], row[VELOCITY + axis] = 1.0, dt - silent + gone
         for part in range(INPUTS):
             row[BIAS + part] = -coupling[0, axis, part]
         if turned:
@@ -99,8 +102,7 @@ def fused(model: Model, state: State, phone: Phone, time: float, answers: FloatA
                     variance += row[one] * state.covariance[one, other] * row[other]
         answers[FUSED + axis] = position
     psd_dt2 = state.fact[TRUST] * dt**2 + 2.0 * total[0, CLIPPED]  # ∫∫ψ is ψ dt²/2 where ψ lasts
-    of_silence = SILENT_PSD * max(silent - HOLD_S, 0.0) ** 3 / 3.0
-    return float(variance / dimension + psd_dt2 * dt / 3.0 + of_silence)
+    return float(variance / dimension + psd_dt2 * dt / 3.0 + coasted(unheard))
 
 
 @compiled(inner=True)
@@ -122,7 +124,7 @@ def answer(model: Model, state: State, phone: Phone, time: float, answers: Float
         answers[MIXED + axis] += weight[1] * answers[AHEAD + axis] + weight[2] * answers[HELD + axis]
 
 
-@compiled
+@compiled(inner=True)
 def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
     """The lever arm, as the newest row turns it, added to what positions alone say of the phone."""
     newest = state.count[ROWS] - 1
@@ -135,7 +137,7 @@ def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
             answers[HELD + axis] += arm
 
 
-@compiled
+@compiled(inner=True)
 def _weights(model: Model, state: State, weight: FloatArray) -> None:
     """The answers' weights by their squared errors: as of normal errors whose variance is what was seen.
 
@@ -179,13 +181,13 @@ def score(model: Model, state: State, phone: Phone, time: float, position: Float
             state.fact[SURPRISE] += newer * (surprise - state.fact[SURPRISE])
 
 
-@compiled
+@compiled(inner=True)
 def _noise(state: State) -> float:
     """The variance of a position's noise, as found."""
     return float(state.fact[NOISE] + state.fact[NOISE_DRIFT])
 
 
-@compiled
+@compiled(inner=True)
 def _of_either_clock(model: Model, state: State) -> float:
     """The variance of not knowing whose clock is wrong: no frame shows it, since all are off by as much.
 

@@ -113,7 +113,8 @@ def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> No
         oldest = phone.time[count - 1] - model.history_s
         if oldest > state.fact[AT]:
             _advance(model, state, phone, oldest)
-        if newest == count - 1 and newest > 0 and before == state.fact[AT] and phone.time[newest - 1] > before:
+        extends = newest == count - 1 and newest > 0 and before == state.fact[AT] and phone.time[newest - 1] > before
+        if extends and phone.time[newest] - phone.time[newest - 1] <= rows.LONG_S:
             _extend_head(state, phone)
         else:
             rows.integrate(phone.time, count, phone.row, state.fact[AT], phone.time[count - 1], state.head)
@@ -121,7 +122,7 @@ def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> No
             shown.answer(model, state, phone, phone.time[newest], phone.shown[newest])
 
 
-@compiled
+@compiled(inner=True)
 def _correct_clock(state: State, ahead_s: float) -> None:
     """No reading was measured after it arrived: a phone's stamps that say so are taken back by as much.
 
@@ -133,7 +134,7 @@ def _correct_clock(state: State, ahead_s: float) -> None:
     state.fact[PHONE_AHEAD] = ahead
 
 
-@compiled
+@compiled(inner=True)
 def _queue(state: State, reading: FloatArray) -> None:
     """A frame among those that wait, in order of measurement. There is room for one more than may wait."""
     at, waiting = state.count[WAITING], state.waiting
@@ -147,7 +148,7 @@ def _queue(state: State, reading: FloatArray) -> None:
     state.count[WAITING] += 1
 
 
-@compiled
+@compiled(inner=True)
 def _is_due(state: State, phone: Phone, now: float) -> bool:
     """Need the first frame wait no longer? The phone has said what it felt up to then, or is not going to."""
     if state.count[WAITING] == 0 or state.count[WAITING] > MOST_WAITING:
@@ -175,7 +176,7 @@ def _take_first(model: Model, state: State, phone: Phone) -> None:
         _take_in(model, state, phone, stamp, value)
 
 
-@compiled
+@compiled(inner=True)
 def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
     """The first frame."""
     moments.begin(model, state, value)
@@ -188,7 +189,7 @@ def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
         state.fact[LAST + axis] = value[axis]
 
 
-@compiled
+@compiled(inner=True)
 def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[float, float, float]:
     """Everything moved to `time`; returns the duration, and what the small filters are to consider: a variance
     of positions and a density of accelerations."""
@@ -201,7 +202,11 @@ def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[flo
         rows.couple(state, phone, total, order, dt if order == 0 else dt * dt / 2.0, model.dimension, coupling)
     moments.inputs_of(state, total, coupling, net)
     unknown += total[0, CLIPPED] / dt
-    moments.move(model, state, dt, net, coupling, state.fact[TRUST] + unknown)
+    silent = rows.silence(phone.time, state.count[ROWS], state.fact[AT], time)
+    heard = unknown - rows.SILENT_PSD * silent / dt
+    moments.move(model, state, dt, net, coupling, state.fact[TRUST] + heard)
+    if silent > 0.0:
+        moments.coast(state, silent)
     moments.fade(state, dt, state.fact[NOISE_DRIFT], state.fact[NOISE_DRIFT_S])
     state.fact[AT] = time
     turned = np.empty((3, 3))
@@ -213,7 +218,7 @@ def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[flo
     return dt, of_positions, unknown + of_accelerations
 
 
-@compiled
+@compiled(inner=True)
 def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: FloatArray) -> None:
     """A frame taken in, measured at its stamp by the tracker's clock, if it is a measurement at all."""
     time = stamp + state.fact[CLOCK_S]
@@ -240,7 +245,7 @@ def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: Floa
         moments.correct(model, state, ago, turned, value, state.fact[NOISE] + _of_clock(model, state))
 
 
-@compiled
+@compiled(inner=True)
 def _judge(
     model: Model,
     state: State,
@@ -268,7 +273,7 @@ def _judge(
     return _MEASURED
 
 
-@compiled
+@compiled(inner=True)
 def _of_clock(model: Model, state: State) -> float:
     """How much of a position's noise comes of not knowing when it was measured."""
     squared = 0.0
@@ -277,7 +282,7 @@ def _of_clock(model: Model, state: State) -> float:
     return float(squared * state.fact[CLOCK_VARIANCE])
 
 
-@compiled
+@compiled(inner=True)
 def _is_news(model: Model, state: State, value: FloatArray) -> bool:
     """A tracker that has lost its target repeats the last position or says zero: no noise does that on all axes.
 
@@ -293,7 +298,7 @@ def _is_news(model: Model, state: State, value: FloatArray) -> bool:
     return not (repeated or zero) or state.count[HAS_DIFFERED] == 0
 
 
-@compiled
+@compiled(inner=True)
 def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -> bool:
     """Further from what was expected than a hand goes: another body's, for as long as that can be.
 
@@ -316,7 +321,7 @@ def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -
     return bool(time - state.fact[STRANGE_SINCE] < _BELIEVED_AFTER_S)
 
 
-@compiled
+@compiled(inner=True)
 def _extend_head(state: State, phone: Phone) -> None:
     """The integrals from the state on go on to a new newest row."""
     newest = state.count[ROWS] - 1
@@ -339,7 +344,7 @@ def oldest_needed(models: Records, states: Records, phone: Phone) -> int:
     return first
 
 
-@compiled
+@compiled(inner=True)
 def _trace(state: State, into: FloatArray) -> None:
     for at in range(FACTS):
         into[at] = state.fact[at]

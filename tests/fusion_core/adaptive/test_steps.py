@@ -97,3 +97,22 @@ def test_fewer_axes_are_the_same_filter(seed: int, dimension: int) -> None:
     other = FusionAdaptive(sensors).replay(mirrored, forces)
     np.testing.assert_allclose(other.mean, -track.mean, atol=1e-9)
     np.testing.assert_allclose(other.sd, track.sd, atol=1e-9)
+
+
+def test_a_hand_that_neither_sensor_sees_is_not_sent_away() -> None:
+    """No frame and no reading for three seconds: what is shown stays near, and its SD says how near."""
+    whole = recorded(simulated(40.0), Departure())
+    imu, frames = whole.samples["imu"], whole.samples["tracker"]
+    heard, seen = ((one.time < 20.0) | (one.time > 23.0) for one in (imu, frames))
+    assert imu.rotation is not None
+    assert imu.force is not None
+    phone = Samples(imu.time[heard], imu.arrival[heard], imu.value[heard], imu.rotation[heard], imu.force[heard])
+    samples = {"tracker": Samples(frames.time[seen], frames.arrival[seen], frames.value[seen]), "imu": phone}
+    blind = (whole.times > 20.0) & (whole.times < 23.15)
+    track = FusionAdaptive(SENSORS).replay(samples, whole.times)
+    error = track.mean - whole.truth
+    held = frames.value[np.searchsorted(frames.arrival, 20.0) - 1] - whole.truth[blind]
+    assert np.sqrt(np.mean(error[blind] ** 2)) < 2.0 * np.sqrt(np.mean(held**2))
+    assert np.mean(np.abs(error[blind]) < 1.96 * track.sd[blind]) > 0.9
+    after = (whole.times > 24.0) & (whole.times < 30.0)
+    assert np.sqrt(np.mean(error[after] ** 2)) < 1.3 * np.sqrt(np.mean(error[whole.times > 30.0] ** 2))
