@@ -127,7 +127,7 @@ def move(model: Model, state: State, dt: float, net: FloatArray, more_psd: float
         own[_NN, member] = kept * kept * own[_NN, member] + fresh
 
 
-@compiled(inner=True)
+@compiled
 def _move_means(model: Model, state: State, dt: float, net: FloatArray) -> None:
     mean, half, phone = state.bank_mean, dt * dt / 2.0, model.member[USES_PHONE]
     for member in range(MEMBERS):
@@ -162,7 +162,7 @@ def take_in(model: Model, state: State, position: FloatArray, more_variance: flo
     _correct(model.dimension, mean, own, apart, gain)
 
 
-@compiled(inner=True)
+@compiled
 def _correct(dimension: int, mean: FloatArray, own: FloatArray, apart: FloatArray, gain: FloatArray) -> None:
     """Means and covariances of all members corrected, with the inverse of each innovation's variance as `gain`."""
     for member in range(MEMBERS):
@@ -219,7 +219,7 @@ def judge(model: Model, state: State) -> None:
     state.fact[NOISE_DRIFT_S] = np.exp(drift_s / drifting) if drifting > 0.0 else 0.0
 
 
-@compiled(inner=True)
+@compiled
 def _to_shares(model: Model, state: State, begin: int, end: int) -> None:
     """The shares of the members from `begin` to `end`, which sum to 1."""
     highest, total = -np.inf, 0.0

@@ -1,6 +1,8 @@
 """How far the tracker's clock is off: small filters that take each frame for earlier or later than its stamp says.
 
-All have one covariance, since the same readings reach each, only elsewhere in time; they differ in their means. Their
+All have one covariance, since the same readings reach each, only elsewhere in time; they differ in their means. Each
+has a lever arm of its own: with that of the large filter, which was found with the offset believed so far, the two
+hold each other in a place where both are wrong (a recording of circles stood at 25 ms for half a minute). Their
 log likelihoods, with forgetting, are a parabola about the true offset, whose vertex and bend are the offset and its SD.
 A hand at rest says nothing of it; the prior then mostly believes the stated latency, or each start would be uncertain.
 As a state of the large filter the offset would hang on an estimated velocity, and what is wrong with that (noise that
@@ -13,16 +15,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusion_core.adaptive import rows
+from fusion_core.adaptive import moments, rows
 from fusion_core.adaptive.bank import weighed
 from fusion_core.adaptive.layout import (
+    ARM,
     AT,
     BEGAN,
     CLOCK_S,
     CLOCK_VARIANCE,
+    KNOWS_ARM,
     NOISE,
     NOISE_DRIFT,
     NOISE_DRIFT_S,
+    OF_ARM,
     OFFSETS,
     ROWS,
     STAMP,
@@ -41,7 +46,11 @@ _FORGET_S = 10.0  # as the bank does
 _EXACT, _EXACT_SD_S = 0.7, 0.005  # so often a stated latency is right as far as any latency is constant
 _PRIOR_SD_S = 0.02  # else it is right within a frame or so
 _LEAST_SD_S = 0.002  # the past is forgotten so far as to leave no more certainty: a latency wanders
+_LEAD = 5.0  # in log likelihood: what is so far behind is out of the question
 _RATE_SD, _RATE_PSD = 1000.0, 900.0  # of the acceleration error, as in the bank
+
+# Rows of State.clock_covariance: position, velocity, acceleration error and correlated noise of each axis, lever arm.
+_ARM, _STATES = 12, 15
 
 
 @compiled(inner=True)
@@ -49,25 +58,51 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
     """At the first position."""
     for one in range(OFFSETS):
         state.clock_weight[one] = 0.0
-    begin_again(model, state, position)
+        for part in range(3):
+            state.clock_mean[one, OF_ARM, part] = 0.0
+    for row in range(_STATES):
+        for column in range(_STATES):
+            state.clock_covariance[row, column] = 0.0
+    for part in range(3):
+        state.clock_covariance[_ARM + part, _ARM + part] = model.prior[ARM + part]
+    begin_again(model, state, position, np.zeros((3, 3)))
     judge(state)
 
 
 @compiled(inner=True)
-def begin_again(model: Model, state: State, position: FloatArray) -> None:
-    """The motion begins anew at a position; weights stay."""
+def begin_again(model: Model, state: State, position: FloatArray, turned: FloatArray) -> None:
+    """The motion begins anew at a position of the tracked point; weights and lever arms stay."""
     own, drift = state.clock_covariance, state.fact[NOISE_DRIFT]
-    for row in range(4):
-        for column in range(4):
-            own[row, column] = 0.0
-    own[0, 0], own[1, 1], own[2, 2] = state.fact[NOISE] + drift, model.prior[VELOCITY], _RATE_SD**2
-    own[3, 3], own[0, 3], own[3, 0] = drift, -drift, -drift
-    for one in range(OFFSETS):
-        for axis in range(3):
+    for row in range(_ARM):
+        for column in range(_STATES):
+            own[row, column] = own[column, row] = 0.0
+    for axis in range(3):
+        at = 4 * axis
+        own[at, at], own[at + 1, at + 1] = state.fact[NOISE] + drift, model.prior[VELOCITY]
+        own[at + 2, at + 2], own[at + 3, at + 3], own[at, at + 3], own[at + 3, at] = _RATE_SD**2, drift, -drift, -drift
+        for one in range(OFFSETS):
             for row in range(4):
                 state.clock_mean[one, row, axis] = 0.0
             if axis < model.dimension:
                 state.clock_mean[one, 0, axis] = position[axis]
+    to_phone(state, turned)
+
+
+@compiled(inner=True)
+def to_phone(state: State, turned: FloatArray) -> None:
+    """From the tracked point to the phone, whose rotation is `turned` (3, 3): p − R r, with each its own lever arm."""
+    own = state.clock_covariance
+    for axis in range(3):
+        for part in range(3):
+            share = turned[axis, part]
+            for one in range(OFFSETS):
+                state.clock_mean[one, 0, axis] -= share * state.clock_mean[one, OF_ARM, part]
+            for column in range(_STATES):
+                own[4 * axis, column] -= share * own[_ARM + part, column]
+    for axis in range(3):
+        for part in range(3):
+            for row in range(_STATES):
+                own[row, 4 * axis] -= turned[axis, part] * own[row, _ARM + part]
 
 
 @compiled(inner=True)
@@ -77,11 +112,14 @@ def take_in(
     phone: Phone,
     stamp: float,
     value: FloatArray,
+    turned: FloatArray,
     more_psd: float,
-    more: float,
     news: int,
 ) -> None:
-    """All moved to the stamp of a frame, each by its own offset; and with `news` the position taken in."""
+    """All moved to the stamp of a frame, each by its own offset; and with `news` the position taken in.
+
+    `turned` (3, 3) is the phone's rotation at about that time.
+    """
     before = state.fact[STAMP]
     dt = stamp - before
     if dt > 0.0:
@@ -90,76 +128,130 @@ def take_in(
         _move(state, dt, more_psd)
         _move_means(model, state, phone, before, stamp, value, apart)
         if news:
-            _correct(model, state, apart, more, dt)
+            _correct(model, state, apart, turned, dt)
+            _follow(model, state, turned)
     if news:
         judge(state)
 
 
-@compiled(inner=True)
+@compiled
 def _move_means(
     model: Model, state: State, phone: Phone, before: float, stamp: float, value: FloatArray, apart: FloatArray
 ) -> None:
     """The means moved from the stamp `before` to another; how far the position is from each goes into `apart`."""
-    mean, net, arm, count = state.clock_mean, np.empty((2, 3)), np.empty(3), state.count[ROWS]
+    mean, net, turned, count = state.clock_mean, np.empty((2, 3)), np.zeros((3, 3)), state.count[ROWS]
     dt = stamp - before
     rows.correct(state, phone, rows.row_before(phone, count, before + FIRST_S), model.dimension)
     kept = np.exp(-dt / state.fact[NOISE_DRIFT_S]) if state.fact[NOISE_DRIFT_S] > 0.0 else 0.0
     for one in range(OFFSETS):
         begin, end = before + (FIRST_S + one * STEP_S), stamp + (FIRST_S + one * STEP_S)
         rows.integrate(phone.time, count, phone.corrected, begin, end, net)
-        rows.between(phone, count, end, arm)
+        if state.count[KNOWS_ARM]:
+            rows.turned_at(state, phone, end, turned)
         for axis in range(model.dimension):
             mean[one, 0, axis] += dt * mean[one, 1, axis] + dt * dt / 2.0 * mean[one, 2, axis] + net[1, axis]
             mean[one, 1, axis] += dt * mean[one, 2, axis] + net[0, axis]
             mean[one, 3, axis] *= kept
-            apart[one, axis] = value[axis] - mean[one, 0, axis] - mean[one, 3, axis] - arm[axis]
+            expected = mean[one, 0, axis] + mean[one, 3, axis]
+            for part in range(3):
+                expected += turned[axis, part] * mean[one, OF_ARM, part]
+            apart[one, axis] = value[axis] - expected
 
 
-@compiled(inner=True)
+@compiled
 def _move(state: State, dt: float, more_psd: float) -> None:
     """The covariance of all moved over `dt` seconds, as that of a member of the bank."""
     own = state.clock_covariance
     drift_s, half, psd = state.fact[NOISE_DRIFT_S], dt * dt / 2.0, state.fact[TRUST] + more_psd
     kept = np.exp(-dt / drift_s) if drift_s > 0.0 else 0.0
-    for column in range(4):
-        own[0, column] += dt * own[1, column] + half * own[2, column]
-        own[1, column] += dt * own[2, column]
-        own[3, column] *= kept
-    for row in range(4):
-        own[row, 0] += dt * own[row, 1] + half * own[row, 2]
-        own[row, 1] += dt * own[row, 2]
-        own[row, 3] *= kept
-    own[0, 0] += psd * dt * half * 2.0 / 3.0
-    own[0, 1] += psd * half
-    own[1, 0] += psd * half
-    own[1, 1] += psd * dt
-    own[2, 2] += _RATE_PSD * dt
-    own[3, 3] += (1.0 - kept * kept) * state.fact[NOISE_DRIFT]
+    for at in range(0, _ARM, 4):
+        for column in range(_STATES):
+            own[at, column] += dt * own[at + 1, column] + half * own[at + 2, column]
+            own[at + 1, column] += dt * own[at + 2, column]
+            own[at + 3, column] *= kept
+    for at in range(0, _ARM, 4):
+        for row in range(_STATES):
+            own[row, at] += dt * own[row, at + 1] + half * own[row, at + 2]
+            own[row, at + 1] += dt * own[row, at + 2]
+            own[row, at + 3] *= kept
+        own[at, at] += psd * dt * half * 2.0 / 3.0
+        own[at, at + 1] += psd * half
+        own[at + 1, at] += psd * half
+        own[at + 1, at + 1] += psd * dt
+        own[at + 2, at + 2] += _RATE_PSD * dt
+        own[at + 3, at + 3] += (1.0 - kept * kept) * state.fact[NOISE_DRIFT]
 
 
-@compiled(inner=True)
-def _correct(model: Model, state: State, apart: FloatArray, more: float, dt: float) -> None:
-    """A position taken in by all, with one gain, and their weights moved by how likely it was to each."""
+@compiled
+def _correct(model: Model, state: State, apart: FloatArray, turned: FloatArray, dt: float) -> None:
+    """A position taken in by all, with one gain, and their weights moved by how likely it was to each.
+
+    It observes p + R r + correlated noise, and its white noise is as found.
+    """
     kept = np.exp(-dt / min(_FORGET_S, 1.0 + (state.fact[AT] - state.fact[BEGAN]) / 2.0))
-    own, shared = state.clock_covariance, np.empty(4)
-    for row in range(4):
-        shared[row] = own[0, row] + own[3, row]
-    variance = shared[0] + shared[3] + state.fact[NOISE] + more
-    best = np.inf
+    dimension, own, shared, spread = model.dimension, state.clock_covariance, np.empty((_STATES, 3)), np.empty((3, 3))
+    for axis in range(dimension):
+        for row in range(_STATES):
+            total = own[row, 4 * axis] + own[row, 4 * axis + 3]
+            for part in range(3):
+                total += turned[axis, part] * own[row, _ARM + part]
+            shared[row, axis] = total
+    for axis in range(dimension):
+        for other in range(dimension):
+            total = shared[4 * axis, other] + shared[4 * axis + 3, other]
+            for part in range(3):
+                total += turned[axis, part] * shared[_ARM + part, other]
+            spread[axis, other] = total
+    factor, white, best = np.empty((3, 3)), np.empty((OFFSETS, 3)), np.inf
     for one in range(OFFSETS):
-        squared = 0.0
-        for axis in range(model.dimension):
-            squared += apart[one, axis] ** 2 / variance
+        squared = moments.whiten(dimension, spread, state.fact[NOISE], apart[one], factor, white[one])
         best = min(best, squared)
+        variance = 1.0
+        for axis in range(dimension):
+            variance *= factor[axis, axis] ** (2.0 / dimension)
         state.clock_weight[one] = kept * state.clock_weight[one] + weighed(model, squared, variance)
-    variance *= max(best / model.surprise, 1.0)
-    for row in range(4):
-        for one in range(OFFSETS):
+    _gain(state, shared, factor, white, dimension, max(best / model.surprise, 1.0))
+
+
+@compiled
+def _gain(
+    state: State, shared: FloatArray, factor: FloatArray, white: FloatArray, dimension: int, robust: float
+) -> None:
+    """With A = shared L⁻ᵀ the means move by A L⁻¹ν and the covariance loses A Aᵀ, both over `robust`."""
+    own, mean = state.clock_covariance, state.clock_mean
+    for row in range(_STATES):
+        part, axis = (row % 4, row // 4) if row < _ARM else (OF_ARM, row - _ARM)
+        for k in range(dimension):
+            rest = shared[row, k]
+            for before in range(k):
+                rest -= factor[k, before] * shared[row, before]
+            shared[row, k] = rest / factor[k, k]
+            for one in range(OFFSETS):
+                mean[one, part, axis] += shared[row, k] * white[one, k] / robust
+        for column in range(row + 1):
+            left = own[row, column]
+            for k in range(dimension):
+                left -= shared[row, k] * shared[column, k] / robust
+            own[row, column] = own[column, row] = left
+
+
+@compiled
+def _follow(model: Model, state: State, turned: FloatArray) -> None:
+    """Those that are out of the question take over the lever arm of the likeliest.
+
+    Their own was bent by positions that they did not expect, and would hold them back when a wandering clock comes by.
+    """
+    best, mean = 0, state.clock_mean
+    for one in range(OFFSETS):
+        if state.clock_weight[one] > state.clock_weight[best]:
+            best = one
+    for one in range(OFFSETS):
+        if state.clock_weight[one] < state.clock_weight[best] - _LEAD:
             for axis in range(model.dimension):
-                state.clock_mean[one, row, axis] += shared[row] / variance * apart[one, axis]
-    for row in range(4):
-        for column in range(4):
-            own[row, column] -= shared[row] * shared[column] / variance
+                for part in range(3):
+                    mean[one, 0, axis] -= turned[axis, part] * (mean[best, OF_ARM, part] - mean[one, OF_ARM, part])
+            for part in range(3):
+                mean[one, OF_ARM, part] = mean[best, OF_ARM, part]
 
 
 @compiled(inner=True)
@@ -182,7 +274,7 @@ def judge(state: State) -> None:
     state.fact[CLOCK_S] = min(max(state.fact[CLOCK_S], offset - STEP_S), offset + STEP_S)
 
 
-@compiled(inner=True)
+@compiled
 def _add_prior(state: State, bend: float, pull: float) -> None:
     """Mean and variance of an offset o whose log likelihood is pull·o − bend·o²/2, by a prior of two normals.
 

@@ -59,6 +59,7 @@ FUSED, AHEAD, HELD, MIXED, STATED, OWN, SHOWN = 0, 3, 6, 9, 12, 13, 14
 
 MEMBERS = 81  # of the bank
 OFFSETS = 11  # of the tracker's clock, that are tried
+OF_ARM = 4  # the row of a clock filter's mean that holds its lever arm
 MOST_WAITING = 8
 
 
@@ -90,8 +91,8 @@ class State(Protocol):
     weight: FloatArray  # (members,): log likelihood with forgetting
     share: FloatArray  # (members,): by weight and prior
     kept: FloatArray  # (members,): of the correlated noise, over the last step
-    clock_mean: FloatArray  # (offsets, 4, 3): as of a member of the bank
-    clock_covariance: FloatArray  # (4, 4), of all
+    clock_mean: FloatArray  # (offsets, 5, 3): as of a member of the bank, and a lever arm
+    clock_covariance: FloatArray  # (15, 15), of all: four of each axis, and the lever arm
     clock_weight: FloatArray  # (offsets,)
     usual: FloatArray  # (3, 3 + INPUTS): slow averages of lever-arm and input couplings
     waiting: FloatArray  # (most + 1, 5): time, arrival and value of frames not taken in yet
@@ -103,7 +104,7 @@ class Phone(NamedTuple):
     time: FloatArray  # (capacity,)
     row: FloatArray  # (capacity, COLUMNS)
     shown: FloatArray  # (capacity, SHOWN): what was shown when the row was the newest; NaN where nothing was
-    corrected: FloatArray  # (capacity, 6): room for accelerations and lever arms as the state corrects them
+    corrected: FloatArray  # (capacity, 3): room for accelerations as the state corrects them
 
 
 MODEL = np.dtype(
@@ -132,8 +133,8 @@ STATE = np.dtype(
         ("weight", np.float64, (MEMBERS,)),
         ("share", np.float64, (MEMBERS,)),
         ("kept", np.float64, (MEMBERS,)),
-        ("clock_mean", np.float64, (OFFSETS, 4, 3)),
-        ("clock_covariance", np.float64, (4, 4)),
+        ("clock_mean", np.float64, (OFFSETS, 5, 3)),
+        ("clock_covariance", np.float64, (15, 15)),
         ("clock_weight", np.float64, (OFFSETS,)),
         ("usual", np.float64, (3, 3 + INPUTS)),
         ("waiting", np.float64, (MOST_WAITING + 1, 5)),
@@ -158,5 +159,5 @@ def empty(capacity: int) -> Memory:
 def room(capacity: int) -> Phone:
     """Room for `capacity` rows."""
     return Phone(
-        np.zeros(capacity), np.zeros((capacity, COLUMNS)), np.full((capacity, SHOWN), np.nan), np.zeros((capacity, 6))
+        np.zeros(capacity), np.zeros((capacity, COLUMNS)), np.full((capacity, SHOWN), np.nan), np.zeros((capacity, 3))
     )

@@ -65,7 +65,7 @@ def move(model: Model, state: State, dt: float, net: FloatArray, coupling: Float
     _add_noise(model, state, dt, psd)
 
 
-@compiled(inner=True)
+@compiled
 def _add_noise(model: Model, state: State, dt: float, psd: float) -> None:
     covariance = state.covariance
     for axis in range(3):
@@ -178,15 +178,15 @@ def correct(model: Model, state: State, ago: float, turned: FloatArray, position
                 total += turned[axis, arm] * shared[ARM + arm, other]
             spread[axis, other] = total
         own += spread[axis, axis] / dimension
-    squared = _whiten(dimension, spread, variance, innovation, factor, white)
+    squared = whiten(dimension, spread, variance, innovation, factor, white)
     if squared > model.surprise:
         more = squared / model.surprise * (own + variance) - own
-        _whiten(dimension, spread, more, innovation, factor, white)
+        whiten(dimension, spread, more, innovation, factor, white)
     _gain(dimension, mean, covariance, shared, factor, white)
 
 
 @compiled(inner=True)
-def _whiten(
+def whiten(
     dimension: int,
     spread: FloatArray,
     variance: float,
@@ -210,7 +210,7 @@ def _whiten(
     return squared
 
 
-@compiled(inner=True)
+@compiled
 def _gain(
     dimension: int,
     mean: FloatArray,

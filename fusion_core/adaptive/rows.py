@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 
 from fusion_core.adaptive.layout import (
-    ARM,
     AT_LARGEST,
     BIAS,
     CLIPPED,
@@ -24,7 +23,6 @@ from fusion_core.adaptive.layout import (
     FORCE,
     INPUTS,
     KNOWN,
-    KNOWS_ARM,
     LARGEST,
     MOUNTING,
     OFFSET,
@@ -80,7 +78,7 @@ def put_in(model: Model, state: State, phone: Phone, reading: FloatArray) -> int
     return int(at)
 
 
-@compiled(inner=True)
+@compiled
 def _is_clipped(state: State, reading: FloatArray) -> bool:
     """Is a component the very largest there was, and not for the first times? A motion's peaks differ, a range ends."""
     largest = 0.0
@@ -95,7 +93,7 @@ def _is_clipped(state: State, reading: FloatArray) -> bool:
     return bool(largest > _MAY_CLIP_MM_S2 and state.fact[AT_LARGEST] >= _CLIPS_AFTER)
 
 
-@compiled(inner=True)
+@compiled
 def _write_row(row: FloatArray, at: int, reading: FloatArray, dimension: int) -> None:
     for column in range(COLUMNS):
         row[at, column] = 0.0
@@ -112,7 +110,7 @@ def _write_row(row: FloatArray, at: int, reading: FloatArray, dimension: int) ->
             row[at, CROSSED + 3 * axis + 2] = x * b - y * a
 
 
-@compiled(inner=True)
+@compiled
 def _copy_row(phone: Phone, of: int, to: int) -> None:
     phone.time[to] = phone.time[of]
     for column in range(COLUMNS):
@@ -136,7 +134,7 @@ def row_before(phone: Phone, count: int, time: float) -> int:
     return _before(phone.time, count, time)
 
 
-@compiled(inner=True)
+@compiled
 def _before(times: FloatArray, count: int, time: float) -> int:
     at = max(count - 1, 0)
     while at > 0 and times[at] > time:
@@ -169,7 +167,7 @@ def integrate(times: FloatArray, count: int, values: FloatArray, begin: float, e
     return unknown / (end - begin)
 
 
-@compiled(inner=True)
+@compiled
 def _straight(
     times: FloatArray, values: FloatArray, row: int, at: float, until: float, end: float, total: FloatArray
 ) -> float:
@@ -189,7 +187,7 @@ def _straight(
     return dt * _JERK_PSD * step * step / 12.0 if step > _GAP_S else 0.0
 
 
-@compiled(inner=True)
+@compiled
 def _held(
     times: FloatArray, values: FloatArray, row: int, at: float, until: float, end: float, total: FloatArray
 ) -> float:
@@ -219,37 +217,20 @@ def silence(times: FloatArray, count: int, begin: float, end: float) -> float:
 
 
 @compiled(inner=True)
-def between(phone: Phone, count: int, time: float, arm: FloatArray) -> None:
-    """The corrected lever arm (3,) at a time, by a straight line between rows; the first or last outside."""
-    if count == 0:
-        for axis in range(3):
-            arm[axis] = 0.0
-        return
-    row = _before(phone.time, count, time)
-    following, share = min(row + 1, count - 1), 0.0
-    if following > row:
-        share = min(max((time - phone.time[row]) / (phone.time[following] - phone.time[row]), 0.0), 1.0)
-    for axis in range(3):
-        arm[axis] = (1.0 - share) * phone.corrected[row, 3 + axis] + share * phone.corrected[following, 3 + axis]
-
-
-@compiled(inner=True)
 def correct(state: State, phone: Phone, first: int, dimension: int) -> None:
-    """From the row `first` on: accelerations less what the input states put into them, and lever arms."""
+    """From the row `first` on: accelerations less what the input states put into them."""
     mean, up, level, felt, count = state.mean, np.zeros(3), np.zeros(3), False, state.count[ROWS]
     if dimension == 3 and count > 0:
         felt = phone.row[count - 1, KNOWN] == FELT
         _upward(phone, count - 1, up)
     for at in range(first, count):
         own = phone.row[at]
-        turned = state.count[KNOWS_ARM] and own[KNOWN] >= ORIENTED
         for axis in range(3):
-            total, arm = own[VALUE + axis] - mean[OFFSET + axis], 0.0
+            total = own[VALUE + axis] - mean[OFFSET + axis]
             for part in range(3):
-                share = own[TURNED + 3 * axis + part]
-                arm += share * mean[ARM + part]
-                total -= share * mean[BIAS + part] + own[CROSSED + 3 * axis + part] * mean[MOUNTING + part]
-            phone.corrected[at, axis], phone.corrected[at, 3 + axis] = total, arm if turned else 0.0
+                total -= own[TURNED + 3 * axis + part] * mean[BIAS + part]
+                total -= own[CROSSED + 3 * axis + part] * mean[MOUNTING + part]
+            phone.corrected[at, axis] = total
         if felt:
             rise = own[VALUE] * up[0] + own[VALUE + 1] * up[1] + own[VALUE + 2] * up[2]
             for axis in range(3):
@@ -289,7 +270,7 @@ def couple(
         coupling[order, axis, TURN - BIAS + 1] = up[one] * level[two] - up[two] * level[one]
 
 
-@compiled(inner=True)
+@compiled
 def _upward(phone: Phone, row: int, up: FloatArray) -> None:
     """Against gravity, which was added to R f to make the row's acceleration; zeros where there was none."""
     own, squared = phone.row[row], 0.0

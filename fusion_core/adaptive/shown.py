@@ -124,7 +124,7 @@ def answer(model: Model, state: State, phone: Phone, time: float, answers: Float
         answers[MIXED + axis] += weight[1] * answers[AHEAD + axis] + weight[2] * answers[HELD + axis]
 
 
-@compiled(inner=True)
+@compiled
 def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
     """The lever arm, as the newest row turns it, added to what positions alone say of the phone."""
     newest = state.count[ROWS] - 1
@@ -137,7 +137,7 @@ def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
             answers[HELD + axis] += arm
 
 
-@compiled(inner=True)
+@compiled
 def _weights(model: Model, state: State, weight: FloatArray) -> None:
     """The answers' weights by their squared errors: as of normal errors whose variance is what was seen.
 
@@ -181,13 +181,13 @@ def score(model: Model, state: State, phone: Phone, time: float, position: Float
             state.fact[SURPRISE] += newer * (surprise - state.fact[SURPRISE])
 
 
-@compiled(inner=True)
+@compiled
 def _noise(state: State) -> float:
     """The variance of a position's noise, as found."""
     return float(state.fact[NOISE] + state.fact[NOISE_DRIFT])
 
 
-@compiled(inner=True)
+@compiled
 def _of_either_clock(model: Model, state: State) -> float:
     """The variance of not knowing whose clock is wrong: no frame shows it, since all are off by as much.
 

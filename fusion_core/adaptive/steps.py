@@ -122,7 +122,7 @@ def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> No
             shown.answer(model, state, phone, phone.time[newest], phone.shown[newest])
 
 
-@compiled(inner=True)
+@compiled
 def _correct_clock(state: State, ahead_s: float) -> None:
     """No reading was measured after it arrived: a phone's stamps that say so are taken back by as much.
 
@@ -134,7 +134,7 @@ def _correct_clock(state: State, ahead_s: float) -> None:
     state.fact[PHONE_AHEAD] = ahead
 
 
-@compiled(inner=True)
+@compiled
 def _queue(state: State, reading: FloatArray) -> None:
     """A frame among those that wait, in order of measurement. There is room for one more than may wait."""
     at, waiting = state.count[WAITING], state.waiting
@@ -148,7 +148,7 @@ def _queue(state: State, reading: FloatArray) -> None:
     state.count[WAITING] += 1
 
 
-@compiled(inner=True)
+@compiled
 def _is_due(state: State, phone: Phone, now: float) -> bool:
     """Need the first frame wait no longer? The phone has said what it felt up to then, or is not going to."""
     if state.count[WAITING] == 0 or state.count[WAITING] > MOST_WAITING:
@@ -176,7 +176,7 @@ def _take_first(model: Model, state: State, phone: Phone) -> None:
         _take_in(model, state, phone, stamp, value)
 
 
-@compiled(inner=True)
+@compiled
 def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
     """The first frame."""
     moments.begin(model, state, value)
@@ -189,7 +189,7 @@ def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
         state.fact[LAST + axis] = value[axis]
 
 
-@compiled(inner=True)
+@compiled
 def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[float, float, float]:
     """Everything moved to `time`; returns the duration, and what the small filters are to consider: a variance
     of positions and a density of accelerations."""
@@ -213,12 +213,13 @@ def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[flo
     if rows.turned_at(state, phone, time, turned) and not state.count[KNOWS_ARM]:
         state.count[KNOWS_ARM] = 1
         moments.to_phone(state, turned)
+        clock.to_phone(state, turned)
     of_positions, of_accelerations = bank.considered(model, state, turned, coupling, dt)
     bank.move(model, state, dt, net, unknown + of_accelerations)
     return dt, of_positions, unknown + of_accelerations
 
 
-@compiled(inner=True)
+@compiled
 def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: FloatArray) -> None:
     """A frame taken in, measured at its stamp by the tracker's clock, if it is a measurement at all."""
     time = stamp + state.fact[CLOCK_S]
@@ -231,7 +232,7 @@ def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: Floa
     if verdict == _BELIEVED_AGAIN:
         moments.begin_again(model, state, of_phone)
         bank.begin_again(model, state, of_phone)
-        clock.begin_again(model, state, of_phone)
+        clock.begin_again(model, state, value, turned)
         state.fact[STAMP] = stamp
         return
     news = 1 if verdict == _MEASURED and ago == 0.0 else 0
@@ -240,12 +241,12 @@ def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: Floa
         bank.take_in(model, state, of_phone, of_positions, max(dt, 1e-3))
         bank.judge(model, state)
     if news or verdict == _NOTHING:
-        clock.take_in(model, state, phone, stamp, value, of_accelerations, of_positions, news)
+        clock.take_in(model, state, phone, stamp, value, turned, of_accelerations, news)
     if verdict == _MEASURED:
         moments.correct(model, state, ago, turned, value, state.fact[NOISE] + _of_clock(model, state))
 
 
-@compiled(inner=True)
+@compiled
 def _judge(
     model: Model,
     state: State,
@@ -273,7 +274,7 @@ def _judge(
     return _MEASURED
 
 
-@compiled(inner=True)
+@compiled
 def _of_clock(model: Model, state: State) -> float:
     """How much of a position's noise comes of not knowing when it was measured."""
     squared = 0.0
@@ -282,7 +283,7 @@ def _of_clock(model: Model, state: State) -> float:
     return float(squared * state.fact[CLOCK_VARIANCE])
 
 
-@compiled(inner=True)
+@compiled
 def _is_news(model: Model, state: State, value: FloatArray) -> bool:
     """A tracker that has lost its target repeats the last position or says zero: no noise does that on all axes.
 
@@ -298,7 +299,7 @@ def _is_news(model: Model, state: State, value: FloatArray) -> bool:
     return not (repeated or zero) or state.count[HAS_DIFFERED] == 0
 
 
-@compiled(inner=True)
+@compiled
 def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -> bool:
     """Further from what was expected than a hand goes: another body's, for as long as that can be.
 
@@ -321,7 +322,7 @@ def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -
     return bool(time - state.fact[STRANGE_SINCE] < _BELIEVED_AFTER_S)
 
 
-@compiled(inner=True)
+@compiled
 def _extend_head(state: State, phone: Phone) -> None:
     """The integrals from the state on go on to a new newest row."""
     newest = state.count[ROWS] - 1
@@ -344,7 +345,7 @@ def oldest_needed(models: Records, states: Records, phone: Phone) -> int:
     return first
 
 
-@compiled(inner=True)
+@compiled
 def _trace(state: State, into: FloatArray) -> None:
     for at in range(FACTS):
         into[at] = state.fact[at]

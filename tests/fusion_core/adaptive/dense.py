@@ -16,6 +16,7 @@ from scipy.linalg import block_diag
 from fusion_core.adaptive import layout
 from fusion_core.adaptive.layout import Records
 from fusion_core.samples import Samples
+from tests.fusion_core.adaptive.dense_clock import DenseClock
 
 P, V, INPUT, ARM, DRIFT = slice(0, 3), slice(3, 6), slice(6, 17), slice(17, 20), slice(20, 23)
 
@@ -47,6 +48,8 @@ class Dense:
             self.bank.append(own)
         self.weight = np.zeros(len(members))
         self.judge()
+        self.stamp = time
+        self.clock = DenseClock(model, self.scale[0], self.scale[2], position)
 
     def turned(self, time: float) -> np.ndarray:
         """The rotation, between readings by a straight line."""
@@ -75,8 +78,9 @@ class Dense:
                 second += share * (end - at) * value
         return first.reshape(3, 12), second.reshape(3, 12)
 
-    def take(self, time: float, position: np.ndarray, clock_variance: tuple[float, float]) -> None:
-        """A frame, moved to and taken in; the clock's variance is that before and after it."""
+    def take(self, stamp: float, position: np.ndarray) -> None:
+        """A frame, moved to and taken in."""
+        time = stamp + self.clock.value
         dt = time - self.time
         first, second = self.integrals(self.time, time)
         net = [integral[:, 0] - integral[:, 1:] @ self.mean[INPUT] for integral in (first, second)]
@@ -91,10 +95,12 @@ class Dense:
         of_positions, of_accelerations = self._considered(dt, turned, first[:, 1:] / dt)
         of_phone = position - turned @ self.mean[ARM]
         squared_speed = float(self.mean[V] @ self.mean[V] / 3)
-        of_positions += squared_speed * clock_variance[0]
+        of_positions += squared_speed * self.clock.variance
         self._bank(dt, net, of_phone, of_positions, of_accelerations)
         self.judge()
-        self._correct(turned, position, squared_speed * clock_variance[1])
+        self.clock.take(self, self.stamp, stamp, position, of_accelerations, turned)
+        self.stamp = stamp
+        self._correct(turned, position, squared_speed * self.clock.variance)
 
     def _move(self, dt: float, first: np.ndarray, second: np.ndarray) -> None:
         kept = np.exp(-dt / self.scale[3]) if self.scale[3] > 0 else 0.0
@@ -172,13 +178,16 @@ class Dense:
         self.covariance = self.covariance - gain @ observed @ self.covariance
 
 
-def taken(model: Records, tracker: Samples, imu: Samples, clock: np.ndarray) -> dict[str, Any]:
-    """A whole recording: the last mean, covariance and scales.
-
-    `clock` (n, 2) is the offset of the tracker's clock and its variance after each frame: they are another filter's.
-    """
+def taken(model: Records, tracker: Samples, imu: Samples) -> dict[str, Any]:
+    """A whole recording: the last mean, covariance and scales, the clock's offset and its variance."""
     dense = Dense(model, imu, tracker.value[0], float(tracker.time[0]))
     for frame in range(1, len(tracker)):
-        offset, before = clock[frame - 1]
-        dense.take(float(tracker.time[frame] + offset), tracker.value[frame], (before, clock[frame, 1]))
-    return {"mean": dense.mean, "covariance": dense.covariance, "scale": dense.scale, "time": dense.time}
+        dense.take(float(tracker.time[frame]), tracker.value[frame])
+    clock = (dense.clock.value, dense.clock.variance)
+    return {
+        "mean": dense.mean,
+        "covariance": dense.covariance,
+        "scale": dense.scale,
+        "time": dense.time,
+        "clock": clock,
+    }
