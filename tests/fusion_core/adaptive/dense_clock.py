@@ -64,7 +64,7 @@ class DenseClock:
         self.mean = self.mean + apart @ gain.T
         self.covariance = self.covariance - gain @ observed @ self.covariance
         best = int(np.argmax(self.weight))
-        for one in np.flatnonzero(self.weight < self.weight[best] - 5.0):
+        for one in map(int, np.flatnonzero(self.weight < self.weight[best] - 5.0)):
             self.mean[one, :3] -= turned @ (self.mean[best, 12:] - self.mean[one, 12:])
             self.mean[one, 12:] = self.mean[best, 12:]
 
