@@ -206,6 +206,9 @@ def under_departures(sources: list[Source]) -> None:
         rows, worse = [], []
         for source in sources:
             whole = _without_gaps(recorded(source, DEPARTURES[departure]), source)
+            if not len(whole.times):
+                worse.append(f"{source.name} left out: no heading was ever found")
+                continue
             own, raw, alone = (score(one, whole, source.reference) for one in names.values())
             ratio = own.rmse_mm / min(raw.rmse_mm, alone.rmse_mm)
             rows.append((own.rmse_mm, own.coverage, ratio))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 from pipeline.report.prose.references import has_publication
-from pipeline.sessions.estimators import build_estimator
+from pipeline.sessions.estimators import build_estimator, fusing
 from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON
 from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES
 from pipeline.study.comparison import Comparison, matching_measures
@@ -16,6 +15,7 @@ from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
+from pipeline.words.estimators import ESTIMATOR_WORDS, setting_in_words, settings_in_words
 from pipeline.words.evidence import resampled
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
 from pipeline.words.numbers import number
@@ -103,22 +103,17 @@ def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _estimators(study: Study) -> Iterator[str]:
-    """Each estimator with all its settings, stated or not."""
+    """Each estimator and the settings that were chosen for it; the provenance has them all."""
     if not study.estimators or study.sessions is None:
         return
     sensors = [f"{name} ({', '.join(_stated(stream))})" for name, stream in study.sensor_streams.items()]
     yield f"Sensors, as stated to the estimators: {'; '.join(sensors)}."
-    estimators = []
+    estimators, with_accelerations = [], fusing(study)
     for name, settings in study.estimators.items():
-        built = build_estimator(study, name)
-        values = [
-            setting_in_words(field.name, getattr(built, field.name))
-            for field in fields(built)  # type: ignore[arg-type]
-            if field.name != "sensors"
-        ]
-        kind = settings.type if settings.type == name else f"{name} is {settings.type}"
-        streams = [f"streams {listing(list(settings.use))}"] if settings.use else []
-        estimators.append(f"{kind} ({', '.join([*streams, *values])})" if streams or values else kind)
+        words = settings_in_words(build_estimator(study, name))
+        alone = [] if name in with_accelerations else ["from the tracker alone"]
+        chosen = ", ".join([*alone, *(words[key] for key in settings.parameters)])
+        estimators.append(f"{name}: {ESTIMATOR_WORDS[settings.type]}{f' ({chosen})' if chosen else ''}")
     yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(estimators)}."
     for condition, name in study.shown.items():
         yield f"Condition {condition} displayed {name}."
@@ -138,29 +133,6 @@ def _stated(stream: Sensing) -> Iterator[str]:
     for name, value in stream:
         if name.startswith("noise_sd") or name == "latency_s":
             yield setting_in_words(name, value)
-
-
-_UNITS = (
-    ("_mm_s2_per_sqrt_s", "mm/s²/√s"),
-    ("_mm_per_sqrt_s", "mm/√s"),
-    ("_mm2_s5", "mm²/s⁵"),
-    ("_mm_s2", "mm/s²"),
-    ("_mm_s", "mm/s"),
-    ("_mm2", "mm²"),
-    ("_hz", "Hz"),
-    ("_deg", "°"),
-    ("_mm", "mm"),
-    ("_ms", "ms"),
-    ("_s", "s"),
-)
-
-
-def setting_in_words(name: str, value: object) -> str:
-    """`noise_sd_mm`, 8.0 as `noise SD 8 mm`: a paper's reader knows none of our names, and their ends are units."""
-    end, unit = next(((end, unit) for end, unit in _UNITS if name.endswith(end)), ("", ""))
-    words = name.removesuffix(end).replace("_", " ").replace(" sd", " SD")
-    shown = f"{value:g}".replace("e+0", "e") if isinstance(value, float) else str(value).replace("_", " ")
-    return f"{words} {shown}{f' {unit}' if unit else ''}"
 
 
 def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:

@@ -16,6 +16,7 @@ from pipeline.sessions.fusion_checks import USED
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
+from pipeline.words.estimators import ESTIMATOR_WORDS
 from pipeline.words.numbers import NO_VALUE, milliseconds, number, percent
 from pipeline.words.phrases import counted
 
@@ -73,7 +74,7 @@ def _without_accelerations(material: Material) -> dict[str, list[str]]:
 def _method(material: Material) -> tuple[str | Strong, ...]:
     with_accelerations = fusing(material.study)
     listed = [
-        f"{name} ({settings.type}{'' if name in with_accelerations else ', from the tracker alone'})"
+        f"{name} ({ESTIMATOR_WORDS[settings.type]}{'' if name in with_accelerations else ', from the tracker alone'})"
         for name, settings in material.study.estimators.items()
     ]
     return (

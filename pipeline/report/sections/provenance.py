@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pipeline.engine.code_digest import versions
 from pipeline.engine.provenance import LIBRARIES
-from pipeline.report.document.model import Column, Folded, Paragraph, Section, Table
+from pipeline.report.document.model import Column, Folded, Paragraph, Section, Table, columns
 from pipeline.report.prose.methods import computed_with
 from pipeline.report.sections.material import Material
+from pipeline.sessions.estimators import build_estimator
 from pipeline.statistics import WILSON
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words.phrases import counted
+from pipeline.words.estimators import ESTIMATOR_WORDS, settings_in_words
+from pipeline.words.numbers import NO_VALUE
+from pipeline.words.phrases import counted, listing
 
 _FILES_MAX = 60
 
@@ -51,9 +54,30 @@ def section(material: Material) -> Section:
         "Provenance",
         (
             Paragraph((text,)),
+            *_settings(material),
             Folded("Digests of the files that were read", (_inputs(material),), in_annex=False),
         ),
     )
+
+
+def _settings(material: Material) -> Iterator[Folded]:
+    """Every estimator's settings, those that study.yaml leaves to the program too."""
+    study = material.study
+    if not study.estimators or study.sessions is None:
+        return
+    rows = []
+    for name, settings in study.estimators.items():
+        streams = [f"streams {listing(list(settings.use))}"] if settings.use else []
+        words = settings_in_words(build_estimator(study, name))
+        rows.append((name, ESTIMATOR_WORDS[settings.type], ", ".join([*streams, *words.values()]) or NO_VALUE))
+    table = Table(
+        "table-estimators",
+        "The estimators with all their settings: those of study.yaml, and the defaults of this version for the others.",
+        columns(("Estimator", "What it is", "Settings"), 3),
+        tuple(rows),
+        cards=True,
+    )
+    yield Folded("The settings of the estimators", (table,))
 
 
 def _inputs(material: Material) -> Table:

@@ -96,7 +96,7 @@ def test_without_a_contradiction_the_best_is_named(folder: Folder, steadyhand: S
     page = text_of(steadyhand.out / "report.html")
     assert "fusion comes closest to the reference" in page
     assert "Smallest RMSE: fusion" in page
-    assert "raw (raw, from the tracker alone); fusion (fusion_kalman)" in page
+    assert "raw (the newest position, held, from the tracker alone); fusion (a Kalman filter of positions and" in page
     assert "is best is not said" not in page + ran.out
     assert "Nothing was left out: every session" in page
 
