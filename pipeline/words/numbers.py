@@ -72,13 +72,20 @@ def fixed_decimals(value: float, digits: int) -> str:
     return text.removeprefix(MINUS) if float(text.replace(MINUS, "-").replace(THIN_SPACE, "")) == 0 else text
 
 
+_MOST_DECIMALS = 12
+_LEVEL = 0.05  # of significance, as nearly every study chooses it
+
+
 def p_value(p: float | None, digits: int = 4) -> str:
     """A p value with `digits` decimals: `.0071`.
 
-    A p value is never 0 or 1, so one that would be rounded to that is shown as `< .0001` or `> .9999`.
+    A p value is never 0 or 1, so one that would be rounded to that is shown as `< .0001` or `> .9999`; one just below
+    .05 is not rounded up to it, but has as many decimals as keep it below: `.04996`.
     """
     if p is None:
         return NO_VALUE
+    while digits < _MOST_DECIMALS and p < _LEVEL <= round(p, digits):
+        digits += 1
     smallest = 10.0**-digits
     if p < smallest:
         return f"< {fraction(smallest, digits)}"
