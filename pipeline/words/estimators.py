@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-
-from fusion_core import Estimator
+from typing import Any
 
 ESTIMATOR_WORDS: Mapping[str, str] = {
     "raw": "the newest position, held",
@@ -43,10 +42,10 @@ def setting_in_words(name: str, value: object) -> str:
     return f"{words} {shown}{f' {unit}' if unit else ''}"
 
 
-def settings_in_words(built: Estimator) -> dict[str, str]:
-    """All settings of an estimator by name, stated or not, in words."""
+def settings_in_words(built: Any) -> dict[str, str]:
+    """All settings of an estimator, a dataclass, by name, stated or not, in words."""
     return {
         field.name: setting_in_words(field.name, getattr(built, field.name))
-        for field in fields(built)  # type: ignore[arg-type]
+        for field in fields(built)
         if field.name != "sensors"
     }
