@@ -28,7 +28,7 @@ from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Row
 
 MM_PER_M = 1000.0
-MEMORY_PER_BYTE = 20.0
+MEMORY_PER_BYTE = 6.0
 """Bytes of memory that a session takes for each of its log, by docs/limits.md."""
 _NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
 _SAME_CLOCK_S = 3600.0

@@ -22,7 +22,7 @@ from pipeline.study.table_text import is_workbook, read_rows
 Codes = Sequence[float | str]
 """What study.yaml lists under `missing`: numbers or words that stand for a value that is not there."""
 
-MEMORY_PER_BYTE = 27.0
+MEMORY_PER_BYTE = 16.0
 """Bytes of memory that a report takes for each of a table, by docs/limits.md."""
 
 _IN_OURS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "s": 1.0, "ms": 1e-3}

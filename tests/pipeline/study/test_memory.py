@@ -38,7 +38,7 @@ def test_a_table_that_does_not_fit_is_refused_with_what_it_would_take(
         "conditions: [a, b]\nmeasures: m.csv\n", **{"m.csv": "participant,condition,measure,value\nP1,a,m,1\n"}
     )
     monkeypatch.setattr(memory, "_SMALL_BYTES", 10)
-    monkeypatch.setattr(table_file, "free_bytes", lambda: 1000)
+    monkeypatch.setattr(table_file, "free_bytes", lambda: 100)
     ran = steadyhand("compare", study)
     assert ran.code == 2
     assert "m.csv: refused: it is 0 MB, for which a report needs about 0.0 GB of memory, and 0.0 GB are free" in ran.err
