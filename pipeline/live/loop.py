@@ -10,7 +10,7 @@ import asyncio
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.errors import WorkerLostError
 from pipeline.live import checks, run_state, study_run
 from pipeline.live.adapters.mouse import MouseHand
 from pipeline.live.clerk import Clerk, FileAction, agreement
@@ -152,6 +153,7 @@ class Loop:
         self.run = run_state.begin(setup, known)
         self.now_ns, self.pages = clock, dict[int, Outbox]()
         self.refused: list[Counter[str]] = []  # of every adapter: what it did not take, by reason
+        self.examiner: Executor | None = None  # does the checks; without it a thread does, which readings wait for
         self._ticked_ns, self._wall_ns = clock(), clock()
         self._counted_ns, self._counts = clock(), Counter[str]()
         self._folder, self._clerk = folder, clerk
@@ -286,8 +288,9 @@ class Loop:
     async def _examine(self, action: Examine) -> None:
         """Check the last readings."""
         try:
-            seen, claims = await asyncio.to_thread(checks.examined, self.run.setup.study, action.request)
-        except (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError) as error:  # no reason to end a study
+            running, study = asyncio.get_running_loop(), self.run.setup.study
+            seen, claims = await running.run_in_executor(self.examiner, checks.examined, study, action.request)
+        except (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError, WorkerLostError) as error:  # go on
             seen, claims = (), (Light(checks.CLAIMS, "amber", f"The last readings could not be checked: {error}."),)
         self.happens(Examined(seen, claims, self.now_ns()))
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import os
 import socket
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -15,6 +17,7 @@ from pathlib import Path
 import uvicorn
 from starlette.applications import Starlette
 
+from pipeline.engine.processes import Processes
 from pipeline.errors import PipelineError
 from pipeline.live import senders, setup
 from pipeline.live.access import LOOPBACK, Access
@@ -103,11 +106,24 @@ def listening(host: str, port: int) -> socket.socket:
 
 
 _SWITCH_S = 0.0005  # instead of 5 ms
+_NICE = 10
 
 
 def let_others_wait() -> None:
     """Hand over to the loop's thread soon: checks and a replay run beside it, and no reading is to wait for them."""
     sys.setswitchinterval(_SWITCH_S)
+
+
+@contextmanager
+def examiners() -> Iterator[Executor]:
+    """What does the checks: a process that lets others go first.
+
+    In a thread readings would wait for all that NumPy does there in one go, 20 ms and more.
+    """
+    with Processes(1) as examiner:
+        if hasattr(os, "nice"):
+            examiner.submit(os.nice, _NICE)
+        yield examiner
 
 
 @contextmanager
@@ -151,9 +167,18 @@ def opened(access: Access, certificates: Certificates | None) -> Doors:
         raise
 
 
-async def serve(made: Setup, folder: Path, journal: Journal, access: Access, doors: Doors, known: Plan) -> None:
-    """Run the study until the server is stopped."""
+async def serve(
+    made: Setup,
+    folder: Path,
+    journal: Journal,
+    access: Access,
+    doors: Doors,
+    known: Plan,
+    examiner: Executor | None = None,
+) -> None:
+    """Run the study until the server is stopped; `examiner` does the checks of what comes in, or a thread does."""
     loop = Loop(made, folder, Clerk(journal, check=None), known, Clock())
+    loop.examiner = examiner
     receivers = await senders.opened(made, loop, access, folder)
     application = app(loop, access, doors.certificates)
     servers = [(uvicorn.Server(_config(application)), doors.inside)]
@@ -222,7 +247,7 @@ def record(
             setup.warm_up(made)
             ready(made, access, certificates)
             let_others_wait()
-            with nothing_to_search(), suppress(KeyboardInterrupt):
-                asyncio.run(serve(made, folder, journal, access, doors, known))
+            with examiners() as examiner, nothing_to_search(), suppress(KeyboardInterrupt):
+                asyncio.run(serve(made, folder, journal, access, doors, known, examiner))
     finally:
         journal.release()

@@ -124,6 +124,7 @@ def main(folder: Path, count: int) -> None:
     record.let_others_wait()
     prepared, announce = list[Any](), list[dict[str, Any]]()
     with ExitStack() as stack:
+        examiner = stack.enter_context(record.examiners())
         for number in range(count):
             one = folder / f"{number}"
             udp_port = write_study(one)
@@ -136,7 +137,7 @@ def main(folder: Path, count: int) -> None:
             access = Access("http", "127.0.0.1", 0)
             inside = stack.enter_context(closing(record.opened(access, None)))
             access = replace(access, port=inside.inside.getsockname()[1])
-            prepared.append((made, one, journal, access, inside, made.empty_plan()))
+            prepared.append((made, one, journal, access, inside, made.empty_plan(), examiner))
             cookies = {role: f"{access.cookie(role)}={token}" for role, token in access.tokens.items()}
             announce.append({"port": access.port, "udp": udp_port, "key": access.sensors, "cookies": cookies})
         stack.enter_context(record.nothing_to_search())
