@@ -73,16 +73,16 @@ def _without_accelerations(material: Material) -> dict[str, list[str]]:
 
 def _method(material: Material) -> tuple[str | Strong, ...]:
     with_accelerations = fusing(material.study)
-    listed = [
-        f"{name} ({ESTIMATOR_WORDS[settings.type]}{'' if name in with_accelerations else ', from the tracker alone'})"
-        for name, settings in material.study.estimators.items()
-    ]
+    listed: list[str | Strong] = []
+    for name, settings in material.study.estimators.items():
+        alone = "" if name in with_accelerations else ", from the tracker alone"
+        listed += ["; " if listed else "", Strong(name), f" ({ESTIMATOR_WORDS[settings.type]}{alone})"]
     return (
         (
             "Every estimator was run over the same raw streams and asked, at the arrival of each acceleration, where"
             " the hand is at that instant, from what had arrived by then. Estimators: "
         ),
-        Strong("; ".join(listed)),
+        *listed,
         ".",
     )
 

@@ -77,7 +77,7 @@ def _settings(material: Material) -> Iterator[Folded]:
         tuple(rows),
         cards=True,
     )
-    yield Folded("The settings of the estimators", (table,))
+    yield Folded("The settings of the estimators", (table,), in_annex=False)
 
 
 def _inputs(material: Material) -> Table:
