@@ -37,10 +37,13 @@ def _felt_m_s2(since_s: float) -> list[float]:
 
 
 class Rig:
-    """One study's phone, tracker and operator, until `ends`, by the monotonic clock."""
+    """One study's phone, tracker and operator, until `ends`, by the monotonic clock; `phase`, from 0 to 1, is its own.
 
-    def __init__(self, announced: dict[str, Any], ends: float) -> None:
-        self.known, self.ends = announced, ends
+    No two phones are in step: each begins to send at its own part of the time between two readings.
+    """
+
+    def __init__(self, announced: dict[str, Any], ends: float, phase: float) -> None:
+        self.known, self.ends, self.phase = announced, ends, phase
         self.newest = self.drawn = 0
         self.sets_off = time.time() + _STILL_S
         self.answered: dict[str, float] | None = None
@@ -64,6 +67,11 @@ class Rig:
         headers = {"Cookie": cookie}
         return websockets.connect(f"ws://{where}/socket/{role}", origin=f"http://{where}", additional_headers=headers)  # type: ignore[arg-type]
 
+    def _begins(self, every_s: float) -> float:
+        """The next time at which it is this rig's turn, of those that come `every_s` seconds."""
+        now = time.monotonic()
+        return now + (self.phase * every_s - now) % every_s
+
     async def _operate(self, page: Any) -> None:
         """Begin whatever can be begun."""
         await asyncio.sleep(_BEFORE_S)
@@ -83,7 +91,7 @@ class Rig:
                 self.answered = {**{key: message[key] for key in ("t1", "t2", "t3")}, "t4": time.time() * 1e3}
 
     async def _move(self, page: Any) -> None:
-        began = time.monotonic()
+        began = self._begins(_MOTION_S)
         for number in range(10**9):
             await _until(began + number * _MOTION_S)
             now = time.time() * 1e3
@@ -98,7 +106,7 @@ class Rig:
 
     async def _draw(self, page: Any) -> None:
         """The newest at each frame of the screen."""
-        began = time.monotonic()
+        began = self._begins(_FRAME_S)
         for number in range(10**9):
             await _until(began + number * _FRAME_S)
             if self.newest != self.drawn:
@@ -107,7 +115,7 @@ class Rig:
 
     async def _track(self) -> None:
         """Each reading's z is its number in µm, so that the log tells of every one whether it is there."""
-        began, random = time.monotonic(), np.random.default_rng(0)
+        began, random = self._begins(_TRACKER_S), np.random.default_rng(0)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for number in range(10**9):
                 await _until(began + number * _TRACKER_S)
@@ -128,7 +136,8 @@ def load(announced: list[dict[str, Any]], seconds: float) -> None:
 
     async def run() -> None:
         ends = time.monotonic() + seconds
-        await asyncio.gather(*(Rig(one, ends).run() for one in announced))
+        rigs = [Rig(one, ends, number / len(announced)) for number, one in enumerate(announced)]
+        await asyncio.gather(*(rig.run() for rig in rigs))
 
     asyncio.run(run())
 
