@@ -1,12 +1,14 @@
-"""What the operator may do, and what follows from it: start, end, decide about a cut log, skip, drop, note, swap."""
+"""What the operator may do, and what follows from it: start, end, decide about a cut log, skip, drop, note, swap,
+accept a sender.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from pipeline.live import desk, plan, session, session_state
+from pipeline.live import desk, offers, plan, session, session_state
 from pipeline.live.changes import changed
-from pipeline.live.events import Action, Open, Resolve, Said, Tell
+from pipeline.live.events import Accept, Action, Open, Resolve, Said, Tell
 from pipeline.live.messages import Do
 from pipeline.live.outgoing import Done, PhaseOfTask, Refused
 from pipeline.live.plan import Record
@@ -112,6 +114,16 @@ def _swap(run: StudyRun, _reason: str, at_ns: int) -> Stepped:
     return run, (*told, *actions)
 
 
+def _accept(run: StudyRun, offer_id: str, at_ns: int) -> Stepped:
+    """Let a sender without a key feed its stream. The log that is open says so, and so does the file of answers."""
+    offer = offers.named(run, offer_id)
+    assert offer is not None  # noqa: S101 - it would have been refused
+    run = changed(run, accepted={**run.accepted, offer.stream: offer.source})
+    text = f"{offer.source}, which sends {offer.sends}, was accepted as {offer.stream}"
+    run, noted = _note(run, text, at_ns)
+    return run, (Accept(offer.stream, offer.source), *noted)
+
+
 _DEEDS: Mapping[str, Callable[[StudyRun, str, int], Stepped]] = {
     "start": _start,
     "abort": _abort,
@@ -122,4 +134,5 @@ _DEEDS: Mapping[str, Callable[[StudyRun, str, int], Stepped]] = {
     "drop": _drop,
     "note": _note,
     "swap": _swap,
+    "accept": _accept,
 }

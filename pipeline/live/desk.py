@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pipeline.live import health, plan
+from pipeline.live import health, offers, plan
 from pipeline.live.outgoing import Whole
 from pipeline.study.recording import BUILT_IN
 
@@ -64,6 +64,9 @@ class Refusal:
 
 def refusal(run: StudyRun, what: str, reason: str, at_ns: int) -> Refusal | None:
     """Why something cannot be done now; None where it can."""
+    if what == "accept":
+        why = offers.refusal(run, reason, at_ns)
+        return None if why is None else Refusal(why)
     if what not in _choices(run):
         return Refusal(f"“{what}” is not possible now.")
     if what == "note" and not reason:
@@ -98,7 +101,7 @@ def summary(run: StudyRun) -> object:
     pages = run.phones, run.phone, run.operators, run.forms
     # What `run.checks` is made of, as making its sentences for each tick would cost more than all else of it.
     checks = run.watched.found, len(run.watched.reached), run.watched.claims
-    return (run.plan, run.phase, within, pages, run.closed, run.agreed, fault, checks)
+    return (run.plan, run.phase, within, pages, run.closed, run.agreed, fault, checks, run.offers, run.accepted)
 
 
 def state(run: StudyRun, client: int) -> Whole:
@@ -119,6 +122,7 @@ def state(run: StudyRun, client: int) -> Whole:
         "links": [{"role": role, "url": url, "qr": f"/qr/{role}.svg"} for role, url in run.setup.links],
         "phones": len(run.phones),
         "questionnaires_open": len(run.forms),
+        "offers": offers.shown(run),
         "problems": _problems(run),
     }
     return Whole("state", content)
@@ -336,6 +340,7 @@ def facts(run: StudyRun, person: plan.Person, index: int, reason: str, at_ns: in
         drift = f"{mapping.drift * 1e6:.1f} ppm"
         found["clock"] = f"offset {mapping.offset_ms:.3f} ms, {drift}, ± {mapping.uncertainty_ms:.2f} ms"
     found |= {f"check_{one.id}": f"{one.light}: {one.text}" for one in run.checks}
+    found |= {f"accepted_{stream}": source for stream, source in run.accepted.items()}
     if reason:
         found["started_although"] = reason
         red = red_lights(run, at_ns)

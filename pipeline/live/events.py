@@ -152,6 +152,24 @@ class Dropped:
 
 
 @dataclass(frozen=True)
+class Offer:
+    """A sender that was not heard: it sends what it calls `sends`, readings for a stream, from the address `source`."""
+
+    stream: str
+    source: str
+    sends: str
+    rate_hz: int
+
+
+@dataclass(frozen=True)
+class Offered:
+    """Who sends just now without being heard; said when that changes."""
+
+    offers: tuple[Offer, ...]
+    at_ns: int
+
+
+@dataclass(frozen=True)
 class Examined:
     """What came of `Examine`: of the checks that were seen, and of what the readings claim."""
 
@@ -175,6 +193,7 @@ Event = (
     | Woke
     | WallClock
     | Dropped
+    | Offered
     | Examined
 )
 
@@ -258,7 +277,15 @@ class Examine:
     request: Request
 
 
-Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables | Examine | Replace
+@dataclass(frozen=True)
+class Accept:
+    """Let the sender at the address `source` feed a stream, and nobody else."""
+
+    stream: str
+    source: str
+
+
+Action = Tell | Show | Open | Write | Close | Resolve | Save | Tables | Examine | Replace | Accept
 
 Actions = tuple[Action, ...]
 NOTHING: Actions = ()

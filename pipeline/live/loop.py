@@ -21,8 +21,10 @@ import numpy as np
 from pipeline.errors import WorkerLostError
 from pipeline.live import checks, run_state, study_run
 from pipeline.live.adapters.mouse import MouseHand
+from pipeline.live.adapters.newcomers import Newcomers
 from pipeline.live.clerk import Clerk, FileAction, agreement
 from pipeline.live.events import (
+    Accept,
     Action,
     Actions,
     Agreed,
@@ -33,6 +35,7 @@ from pipeline.live.events import (
     Examined,
     Joined,
     Left,
+    Offered,
     Open,
     Replace,
     Role,
@@ -154,6 +157,7 @@ class Loop:
         self.now_ns, self.pages = clock, dict[int, Outbox]()
         self.refused: list[Counter[str]] = []  # of every adapter: what it did not take, by reason
         self.examiner: Executor | None = None  # does the checks; without it a thread does, which readings wait for
+        self.newcomers = Newcomers()
         self._ticked_ns, self._wall_ns = clock(), clock()
         self._counted_ns, self._counts = clock(), Counter[str]()
         self._folder, self._clerk = folder, clerk
@@ -208,6 +212,8 @@ class Loop:
             elif isinstance(action, Replace):
                 if action.client in self.pages:
                     self.pages[action.client].replace()
+            elif isinstance(action, Accept):
+                self.newcomers.accept(action.stream, action.source)
             elif isinstance(action, Examine):
                 self._beside(self._examine(action))
 
@@ -260,10 +266,13 @@ class Loop:
             self.happens(self.now_ns.wall_clock())
 
     def _count_refused(self, now: int) -> None:
-        """Say that adapters have dropped more than before, once a second."""
+        """Say that adapters have dropped more than before, and who is not heard, once a second."""
         if now - self._counted_ns < _COUNT_NS:
             return
+        offers = self.newcomers.waiting((now - self._counted_ns) * S_PER_NS)
         self._counted_ns = now
+        if offers != self.run.offers:
+            self.happens(Offered(offers, now))
         counts = sum(self.refused, Counter[str]())
         if counts != self._counts:
             self._counts = counts

@@ -146,7 +146,7 @@ class Submit:
     id: str
 
 
-DEEDS = ("start", "abort", "redo", "keep", "skip", "next", "drop", "note", "swap", "take_over")
+DEEDS = ("start", "abort", "redo", "keep", "skip", "next", "drop", "note", "swap", "accept", "take_over")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,20 @@ from typing import Literal
 from pipeline.live import checks, desk, plan, session, session_state
 from pipeline.live.changes import changed
 from pipeline.live.clock import Clock, OneWay
-from pipeline.live.events import NOTHING, Action, Actions, Agreed, Close, Closed, Disk, Dropped, Save, Tables, Tell
+from pipeline.live.events import (
+    NOTHING,
+    Action,
+    Actions,
+    Agreed,
+    Close,
+    Closed,
+    Disk,
+    Dropped,
+    Offer,
+    Save,
+    Tables,
+    Tell,
+)
 from pipeline.live.health import Health
 from pipeline.live.messages import Hello
 from pipeline.live.orientation import PhoneMotion
@@ -33,7 +46,8 @@ class StudyRun:
 
     `phone` is the connection of the active phone, `phones` all of them, `ids` which phone each is of, `operators` those
     of operator's pages, the one that may act first. `asked` remembers what is being saved, by token: whom to tell, and
-    how. `links` says of streams whose sender is not connected what is wrong.
+    how. `links` says of streams whose sender is not connected what is wrong. `offers` are the senders that are not
+    heard, `accepted` the address of the one that the operator lets feed a stream.
     """
 
     setup: Setup
@@ -53,6 +67,8 @@ class StudyRun:
     links: Mapping[str, str] = field(default_factory=dict)
     disk: Disk | None = None
     dropped: Dropped | None = None
+    offers: tuple[Offer, ...] = ()
+    accepted: Mapping[str, str] = field(default_factory=dict)
     asked: Mapping[str, tuple[int, str]] = field(default_factory=dict)
     tokens: int = 0
     closed: Closed | None = None

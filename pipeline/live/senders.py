@@ -44,10 +44,12 @@ async def opened(setup: Setup, loop: Loop, access: Access, folder: Path) -> list
     for sender in setup.recording.senders.values():
         if sender.udp_json is not None:
             streams = udp.expected(setup, sender.udp_json.port)
-            receivers[sender.udp_json.port] = udp.Receiver(streams, access.sensors, loop.happens, loop.now_ns)
+            receivers[sender.udp_json.port] = udp.Receiver(
+                streams, access.sensors, loop.newcomers, loop.happens, loop.now_ns
+            )
         if sender.osc is not None:
             addresses = osc.expected(setup, sender.osc.port)
-            receivers[sender.osc.port] = osc.Receiver(addresses, loop.happens, loop.now_ns)
+            receivers[sender.osc.port] = osc.Receiver(addresses, loop.newcomers, loop.happens, loop.now_ns)
     for webcam in cameras.webcams(setup, folder, loop.happens, loop.now_ns):
         await webcam.begin()
         loop.refused.append(webcam.refused)

@@ -27,6 +27,7 @@ from pipeline.live.events import (
     Joined,
     Left,
     Link,
+    Offered,
     Reading,
     Replace,
     Said,
@@ -304,6 +305,7 @@ _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Woke: _woke,
     WallClock: _wall_clock,
     Dropped: lambda run, event: (changed(run, dropped=event), NOTHING),
+    Offered: lambda run, event: (changed(run, offers=event.offers), NOTHING),
     Examined: checking.examined,
     Agreed: lambda run, event: (changed(run, agreed=event), NOTHING),
 }

@@ -30,7 +30,10 @@ SENDERS = ("phone", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove",
 
 
 class UdpJson(Frozen):
-    """Datagrams of JSON. `source` is the address they must come from."""
+    """Datagrams of JSON. `source` is the address they must come from.
+
+    While that is `any`, the operator may accept a sender of another computer that has no key.
+    """
 
     port: Port
     source: str = "any"
@@ -39,7 +42,8 @@ class UdpJson(Frozen):
 class Osc(Frozen):
     """Open Sound Control: the arguments `fields` of messages to `address`.
 
-    It has no key, so it is heard from this computer alone unless `source` names the sender's address (or `any`).
+    It has no key, so it is heard from this computer alone unless `source` names the sender's address (or `any`), or
+    the operator accepts the sender.
     """
 
     port: Port

@@ -1,7 +1,7 @@
 """Readings by Open Sound Control: arguments of messages to an address.
 
-It has no key, so this computer alone is heard, or the sender that study.yaml names. OSC states a time for bundles
-alone, and most senders leave it out, so a reading's stamp is its arrival.
+It has no key, so this computer alone is heard, or the sender that study.yaml names or the operator accepts. OSC states
+a time for bundles alone, and most senders leave it out, so a reading's stamp is its arrival.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from pipeline.live.access import LOOPBACK
 from pipeline.live.adapters.feeds import of_numbers
+from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.adapters.udp import Limited
 from pipeline.live.events import Reading
 from pipeline.live.messages import Datagram
@@ -28,8 +29,8 @@ class Expected:
     units: Units
     source: str | None = None
 
-    def hears(self, source: str) -> bool:
-        """Whether a sender at that address may send it."""
+    def trusts(self, source: str) -> bool:
+        """Whether a sender at that address may send it, without being accepted."""
         return source in LOOPBACK if self.source is None else self.source in ("any", source)
 
 
@@ -48,10 +49,14 @@ class Receiver(Limited):
     """A port for OSC."""
 
     def __init__(
-        self, streams: Mapping[str, Expected], happens: Callable[[Reading], None], now_ns: Callable[[], int]
+        self,
+        streams: Mapping[str, Expected],
+        newcomers: Newcomers,
+        happens: Callable[[Reading], None],
+        now_ns: Callable[[], int],
     ) -> None:
         super().__init__(happens, now_ns)
-        self._streams = streams
+        self._streams, self._newcomers = streams, newcomers
 
     def take(self, data: bytes, source: str, now: int) -> None:
         """A datagram within the limits."""
@@ -67,15 +72,18 @@ class Receiver(Limited):
             if stream is None:
                 self.refused["no such address"] += 1
                 continue
-            if not stream.hears(source):
+            is_trusted = stream.trusts(source)
+            if stream.source is not None and not is_trusted:
                 self.refused["not from its source"] += 1
                 continue
             reading = _reading(stream, message.params)
             values = None if reading is None else in_si(stream.units, stream.content, reading)
             if values is None:
                 self.refused["not of the stream's kind"] += 1
-                continue
-            self.happens(Reading(stream.stream, None, now, values))
+            elif not self._newcomers.hears(stream.stream, source, message.address, is_trusted):
+                self.refused[NOT_ACCEPTED] += 1
+            else:
+                self.happens(Reading(stream.stream, None, now, values))
 
 
 def _reading(stream: Expected, arguments: list[object]) -> Datagram | None:

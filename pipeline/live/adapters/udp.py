@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from secrets import compare_digest
 from typing import Any
 
+from pipeline.live.access import LOOPBACK
+from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.events import Reading
 from pipeline.live.limits import Flow, admit
 from pipeline.live.messages import DATAGRAM_BYTES, Datagram, MessageError, parse_datagram
@@ -34,6 +36,10 @@ class Expected:
     content: str
     units: Units
     source: str
+
+    def may_be_offered(self, source: str) -> bool:
+        """Whether a sender at that address may be accepted by the operator, though it has no key."""
+        return self.source == "any" and source not in LOOPBACK
 
 
 def expected(setup: Setup, port: int) -> dict[str, Expected]:
@@ -74,17 +80,18 @@ class Limited(asyncio.DatagramProtocol):
 
 
 class Receiver(Limited):
-    """A port for readings in JSON, which hold the run's key."""
+    """A port for readings in JSON, which hold the run's key, or come from a sender that the operator accepts."""
 
     def __init__(
         self,
         streams: Mapping[str, Expected],
         key: str,
+        newcomers: Newcomers,
         happens: Callable[[Reading], None],
         now_ns: Callable[[], int],
     ) -> None:
         super().__init__(happens, now_ns)
-        self._streams, self._key = streams, key
+        self._streams, self._key, self._newcomers = streams, key, newcomers
 
     def take(self, data: bytes, source: str, now: int) -> None:
         """A datagram within the limits."""
@@ -97,16 +104,20 @@ class Receiver(Limited):
             self._take(reading, source, now)
 
     def _take(self, datagram: Datagram, source: str, now: int) -> None:
-        if not compare_digest(datagram.key.encode(), self._key.encode()):
+        stream, has_key = self._streams.get(datagram.stream), compare_digest(datagram.key.encode(), self._key.encode())
+        may_be_offered = not datagram.key and stream is not None and stream.may_be_offered(source)
+        if not has_key and not may_be_offered:
             self.refused["wrong key"] += 1
             return
-        stream = self._streams.get(datagram.stream)
         if stream is None or stream.source not in ("any", source):
             self.refused["no such stream"] += 1
             return
         values = in_si(stream.units, stream.content, datagram)
         if values is None:
             self.refused["not of the stream's kind"] += 1
+            return
+        if not self._newcomers.hears(datagram.stream, source, datagram.stream, has_key):
+            self.refused[NOT_ACCEPTED] += 1
             return
         sent = None if datagram.t is None else datagram.t * _MS_PER_S
         self.happens(Reading(datagram.stream, None, now, values, datagram.seq, sent))

@@ -3,6 +3,7 @@
 
 import { exchangeKey } from "./key.js";
 import { announcer, showLights } from "./lights.js";
+import { showOffers } from "./offers.js";
 import { showParticipants, showSheet } from "./participants.js";
 import { Link } from "./socket.js";
 import { fill, filled, loadTexts, taskName } from "./texts.js";
@@ -125,6 +126,8 @@ function showButtons() {
   const kept = [...at("others").children].map((button) => button.dataset.do).join();
   if (kept !== others.join()) at("others").replaceChildren(...others.map(otherButton));
   for (const button of [...at("others").children, ...at("note").querySelectorAll("button")]) button.disabled = off;
+  at("offers").hidden = !state.offers.length;
+  showOffers(at("offer-list"), texts.offers, state.offers, off, (id) => ask("accept", id));
 }
 
 function otherButton(what) {
@@ -160,7 +163,7 @@ function ask(what, text) {
 function answered({ type, id, why, reason_overrules: overrules }) {
   const { what, text } = asked.get(id) ?? {};
   asked.delete(id);
-  at("answer").textContent = type === "refused" ? filled(texts.refused, { why }) : what === "note" ? texts.noted : "";
+  at("answer").textContent = type === "refused" ? filled(texts.refused, { why }) : what === "note" ? texts.noted : what === "accept" ? texts.offers.accepted : "";
   if (type === "refused" && overrules && !text) askWithReason(what, why);
 }
 

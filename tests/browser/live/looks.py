@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.browser.chromium import Tab
 from tests.browser.complaints import complaint
 from tests.browser.live.acts import sized, wait_for
-from tests.browser.live.samples import TLX, form, lights, own_form, ready, running, show, state, welcome
+from tests.browser.live.samples import TLX, form, lights, offering, own_form, ready, running, show, state, welcome
 from tests.browser.live.server import LiveServer, until
 
 SIZES = {390: 844, 854: 480, 1440: 900}
@@ -121,6 +121,7 @@ SCENES: dict[str, Scene] = {
     "questionnaire, pairs": _questionnaire(form(True, **dict.fromkeys(TLX, 3))),
     "questionnaire, a lab's own": _questionnaire(own_form()),
     "operator, running": _operator(state()),
+    "operator, a sender without a key": _operator(offering()),
     "operator, looking on": _operator(state(read_only=True)),
     "operator, a reason": _operator_asks,
 }

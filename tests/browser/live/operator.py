@@ -7,7 +7,7 @@ import time
 
 from tests.browser.chromium import Tab
 from tests.browser.live.acts import focused, is_seen, key, mouse, place, sized, tab_to, text, value, wait_for, write
-from tests.browser.live.samples import HOSTILE, Message, lights, ready, state
+from tests.browser.live.samples import HOSTILE, Message, lights, offering, ready, state
 from tests.browser.live.server import KEY, LiveServer, until
 
 
@@ -105,6 +105,27 @@ def a_questionnaire_is_not_left_by_a_slip(tab: Tab, server: LiveServer) -> None:
     assert _asked(server, 1) == ("next", "No time.")
 
 
+def a_sender_is_accepted_by_one_press(tab: Tab, server: LiveServer) -> None:
+    """It is named as text, its button keeps the focus when the list comes anew, and it goes where there is another."""
+    _opened(tab, server, offering())
+    assert text(tab, "#offer-list p") == f"192.168.1.7 sends /hand {HOSTILE}, 30 Hz: use as tracker?"
+    tab.evaluate("document.querySelector('#offer-list button').focus()")
+    offered = offering()
+    offered["offers"][0]["rate_hz"] = 31
+    _shows(tab, server, offered)
+    until(lambda: "31 Hz" in text(tab, "#offer-list p"), "the rate is new")
+    assert tab.evaluate("document.activeElement.textContent") == "Use as tracker"
+    key(tab, "Enter")
+    assert _asked(server, 1) == ("accept", "tracker 192.168.1.7")
+    server.say("operator", type="done", id=server.said("operator", "do")[0]["id"])
+    until(lambda: text(tab, "#answer") == "This sender is used until the end of this run.", "it says so")
+    _shows(tab, server, offering("192.168.1.6"))
+    until(lambda: "tracker comes from 192.168.1.6" in text(tab, "#offer-list p"), "it is not used")
+    assert not is_seen(tab, "#offer-list button")
+    _shows(tab, server, state())
+    until(lambda: not is_seen(tab, "#offers"), "nobody sends any more")
+
+
 def a_note_with_a_key(tab: Tab, server: LiveServer) -> None:
     """N, the note, Enter; and that it was taken is said."""
     _opened(tab, server, state())
@@ -186,6 +207,7 @@ CASES = (
     one_big_button_begins,
     a_red_check_wants_a_reason,
     a_questionnaire_is_not_left_by_a_slip,
+    a_sender_is_accepted_by_one_press,
     a_note_with_a_key,
     a_second_page_only_looks_on,
     lights_differ_in_more_than_colour,

@@ -118,6 +118,7 @@ def state(**other: Any) -> Message:
         "links": [{"role": "phone", "url": "https://192.168.1.5:8443/join#k=k7Qm", "qr": "/qr/phone.svg"}],
         "phones": 1,
         "questionnaires_open": 0,
+        "offers": [],
         "problems": [f"P02, task 1 was cut after 31.2 s {HOSTILE}"],
     } | other
 
@@ -129,6 +130,12 @@ def ready(light: str) -> Message:
         next={"do": "start", "label": "Start Task 1 of P01", "others": ["note", "skip"]},
         checks=[{"id": "still", "light": light, "text": "Hold the phone still for two seconds."}],
     )
+
+
+def offering(accepted: str | None = None) -> Message:
+    """A sender without a key sends for a stream, whose names are as bad as names can be."""
+    offer = {"id": "tracker 192.168.1.7", "stream": "tracker", "source": "192.168.1.7", "sends": f"/hand {HOSTILE}"}
+    return ready("green") | {"offers": [{**offer, "rate_hz": 30, "accepted": accepted}]}
 
 
 def lights(phone: str = "green") -> Message:

@@ -22,6 +22,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from pipeline.live import server
 from pipeline.live.access import Access
 from pipeline.live.adapters import osc
+from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.adapters.osc import Receiver as OscReceiver
 from pipeline.live.adapters.udp import Limited, Receiver, expected, listen
 from pipeline.live.certificates import Certificates
@@ -322,7 +323,7 @@ def test_what_a_receiver_refuses_is_counted(tmp_path: Path) -> None:
     )
     taken: list[Reading] = []
     clock = iter(range(0, 10**12, 1000))
-    receiver = Receiver(expected(setup, 9700), "secret", taken.append, lambda: next(clock))
+    receiver = Receiver(expected(setup, 9700), "secret", Newcomers(), taken.append, lambda: next(clock))
     good = b'{"key":"secret","stream":"tracker","t":1.5,"position":[1,2,3]}'
     source = ("127.0.0.1", 5)
     for data in (good, b"x", good.replace(b"secret", b"wrong"), good.replace(b"tracker", b"other"), b"[" + b" " * 1500):
@@ -381,7 +382,7 @@ def test_osc_messages_to_an_address_are_readings(tmp_path: Path) -> None:
     )
     _, setup = study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}, imu: {demo: {}}}", senders))
     taken: list[Reading] = []
-    receiver = OscReceiver(osc.expected(setup, 9000), taken.append, lambda: 5)
+    receiver = OscReceiver(osc.expected(setup, 9000), Newcomers(), taken.append, lambda: 5)
 
     def sends(address: str, *arguments: object) -> None:
         message = OscMessageBuilder(address)
@@ -407,15 +408,15 @@ def test_osc_messages_to_an_address_are_readings(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "heard"),
+    ("source", "heard", "reason"),
     [
-        ("", ["127.0.0.1"]),
-        (", source: 10.1.2.3", ["10.1.2.3"]),
-        (", source: any", ["127.0.0.1", "10.1.2.3", "10.1.2.4"]),
+        ("", ["127.0.0.1"], NOT_ACCEPTED),
+        (", source: 10.1.2.3", ["10.1.2.3"], "not from its source"),
+        (", source: any", ["127.0.0.1", "10.1.2.3", "10.1.2.4"], "not from its source"),
     ],
 )
 def test_osc_is_heard_from_this_computer_or_whom_study_yaml_names(
-    tmp_path: Path, source: str, heard: list[str]
+    tmp_path: Path, source: str, heard: list[str], reason: str
 ) -> None:
     senders = f"senders: {{tracker: {{osc: {{port: 9000, address: /hand{source}}}}}, imu: {{demo: {{}}}}}}"
     _, setup = study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}, imu: {demo: {}}}", senders))
@@ -424,15 +425,20 @@ def test_osc_is_heard_from_this_computer_or_whom_study_yaml_names(
         message.add_arg(number)
     found = []
     for address in ("127.0.0.1", "10.1.2.3", "10.1.2.4"):
-        receiver = OscReceiver(osc.expected(setup, 9000), lambda _, one=address: found.append(one), lambda: 5)  # type: ignore[misc]
+        receiver = OscReceiver(
+            osc.expected(setup, 9000),
+            Newcomers(),
+            lambda _, one=address: found.append(one),  # type: ignore[misc]
+            lambda: 5,
+        )
         receiver.datagram_received(message.build().dgram, (address, 1))
-        assert receiver.refused["not from its source"] == (address not in heard)
+        assert receiver.refused[reason] == (address not in heard)
     assert found == heard
 
 
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_osc(data: bytes) -> None:
-    receiver = OscReceiver({}, lambda reading: None, lambda: 0)
+    receiver = OscReceiver({}, Newcomers(), lambda reading: None, lambda: 0)
     receiver.datagram_received(data, ("127.0.0.1", 1))
     receiver.datagram_received(b"/a\0\0" + data, ("127.0.0.1", 1))
     receiver.datagram_received(b"#bundle\0" + data, ("127.0.0.1", 1))
