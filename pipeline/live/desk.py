@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.live import health, offers, plan
 from pipeline.live.outgoing import Whole
+from pipeline.live.watch import Light
 from pipeline.study.recording import BUILT_IN
 
 if TYPE_CHECKING:
@@ -54,6 +55,11 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
     return [*found, *(one.text for one in run.checks if one.light == "red")]
 
 
+def undone(run: StudyRun, person: plan.Person) -> list[Light]:
+    """The checks that must be done before a participant's first task, and of which nothing has been seen."""
+    return [] if person.begun else [one for one in run.checks if one.light == "off"]
+
+
 @dataclass(frozen=True)
 class Refusal:
     """Why something cannot be done now, and whether a reason that is given overrules that."""
@@ -71,13 +77,19 @@ def refusal(run: StudyRun, what: str, reason: str, at_ns: int) -> Refusal | None
         return Refusal(f"“{what}” is not possible now.")
     if what == "note" and not reason:
         return Refusal("A note needs a text.")
-    if what == "start":
-        red = red_lights(run, at_ns)
-        if run.phone is None or (run.disk is not None and run.disk.fault is not None):
-            return Refusal(red[0])
-        if red and not reason:
-            return Refusal(red[0], reason_overrules=True)
-    return None
+    return _not_to_start(run, reason, at_ns) if what == "start" else None
+
+
+def _not_to_start(run: StudyRun, reason: str, at_ns: int) -> Refusal | None:
+    """Why a task cannot begin; None where it can."""
+    red = red_lights(run, at_ns)
+    if run.phone is None or (run.disk is not None and run.disk.fault is not None):
+        return Refusal(red[0])
+    not_done = [] if run.now is None else [one.text for one in undone(run, run.now[0])]
+    if reason or not (red or not_done):
+        return None
+    why = red[0] if red else f"Not all checks are done: {' '.join(not_done)} Or give a reason to start without."
+    return Refusal(why, reason_overrules=True)
 
 
 def _choices(run: StudyRun) -> tuple[str, ...]:
@@ -343,7 +355,7 @@ def facts(run: StudyRun, person: plan.Person, index: int, reason: str, at_ns: in
     found |= {f"accepted_{stream}": source for stream, source in run.accepted.items()}
     if reason:
         found["started_although"] = reason
-        red = red_lights(run, at_ns)
-        if red:
-            found["overruled"] = " ".join(red)
+        overruled = [*red_lights(run, at_ns), *(f"{one.id}: not done." for one in undone(run, person))]
+        if overruled:
+            found["overruled"] = " ".join(overruled)
     return found

@@ -15,7 +15,7 @@ _SHOWN = 6
 
 
 def blocks(material: Material) -> Iterator[Block]:
-    """A paragraph, and a table of what was begun over a red light; nothing where no session was recorded live."""
+    """A paragraph, and a table of what was begun over a red light or without a check; nothing if none was live."""
     rows = material.rows("recorders")
     if not rows:
         return
@@ -27,7 +27,9 @@ def blocks(material: Material) -> Iterator[Block]:
     yield Paragraph((said, *(f" {words}" for words in _other_settings(rows))))
     overruled = [row for row in rows if row["overruled"]]
     if overruled:
-        yield Folded(f"Begun over a red light: {counted(len(overruled), 'session')}", (_table(overruled),))
+        yield Folded(
+            f"Begun over a red light, or without a check: {counted(len(overruled), 'session')}", (_table(overruled),)
+        )
 
 
 def cautions(material: Material) -> Iterator[Text]:
@@ -56,6 +58,6 @@ def _table(rows: list[Row]) -> Table:
     return Table(
         "table-overruled",
         f"What the operator's page said before the task, and the reason to begin all the same.{more}",
-        columns(("Session", "Red", "Reason"), 3),
+        columns(("Session", "Overruled", "Reason"), 3),
         tuple((row["session"], row["overruled"], row["started_although"]) for row in rows[:_ROWS_MAX]),
     )

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.live import checks, run_state, study_run, watch
-from pipeline.live.events import Action, Examine, Examined, Joined, Open, Reading, Said, Tell, Tick, Write
+from pipeline.live.events import Action, Closed, Examine, Examined, Joined, Open, Reading, Said, Tell, Tick, Write
 from pipeline.live.messages import Do, Exchange, Ping, Select
 from pipeline.live.outgoing import PhaseOfTask, Refused
 from pipeline.live.setup import Setup
@@ -180,6 +180,12 @@ class Lab:
             if count % 20 == 0:
                 self.happens(Tick(self.at_ns))
 
+    def taps(self) -> list[Action]:
+        """A press of the button, 30 ms on its way."""
+        at_ms = self.at_ns / MS
+        self.says("phone", PHONE, Ping(at_ms, Exchange(at_ms - 4, at_ms, at_ms, at_ms + 4)))
+        return self.says("phone", PHONE, Select(0, at_ms - 30))
+
     def says(self, role: str, client: int, message: object) -> list[Action]:
         return self.happens(Said(role, client, message, self.at_ns))  # type: ignore[arg-type]
 
@@ -205,9 +211,7 @@ def test_the_phone_asks_for_the_checks_until_all_have_been_seen(tmp_path: Path) 
         "tap": "off",
         "claims": "green",
     }
-    at_ms = lab.at_ns / MS
-    lab.says("phone", PHONE, Ping(at_ms, Exchange(at_ms - 4, at_ms, at_ms, at_ms + 4)))
-    assert phases(lab.says("phone", PHONE, Select(0, at_ms - 30))) == ["waiting"]
+    assert phases(lab.taps()) == ["waiting"]
     assert lab.lights["tap"] == "green"
     assert (
         next(one.text for one in lab.run.checks if one.id == "tap") == "A press is known after 30 ms, round trip 8 ms."
@@ -244,6 +248,45 @@ def test_a_red_check_wants_a_reason_which_the_log_gives(tmp_path: Path) -> None:
     assert opened.facts["check_tap"] == "off: Press the button on the phone."
 
 
+def starts(lab: Lab, reason: str = "") -> tuple[list[Refused], list[Open]]:
+    """What the operator is told, and the log that is begun."""
+    actions = lab.says("operator", OPERATOR, Do("start", reason, "d"))
+    told = [one.message for one in actions if isinstance(one, Tell) and isinstance(one.message, Refused)]
+    return told, [one for one in actions if isinstance(one, Open)]
+
+
+def test_a_first_task_wants_every_check_or_a_reason_which_the_log_gives(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.plays()
+    (refused,), opened = starts(lab)
+    assert opened == []
+    assert refused.reason_overrules
+    assert refused.why == ("Not all checks are done: Press the button on the phone. Or give a reason to start without.")
+    refusals, (log,) = starts(lab, "the button is out of reach")
+    assert refusals == []
+    assert log.facts["started_although"] == "the button is out of reach"
+    assert log.facts["overruled"] == "tap: not done."
+
+
+def test_a_first_task_begins_without_a_reason_once_every_check_is_done(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.plays()
+    lab.taps()
+    refusals, (log,) = starts(lab)
+    assert refusals == []
+    assert "started_although" not in log.facts and "overruled" not in log.facts
+
+
+def test_later_tasks_and_attempts_want_no_checks_again(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.plays()
+    starts(lab, "the button is out of reach")
+    lab.says("operator", OPERATOR, Do("abort", "the light went out", "d"))
+    lab.happens(Closed("data/set-aside/P01_kinect.1.mcap", lab.at_ns))
+    refusals, opened = starts(lab)
+    assert refusals == [] and len(opened) == 1
+
+
 def test_without_a_phone_no_reason_helps(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     lab.run = replace(lab.run, phone=None, phones=())
@@ -258,6 +301,7 @@ def test_without_a_phone_no_reason_helps(tmp_path: Path) -> None:
 def test_a_light_that_turns_red_during_a_task_is_noted_in_the_log(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     lab.plays()
+    lab.taps()
     lab.says("operator", OPERATOR, Do("start", "", "d"))
     red = Light("held positions: tracker", "red", "It holds.")
     actions = lab.happens(Examined((), (red,), lab.at_ns))

@@ -23,6 +23,7 @@ from pipeline.live.events import (
     Disk,
     Dropped,
     Event,
+    Examined,
     Joined,
     Left,
     Open,
@@ -42,6 +43,7 @@ from pipeline.live.loop import Clock, Outbox
 from pipeline.live.messages import Do, Drawn, Exchange, Ping
 from pipeline.live.outgoing import Refused, Say, Shown, Whole
 from pipeline.live.run_state import StudyRun
+from pipeline.live.watch import Light
 from pipeline.sessions.logs.mcap import Message
 from tests.pipeline.live.studies import study_in
 
@@ -60,6 +62,8 @@ class Lab:
         self.at_ms = 0.0
         self.happens(Joined("operator", OPERATOR, EPOCH_NS))
         self.happens(Joined("phone", PHONE, EPOCH_NS))
+        done = tuple(Light(name, "green", "Done.") for name in setup.guided)
+        self.happens(Examined(done, (), EPOCH_NS))
 
     @property
     def now(self) -> int:

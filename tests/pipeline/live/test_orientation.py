@@ -135,7 +135,7 @@ def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: P
         a, r = tuple((force[row] / 1000).tolist()), tuple(np.degrees(turning[row]).tolist())
         happens(Said("phone", 2, Motion(row, ns(at) / 1e6 - behind_ms, a, None, r, 16.0), ns(at + 0.005)))
         if row == 400:
-            happens(Said("operator", 1, Do("start", "", "d"), ns(at + 0.006)))
+            happens(Said("operator", 1, Do("start", "nobody presses the button", "d"), ns(at + 0.006)))
             assert run.phase == "session"
         happens(Tick(ns(at + 0.007)))
     logged = [one for one in messages if one.topic == "/phone/imu"]

@@ -268,7 +268,7 @@ def test_a_task_over_sockets_from_start_to_questionnaire(tmp_path: Path) -> None
             await hears(form, "state", state="waiting")
             await says(phone, type="hello", page="phone", version=1, agent="a test", wake_lock=True)
             await asyncio.sleep(0.3)
-            await says(operator, type="do", what="start", text="", id="d1")
+            await says(operator, type="do", what="start", text="nobody holds a phone", id="d1")
             await hears(operator, "done", id="d1")
             await press_through(phone)
             questions = await hears(form, "form")
