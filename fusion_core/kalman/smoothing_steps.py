@@ -56,6 +56,22 @@ def step_back(
 
 
 @compiled
+def _to_row(
+    motion: Motion,
+    dimension: int,
+    constant_psd: FloatArray,
+    history: History,
+    row: int,
+    later_mean: FloatArray,
+    later_covariance: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Smoothed mean and covariance of a row, from those of the next."""
+    dt, jerk_psd = history.time[row + 1] - history.time[row], history.adapted[row, JERK_PSD]
+    own = history.mean[row], history.covariance[row]
+    return step_back(motion, dimension, constant_psd, *own, dt, jerk_psd, later_mean, later_covariance)
+
+
+@compiled
 def _at(
     motion: Motion,
     dimension: int,
@@ -92,18 +108,7 @@ def smoothed_at(
     mean, covariance = history.mean[count - 1].copy(), history.covariance[count - 1].copy()
     row = count - 2
     while row > oldest and history.time[row] > time:
-        dt = history.time[row + 1] - history.time[row]
-        mean, covariance = step_back(
-            motion,
-            dimension,
-            constant_psd,
-            history.mean[row],
-            history.covariance[row],
-            dt,
-            history.adapted[row, JERK_PSD],
-            mean,
-            covariance,
-        )
+        mean, covariance = _to_row(motion, dimension, constant_psd, history, row, mean, covariance)
         row -= 1
     return _at(motion, dimension, constant_psd, history, row, time, mean, covariance)
 
@@ -167,16 +172,5 @@ def smooth(
             for axis in range(dimension):
                 position[index, axis], sd[index, axis] = there[axis], sd_there[axis]
             index -= 1
-        dt = history.time[row + 1] - history.time[row]
-        mean, covariance = step_back(
-            motion,
-            dimension,
-            constant_psd,
-            history.mean[row],
-            history.covariance[row],
-            dt,
-            history.adapted[row, JERK_PSD],
-            mean,
-            covariance,
-        )
+        mean, covariance = _to_row(motion, dimension, constant_psd, history, row, mean, covariance)
     return position, sd

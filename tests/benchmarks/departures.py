@@ -38,8 +38,12 @@ class Source:
 
     def until(self, seconds: float) -> Source:
         """Its first part."""
-        kept = self.time <= self.time[0] + seconds
-        within = self.reference.time <= self.time[0] + seconds
+        return self.between(-np.inf, self.time[0] + seconds)
+
+    def between(self, begin: float, end: float) -> Source:
+        """What was measured from one time to another."""
+        kept = (self.time >= begin) & (self.time <= end)
+        within = (self.reference.time >= begin) & (self.reference.time <= end)
         at, value = self.reference.time[within], self.reference.value[within]
         return replace(
             self,

@@ -34,7 +34,7 @@ KINDS = {
     "sensor, both, tapped, shaken": ("combined", "_disturbed"),
 }
 _PEOPLE, _PHONES, _FIELDS = ("Guillaume", "Jakob", "Thibaud"), ("Nexus5", "iPhone4S", "iPhone5"), ("NoDist", "Dist")
-_SETTLED_S, _SECONDS = 15.0, 60.0
+_SETTLED_S, _STILL_S, _SECONDS = 15.0, 3.0, 60.0
 _STEP_S, _FINE_S = 0.002, 0.06
 _MISALIGNED_DEG = 20.0  # a phone that seems turned so far in its holder was not brought to the optics' time
 _GAP_S = 0.1
@@ -50,7 +50,8 @@ def phones(folder: Path) -> Iterator[Source]:
             if (folder / "datasets" / "qualisys" / f"{name}.mat").is_file():
                 source = _phone(folder / "datasets", name)
                 if source is not None:
-                    yield _excerpt(source, source.time[0] + _SETTLED_S)
+                    begin = source.time[0] + _SETTLED_S
+                    yield source.between(begin, begin + _SECONDS)
 
 
 def _phone(folder: Path, name: str) -> Source | None:
@@ -134,7 +135,8 @@ def sensors(folder: Path) -> Iterator[Source]:
         force, turning = (whole[name][:count].reshape(-1, 3, 3).mean(axis=1) for name in ("imu_acc", "imu_gyr"))
         time = (np.arange(count) * every).reshape(-1, 3).mean(axis=1)
         moves = np.flatnonzero(whole["movement"])[0] * every
-        yield _excerpt(_source(path.stem, time, 1000.0 * force, turning, optics, every), moves - 3.0)
+        source = _source(path.stem, time, 1000.0 * force, turning, optics, every)
+        yield source.between(moves - _STILL_S, moves - _STILL_S + _SECONDS)
 
 
 def _source(
@@ -149,22 +151,6 @@ def _source(
     gravity = np.array([0.0, 0.0, -G_MM_S2])
     heard = time[within], time[within] + 0.002, force[within], turning[within], quaternion[within]
     return Source(name, *heard, Samples(at, at, position), gravity)
-
-
-def _excerpt(source: Source, begin: float) -> Source:
-    """A minute from `begin` on."""
-    whole = source.until(begin + _SECONDS - source.time[0])
-    kept, within = whole.time >= begin, whole.reference.time >= begin
-    at, value = whole.reference.time[within], whole.reference.value[within]
-    return replace(
-        whole,
-        time=whole.time[kept],
-        arrival=whole.arrival[kept],
-        force_mm_s2=whole.force_mm_s2[kept],
-        gyroscope_rad_s=whole.gyroscope_rad_s[kept],
-        quaternion=whole.quaternion[kept],
-        reference=Samples(at, at, value),
-    )
 
 
 def _interpolated(time: FloatArray, value: FloatArray, wanted: FloatArray) -> FloatArray:

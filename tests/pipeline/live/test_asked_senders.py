@@ -33,7 +33,7 @@ from tests.pipeline.live import servers
 from tests.pipeline.live.servers import IMU, POSITION, point_stamped, published, serving
 from tests.pipeline.live.studies import STUDY, study_in
 from tests.pipeline.live.test_faults import Lab, notes
-from tests.pipeline.live.test_server import Running, free_port, hears, press_through, says, served
+from tests.pipeline.live.test_server import Running, agreed, free_port, hears, press_through, says, served
 
 SUBPROTOCOLS = ("foxglove.sdk.v1",)
 
@@ -391,11 +391,9 @@ def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(tmp_pat
             await says(operator, type="do", what="start", text="a test", id="d1")
             await hears(operator, "done", id="d1")
             await press_through(phone)
-            state = await hears(operator, "state", phase="questionnaire")
-            while not state["agreement"]:
-                state = await hears(operator, "state")
-            assert state["agreement"]["mm"] <= 1e-9
-            assert state["agreement"]["n"] >= 3  # something was shown in each trial
+            agreement = await agreed(operator)
+            assert agreement["mm"] <= 1e-9
+            assert agreement["n"] >= 3  # something was shown in each trial
 
     with sent_by(kind) as senders:
         text = STUDY.replace("tracker: {demo: {}}, imu: {demo: {}}", senders).replace(

@@ -24,7 +24,7 @@ from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import exit_code
 from tests.pipeline.live.frames import FACING, frame
 from tests.pipeline.live.studies import STUDY, study_in
-from tests.pipeline.live.test_server import Running, free_port, hears, press_through, says, served
+from tests.pipeline.live.test_server import Running, agreed, free_port, hears, press_through, says, served
 
 SIZE = (640, 360)
 CAMERA = "camera: {size: [640, 360], field_of_view_deg: 60, late_ms: 20}"
@@ -262,10 +262,7 @@ def test_a_task_with_a_webcam_as_tracker_gives_a_log_that_replays(tmp_path: Path
             await says(operator, type="do", what="start", text="nobody moves the marker", id="d1")
             await hears(operator, "done", id="d1")
             await press_through(phone)
-            state = await hears(operator, "state", phase="questionnaire")
-            while not state["agreement"]:
-                state = await hears(operator, "state")
-            assert state["agreement"]["mm"] <= 1e-9
+            assert (await agreed(operator))["mm"] <= 1e-9
 
     served(tmp_path, play, camera_alone())
     log = mcap.read(tmp_path / "data/P01_kinect.mcap", [Wanted("/tracker/position", "position")])

@@ -302,6 +302,15 @@ def test_a_task_over_sockets_from_start_to_questionnaire(tmp_path: Path) -> None
     assert log.topics["/phone/imu"].values[5][:3].tolist() == pytest.approx([0, 9.80665, 0])
 
 
+async def agreed(operator: Page) -> dict[str, Any]:
+    """What the operator is told, after a task, of what was shown and its replay."""
+    state = await hears(operator, "state", phase="questionnaire")
+    while not state["agreement"]:
+        state = await hears(operator, "state")
+    agreement: dict[str, Any] = state["agreement"]
+    return agreement
+
+
 async def press_through(phone: Page) -> None:
     """Draw whatever comes, and press once a trial, until the task is done."""
     pressed, state = 0, ""
