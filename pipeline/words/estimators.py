@@ -17,6 +17,12 @@ ESTIMATOR_WORDS: Mapping[str, str] = {
 }
 """What an estimator is, by its `type` in study.yaml."""
 
+
+def estimator_in_words(kind: str) -> str:
+    """What an estimator of that type is: of one that nobody has found words for, the type's name."""
+    return ESTIMATOR_WORDS.get(kind, kind.replace("_", " "))
+
+
 _UNITS = (
     ("_mm_s2_per_sqrt_s", "mm/s²/√s"),
     ("_mm_per_sqrt_s", "mm/√s"),

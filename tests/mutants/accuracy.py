@@ -35,8 +35,8 @@ MUTANTS = (
     Mutant("_STILL = 1e-6  #", "_STILL = 0.9  #", _ACCURACY),
     # The lead by cross-correlation.
     Mutant("circular[shifts] / (n - np.abs(shifts))", "circular[shifts] / n", _ACCURACY),
-    Mutant("np.sum(a.conj() * b, axis=0)", "np.sum(a * b.conj(), axis=0)", _ACCURACY),
-    Mutant("fft.rfft((signal - signal.mean(axis=0)).T, length)", "fft.rfft(signal.T, length)", _ACCURACY),
+    Mutant("np.conj(a, out=a)", "np.conj(b, out=b)", _ACCURACY),
+    Mutant("fft.rfft(signal[:, axis] - mean[axis], length)", "fft.rfft(signal[:, axis], length)", _ACCURACY),
     Mutant("fft.next_fast_len(2 * n - 1, real=True)", "fft.next_fast_len(n, real=True)", _ACCURACY),
     Mutant("np.searchsorted(tracker.arrival, grid", "np.searchsorted(tracker.time, grid", _ACCURACY),
     Mutant("peak in (0, int(inside.sum()) - 1)", "peak in (-1,)", _ACCURACY),

@@ -35,7 +35,7 @@ MUTANTS = (
         _SESSIONS,
     ),
     Mutant(
-        'recorded = trials[trials["estimator"] == "recorded"]\n    recorded = recorded.assign',
+        'recorded = _chosen(trials, trials["estimator"] == "recorded")\n    recorded = recorded.assign',
         "recorded = trials\n    recorded = recorded.assign",
         _SESSIONS,
     ),

@@ -15,7 +15,7 @@ from pipeline.study.statistical_tests import TESTS
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
-from pipeline.words.estimators import ESTIMATOR_WORDS, setting_in_words, settings_in_words
+from pipeline.words.estimators import estimator_in_words, setting_in_words, settings_in_words
 from pipeline.words.evidence import resampled
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
 from pipeline.words.numbers import number
@@ -113,7 +113,7 @@ def _estimators(study: Study) -> Iterator[str]:
         words = settings_in_words(build_estimator(study, name))
         alone = [] if name in with_accelerations else ["from the tracker alone"]
         chosen = ", ".join([*alone, *(words[key] for key in settings.parameters)])
-        estimators.append(f"{name}: {ESTIMATOR_WORDS[settings.type]}{f' ({chosen})' if chosen else ''}")
+        estimators.append(f"{name}: {estimator_in_words(settings.type)}{f' ({chosen})' if chosen else ''}")
     yield f"Positions were estimated causally from the raw sensor streams: {'; '.join(estimators)}."
     for condition, name in study.shown.items():
         yield f"Condition {condition} displayed {name}."

@@ -16,7 +16,7 @@ from pipeline.sessions.fusion_checks import USED
 from pipeline.tables import table as tables
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
-from pipeline.words.estimators import ESTIMATOR_WORDS
+from pipeline.words.estimators import estimator_in_words
 from pipeline.words.numbers import NO_VALUE, milliseconds, number, percent
 from pipeline.words.phrases import counted
 
@@ -76,7 +76,7 @@ def _method(material: Material) -> tuple[str | Strong, ...]:
     listed: list[str | Strong] = []
     for name, settings in material.study.estimators.items():
         alone = "" if name in with_accelerations else ", from the tracker alone"
-        listed += ["; " if listed else "", Strong(name), f" ({ESTIMATOR_WORDS[settings.type]}{alone})"]
+        listed += ["; " if listed else "", Strong(name), f" ({estimator_in_words(settings.type)}{alone})"]
     return (
         (
             "Every estimator was run over the same raw streams and asked, at the arrival of each acceleration, where"

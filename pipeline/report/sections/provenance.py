@@ -14,7 +14,7 @@ from pipeline.report.sections.material import Material
 from pipeline.sessions.estimators import build_estimator
 from pipeline.statistics import WILSON
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words.estimators import ESTIMATOR_WORDS, settings_in_words
+from pipeline.words.estimators import estimator_in_words, settings_in_words
 from pipeline.words.numbers import NO_VALUE
 from pipeline.words.phrases import counted, listing
 
@@ -69,7 +69,7 @@ def _settings(material: Material) -> Iterator[Folded]:
     for name, settings in study.estimators.items():
         streams = [f"streams {listing(list(settings.use))}"] if settings.use else []
         words = settings_in_words(build_estimator(study, name))
-        rows.append((name, ESTIMATOR_WORDS[settings.type], ", ".join([*streams, *words.values()]) or NO_VALUE))
+        rows.append((name, estimator_in_words(settings.type), ", ".join([*streams, *words.values()]) or NO_VALUE))
     table = Table(
         "table-estimators",
         "The estimators with all their settings: those of study.yaml, and the defaults of this version for the others.",
