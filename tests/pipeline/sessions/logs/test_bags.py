@@ -89,6 +89,18 @@ def test_a_bag_of_ros_1(tmp_path: Path) -> None:
     assert_whole(dict(log.topics), 0, 60)
 
 
+def test_publishers_of_one_topic_in_ros_1_are_one_stream_in_the_order_of_times(tmp_path: Path) -> None:
+    path, store = tmp_path / "a.bag", ROS1
+    with Bag1Writer(path) as writer:
+        both = [writer.add_connection("/pose", POSE, typestore=store, callerid=name) for name in ("/left", "/right")]
+        for at in range(40):
+            message = IN_ROS1.position(POSE, START_NS + at * STEP_NS - 7, (at, 1, 2))
+            writer.write(both[at // 3 % 2], START_NS + at * STEP_NS, store.serialize_ros1(message, POSE))
+    pose = read_log(path, WANTED[:1]).topics["/pose"]
+    assert pose.values[:, 0].tolist() == list(range(40))
+    assert pose.arrival_ns.tolist() == [START_NS + at * STEP_NS for at in range(40)]
+
+
 def test_a_bag_of_ros_1_without_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_bag1(tmp_path / "a.bag", sent(IN_ROS1, 0, 3))
     real = builtins.__import__
