@@ -40,7 +40,8 @@ def wilson_interval(yes: int, n: int) -> tuple[float, float]:
         from statsmodels.stats.proportion import proportion_confint
 
         low, high = proportion_confint(yes, n, method="wilson")
-    return float(low), float(high)
+    # Of answers all alike it ends at them; statsmodels' sum misses it by a rounding, to either side.
+    return 0.0 if yes == 0 else float(low), 1.0 if yes == n else float(high)
 
 
 @dataclass(frozen=True)

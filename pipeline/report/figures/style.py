@@ -183,7 +183,7 @@ def draw_mean(
 
 def arms_of(mean: float, low: float, high: float) -> FloatArray | None:
     """The interval of a single mean as matplotlib takes it; None where there is none."""
-    return None if np.isnan(low) else np.array([[mean - low], [high - mean]])
+    return None if np.isnan(low) else arms(*(np.array([value]) for value in (mean, low, high)))
 
 
 def arms(middle: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy import stats
 
 from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON, T
@@ -32,6 +34,20 @@ def test_answers_have_wilsons_interval(yes: int, n: int, low: float, high: float
     """Newcombe (1998), Two-sided confidence intervals for the single proportion, Table I, method 3."""
     found = mean_interval(np.repeat([1.0, 0.0], [yes, n - yes]), WILSON)
     assert found == pytest.approx((low, high), abs=5e-5)
+
+
+@given(n=st.integers(1, 5000))
+def test_wilsons_interval_of_answers_all_alike_ends_at_them(n: int) -> None:
+    """By its formula, centre ± width is exactly 0 or 1 there; a rounding beyond would leave the mean outside."""
+    assert mean_interval(np.zeros(n), WILSON)[0] == 0  # type: ignore[index]
+    assert mean_interval(np.ones(n), WILSON)[1] == 1  # type: ignore[index]
+
+
+def test_a_study_in_which_all_succeed_is_reported(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    """statsmodels' bound for 7 of 7 is below 1 by a rounding, on which its picture must not fail."""
+    values = {"m": {"A": [1] * 7, "B": [0] * 7}}
+    page = read(steadyhand, study(tmp_path / "s", values, ["measure: m, test: mcnemar"]))
+    assert "(Wilson's, of answers 0 or 1)" in page
 
 
 def test_a_report_of_answers_names_wilson_and_stays_within_0_and_1(steadyhand: Steadyhand, tmp_path: Path) -> None:

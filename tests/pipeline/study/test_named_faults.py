@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.errors import PipelineError
+from pipeline.study.comparison import Comparison
 from pipeline.study.folder import load_study
 from pipeline.study.settings import Study
+from pipeline.study.streams import Stream
 from pipeline.study.yaml_text import parse
 from tests.pipeline.study.test_study import MEASURES, MINIMAL, Folder
 
@@ -32,6 +34,14 @@ NEEDED: dict[str, Any] = {
 
 def stream(kind: str, **more: object) -> dict[str, object]:
     return {"topic": "/t", "kind": kind, **NEEDED.get(kind, {}), **more}
+
+
+def known_keys(kind: str) -> set[str]:
+    """The keys that a kind of stream has."""
+    (model,) = (
+        each for each in get_args(get_args(Stream)[0]) if kind in get_args(each.model_fields["kind"].annotation)
+    )
+    return set(model.model_fields)
 
 
 def faults(**settings: object) -> list[str]:
@@ -78,7 +88,7 @@ def test_a_stream_keeps_its_name(name: str, kind: str) -> None:
 
 @given(name=names, kind=stream_kinds, key=names)
 def test_an_unknown_key_of_a_stream_keeps_both_names(name: str, kind: str, key: str) -> None:
-    if key not in ("topic", "kind"):
+    if key not in known_keys(kind):
         (line,) = faults(streams={name: stream(kind, **{key: None})})
         assert line.startswith(told(f'unknown key "streams.{name}.{key}"')[0])
 
@@ -112,7 +122,7 @@ def test_a_condition_keeps_its_name(name: str) -> None:
 def test_a_comparison_is_named_by_its_place(key: str) -> None:
     entries = [{"measure": "m", "test": "t_paired"}, {"test": "t_paired"}]
     assert faults(comparisons=entries) == told('"comparisons.1.measure" is missing')
-    if key not in ("test", "measure", "within", "adjust", "follow_up", "zeros", "bounds", "prior_scale", "fixed"):
+    if key not in Comparison.model_fields:
         (line,) = faults(comparisons=[{**entries[0], key: 1}])
         assert line.startswith(told(f'unknown key "comparisons.0.{key}"')[0])
 
