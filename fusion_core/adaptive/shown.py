@@ -21,6 +21,7 @@ from fusion_core.adaptive.layout import (
     BIAS,
     CLIPPED,
     CLOCK_S,
+    CLOCK_VARIANCE,
     DRIFT,
     ERROR,
     EXPECTED,
@@ -188,17 +189,16 @@ def _noise(state: State) -> float:
 
 
 @compiled
-def _of_either_clock(model: Model, state: State) -> float:
-    """The variance of not knowing whose clock is wrong: no frame shows it, since all are off by as much.
+def _of_clocks(model: Model, state: State, axis: int) -> float:
+    """The variance of not knowing when a frame was measured, nor whose clock is wrong: no frame shows it, since all are
+    off by as much.
 
     As likely as not it is the phone's; the hand is then where it was shown to be so much earlier or later.
     """
-    if model.trusted != NEITHER:
-        return 0.0
-    squared = 0.0
-    for axis in range(model.dimension):
-        squared += (state.mean[VELOCITY + axis] + state.head[0, axis]) ** 2 / model.dimension
-    return float(0.5 * squared * state.fact[CLOCK_S] ** 2)
+    off = state.fact[CLOCK_VARIANCE]
+    if model.trusted == NEITHER:
+        off += 0.5 * state.fact[CLOCK_S] ** 2
+    return float((state.mean[VELOCITY + axis] + state.head[0, axis]) ** 2 * off)
 
 
 @compiled(inner=True)
@@ -215,6 +215,5 @@ def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArr
     variance = answers[STATED]
     if state.fact[SCORED] >= _ENOUGH and state.fact[SURPRISE] > 1.0:
         variance += (state.fact[SURPRISE] - 1.0) * (variance + _noise(state))
-    variance += _of_either_clock(model, state)
     for axis in range(model.dimension):
-        mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance)
+        mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance + _of_clocks(model, state, axis))
