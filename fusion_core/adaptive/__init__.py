@@ -8,7 +8,8 @@ accelerometer. This filter (`fusion_adaptive`) estimates, beside the motion, wha
                    scale (2); the lever arm to the tracked point (3); correlated tracker noise (3)
     scales (4)     the tracker's noise, how far accelerations can be trusted, variance and time of correlated noise: by
                    a bank of small filters, weighed by how well each predicted the positions, forgetting over 10 s
-    clock (1)      how much later than its stamp a frame was measured: by small filters that try eleven offsets
+    clock (1)      how much later than its stamp a frame was measured: by small filters that try 21 offsets, for a
+                   clock that is steady and for one that wanders
 
 **Two times in one filter.** Positions are late, accelerations prompt. The state therefore stands at the newest position
 that was *taken in*, about a latency ago, and is never gone back on; accelerations only pile up in rows:
@@ -24,7 +25,7 @@ of their derivatives are enough: nothing is gone through again when a mounting e
 
 **A frame** (`steps.py`): the state is moved to it (`moments.py`); is it a measurement at all (a held position, exact
 zeros, a jump that no hand makes)?; the bank takes it in and says what the scales are (`bank.py`); so do the offsets of
-the clock (`clock.py`); the state takes it in with these.
+the clock (`clock.py`, `offset.py`); the state takes it in with these.
 
 **What was shown is scored** (`shown.py`): what the filter had shown for the time of a frame, a latency before that
 frame came, is compared with it. That is the error that matters, so it decides between the fusion and what positions

@@ -2,11 +2,10 @@
 
 All have one covariance, since the same readings reach each, only elsewhere in time; they differ in their means. Each
 has a lever arm of its own: with that of the large filter, which was found with the offset believed so far, the two
-hold each other in a place where both are wrong (a recording of circles stood at 25 ms for half a minute). Their
-log likelihoods, with forgetting, are a parabola about the true offset, whose vertex and bend are the offset and its SD.
-A hand at rest says nothing of it; the prior then mostly believes the stated latency, or each start would be uncertain.
-As a state of the large filter the offset would hang on an estimated velocity, and what is wrong with that (noise that
-is heavier or longer than thought) pulls it away; a likelihood is not pulled.
+hold each other in a place where both are wrong (a recording of circles stood at 25 ms for half a minute). What
+their likelihoods say of the offset stands in `offset`. As a state of the large filter it would hang on an estimated
+velocity, and what is wrong with that (noise that is heavier or longer than thought) pulls it away; a likelihood is not
+pulled.
 
 Only the *difference* of the two clocks shows. The phone's is believed, unless its stamps are ahead of their arrival.
 """
@@ -15,14 +14,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusion_core.adaptive import moments, rows
+from fusion_core.adaptive import moments, offset, rows
 from fusion_core.adaptive.bank import weighed
 from fusion_core.adaptive.layout import (
     ARM,
     AT,
     BEGAN,
-    CLOCK_S,
-    CLOCK_VARIANCE,
     KNOWS_ARM,
     NOISE,
     NOISE_DRIFT,
@@ -40,12 +37,7 @@ from fusion_core.adaptive.layout import (
 from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
-STEP_S = 0.02  # between the offsets tried: less than the width of the likelihood of any motion but a thrust
-FIRST_S = -0.14  # the tracker is later than stated by so much, at the most; and up to 60 ms earlier
 _FORGET_S = 10.0  # as the bank does
-_EXACT, _EXACT_SD_S = 0.7, 0.005  # so often a stated latency is right as far as any latency is constant
-_PRIOR_SD_S = 0.02  # else it is right within a frame or so
-_LEAST_SD_S = 0.002  # the past is forgotten so far as to leave no more certainty: a latency wanders
 _LEAD = 5.0  # in log likelihood: what is so far behind is out of the question
 _RATE_SD, _RATE_PSD = 1000.0, 900.0  # of the acceleration error, as in the bank
 
@@ -56,8 +48,8 @@ _ARM, _STATES = 12, 15
 @compiled(inner=True)
 def begin(model: Model, state: State, position: FloatArray) -> None:
     """At the first position."""
+    offset.begin(state)
     for one in range(OFFSETS):
-        state.clock_weight[one] = 0.0
         for part in range(3):
             state.clock_mean[one, OF_ARM, part] = 0.0
     for row in range(_STATES):
@@ -66,7 +58,7 @@ def begin(model: Model, state: State, position: FloatArray) -> None:
     for part in range(3):
         state.clock_covariance[_ARM + part, _ARM + part] = model.prior[ARM + part]
     begin_again(model, state, position, np.zeros((3, 3)))
-    judge(state)
+    offset.judge(state)
 
 
 @compiled(inner=True)
@@ -131,7 +123,7 @@ def take_in(
             _correct(model, state, apart, turned, dt)
             _follow(model, state, turned)
     if news:
-        judge(state)
+        offset.judge(state)
 
 
 @compiled
@@ -141,10 +133,10 @@ def _move_means(
     """The means moved from the stamp `before` to another; how far the position is from each goes into `apart`."""
     mean, net, turned, count = state.clock_mean, np.empty((2, 3)), np.zeros((3, 3)), state.count[ROWS]
     dt = stamp - before
-    rows.correct(state, phone, rows.row_before(phone, count, before + FIRST_S), model.dimension)
+    rows.correct(state, phone, rows.row_before(phone, count, before + offset.FIRST_S), model.dimension)
     kept = np.exp(-dt / state.fact[NOISE_DRIFT_S]) if state.fact[NOISE_DRIFT_S] > 0.0 else 0.0
     for one in range(OFFSETS):
-        begin, end = before + (FIRST_S + one * STEP_S), stamp + (FIRST_S + one * STEP_S)
+        begin, end = before + (offset.FIRST_S + one * offset.STEP_S), stamp + (offset.FIRST_S + one * offset.STEP_S)
         rows.integrate(phone.time, count, phone.corrected, begin, end, net)
         if state.count[KNOWS_ARM]:
             rows.turned_at(state, phone, end, turned)
@@ -202,14 +194,15 @@ def _correct(model: Model, state: State, apart: FloatArray, turned: FloatArray, 
             for part in range(3):
                 total += turned[axis, part] * shared[_ARM + part, other]
             spread[axis, other] = total
-    factor, white, best = np.empty((3, 3)), np.empty((OFFSETS, 3)), np.inf
+    factor, white, news, best = np.empty((3, 3)), np.empty((OFFSETS, 3)), np.empty(OFFSETS), np.inf
     for one in range(OFFSETS):
         squared = moments.whiten(dimension, spread, state.fact[NOISE], apart[one], factor, white[one])
         best = min(best, squared)
         variance = 1.0
         for axis in range(dimension):
             variance *= factor[axis, axis] ** (2.0 / dimension)
-        state.clock_weight[one] = kept * state.clock_weight[one] + weighed(model, squared, variance)
+        news[one] = weighed(model, squared, variance)
+    offset.weigh(state, news, kept, dt)
     _gain(state, shared, factor, white, dimension, max(best / model.surprise, 1.0))
 
 
@@ -241,51 +234,14 @@ def _follow(model: Model, state: State, turned: FloatArray) -> None:
 
     Their own was bent by positions that they did not expect, and would hold them back when a wandering clock comes by.
     """
-    best, mean = 0, state.clock_mean
+    best, mean, weight = 0, state.clock_mean, state.clock_weight[offset.likelier(state)]
     for one in range(OFFSETS):
-        if state.clock_weight[one] > state.clock_weight[best]:
+        if weight[one] > weight[best]:
             best = one
     for one in range(OFFSETS):
-        if state.clock_weight[one] < state.clock_weight[best] - _LEAD:
+        if weight[one] < weight[best] - _LEAD:
             for axis in range(model.dimension):
                 for part in range(3):
                     mean[one, 0, axis] -= turned[axis, part] * (mean[best, OF_ARM, part] - mean[one, OF_ARM, part])
             for part in range(3):
                 mean[one, OF_ARM, part] = mean[best, OF_ARM, part]
-
-
-@compiled(inner=True)
-def judge(state: State) -> None:
-    """The offset and its variance: the parabola of the log weights about the highest, with the prior."""
-    broad, best, highest = 1.0 / _PRIOR_SD_S**2, 0, -np.inf
-    for one in range(1, OFFSETS - 1):
-        offset = FIRST_S + one * STEP_S
-        log_weight = state.clock_weight[one] - 0.5 * broad * offset * offset
-        if log_weight > highest:
-            best, highest = one, log_weight
-    before, here, after = state.clock_weight[best - 1], state.clock_weight[best], state.clock_weight[best + 1]
-    bend = max(-(before - 2.0 * here + after) / STEP_S**2, 0.0)
-    most = 1.0 / _LEAST_SD_S**2
-    if bend > most:
-        for one in range(OFFSETS):
-            state.clock_weight[one] *= most / bend
-    offset = FIRST_S + best * STEP_S
-    _add_prior(state, bend, bend * offset + (after - before) / (2.0 * STEP_S))
-    state.fact[CLOCK_S] = min(max(state.fact[CLOCK_S], offset - STEP_S), offset + STEP_S)
-
-
-@compiled
-def _add_prior(state: State, bend: float, pull: float) -> None:
-    """Mean and variance of an offset o whose log likelihood is pull·o − bend·o²/2, by a prior of two normals.
-
-    With precision λ a normal gives it the mean pull / (bend + λ), the variance 1 / (bend + λ) and the evidence
-    √(λ / (bend + λ)) exp(pull² / (bend + λ) / 2); the two are mixed by their evidence.
-    """
-    exact, broad = 1.0 / _EXACT_SD_S**2, 1.0 / _PRIOR_SD_S**2
-    first, second = pull / (bend + exact), pull / (bend + broad)
-    log_odds = np.log(_EXACT / (1.0 - _EXACT)) + 0.5 * pull * (first - second)
-    log_odds += 0.5 * np.log(exact / (bend + exact) * (bend + broad) / broad)
-    share = 1.0 / (1.0 + np.exp(-log_odds))
-    state.fact[CLOCK_S] = share * first + (1.0 - share) * second
-    variance = share / (bend + exact) + (1.0 - share) / (bend + broad)
-    state.fact[CLOCK_VARIANCE] = variance + share * (1.0 - share) * (first - second) ** 2

@@ -51,14 +51,16 @@ LARGEST = 19  # the largest component of specific force so far
 STRANGE_MM = 20  # how far off the first strange frame was
 AT_LARGEST = 21  # how often the largest component came again
 EXPECTED = 22  # the squared error that the fusion expected of itself
-FACTS = 23
+CLOCK_STEADY_S = 23  # as CLOCK_S, were the clock a steady one
+FACTS = 24
 
 # A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
 # position (3) and its variance as the filters state it, and the variance of the fusion's alone.
 FUSED, AHEAD, HELD, MIXED, STATED, OWN, SHOWN = 0, 3, 6, 9, 12, 13, 14
 
 MEMBERS = 81  # of the bank
-OFFSETS = 11  # of the tracker's clock, that are tried
+OFFSETS = 21  # of the tracker's clock, that are tried
+STEADY, WANDERING = 0, 1  # what kind of clock
 OF_ARM = 4  # the row of a clock filter's mean that holds its lever arm
 MOST_WAITING = 8
 
@@ -93,7 +95,8 @@ class State(Protocol):
     kept: FloatArray  # (members,): of the correlated noise, over the last step
     clock_mean: FloatArray  # (offsets, 5, 3): as of a member of the bank, and a lever arm
     clock_covariance: FloatArray  # (15, 15), of all: four of each axis, and the lever arm
-    clock_weight: FloatArray  # (offsets,)
+    clock_weight: FloatArray  # (2, offsets): log likelihoods with forgetting, of a steady clock and of one that wanders
+    clock_foretold: FloatArray  # (2,): log likelihood with forgetting, of the frames as each kind foretold them
     usual: FloatArray  # (3, 3 + INPUTS): slow averages of lever-arm and input couplings
     waiting: FloatArray  # (most + 1, 5): time, arrival and value of frames not taken in yet
 
@@ -135,7 +138,8 @@ STATE = np.dtype(
         ("kept", np.float64, (MEMBERS,)),
         ("clock_mean", np.float64, (OFFSETS, 5, 3)),
         ("clock_covariance", np.float64, (15, 15)),
-        ("clock_weight", np.float64, (OFFSETS,)),
+        ("clock_weight", np.float64, (2, OFFSETS)),
+        ("clock_foretold", np.float64, (2,)),
         ("usual", np.float64, (3, 3 + INPUTS)),
         ("waiting", np.float64, (MOST_WAITING + 1, 5)),
     ]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.special import softmax
 
 from fusion_core.adaptive.layout import Records
 
@@ -14,17 +15,18 @@ if TYPE_CHECKING:
 
 
 class DenseClock:
-    """The clock's filters as textbook ones: each of eleven offsets a state of 15 with a covariance of its own.
+    """The clock's filters as textbook ones: each of 21 offsets a state of 15 with a covariance of its own.
 
     A state is position, velocity, acceleration error and correlated noise, three axes each, and a lever arm. They get
     the accelerations as the large filter corrects them, which is not theirs, so its mean is handed over at each frame.
     """
 
-    STEP_S, FIRST_S, NUMBER = 0.02, -0.14, 11
+    STEP_S, FIRST_S, NUMBER = 0.01, -0.14, 21
 
     def __init__(self, model: Records, noise: float, drift: float, position: np.ndarray) -> None:
         self.model, self.knows_arm = model[0], False
-        self.weight = np.zeros(self.NUMBER)
+        self.steady = 0.0
+        self.weight, self.foretold = np.zeros((2, self.NUMBER)), np.zeros(2)  # of a steady clock, of one that wanders
         self.offset = self.FIRST_S + self.STEP_S * np.arange(self.NUMBER)
         begin = np.kron(
             np.array([[noise + drift, 0, 0, -drift], [0, 500.0**2, 0, 0], [0, 0, 1000.0**2, 0], [-drift, 0, 0, drift]]),
@@ -59,36 +61,63 @@ class DenseClock:
         squared = np.einsum("oi,ij,oj->o", apart, np.linalg.inv(spread), apart)
         surprised = np.maximum(squared / self.model["surprise"], 1.0)
         cost = np.minimum(squared, self.model["surprise"]) + 9.0 * np.log(surprised)
-        self.weight = kept * self.weight - 0.5 * cost - 0.5 * np.linalg.slogdet(spread)[1]
+        news = -0.5 * cost - 0.5 * np.linalg.slogdet(spread)[1]
+        before_it = softmax(self.weight + self._log_prior, axis=1)
+        self.foretold = kept * self.foretold + np.log(before_it @ np.exp(news - news.max())) + news.max()
+        left = np.array([kept, 1 / (1 + 0.01**2 * dt * self._parabola(1)[1])])
+        self.weight = left[:, None] * self.weight + news
         gain = self.covariance @ observed.T @ np.linalg.inv(spread) / max(squared.min() / self.model["surprise"], 1.0)
         self.mean = self.mean + apart @ gain.T
         self.covariance = self.covariance - gain @ observed @ self.covariance
-        best = int(np.argmax(self.weight))
-        for one in map(int, np.flatnonzero(self.weight < self.weight[best] - 5.0)):
+        weight = self.weight[int(self.wandering > 0.5)]
+        best = int(np.argmax(weight))
+        for one in map(int, np.flatnonzero(weight < weight[best] - 5.0)):
             self.mean[one, :3] -= turned @ (self.mean[best, 12:] - self.mean[one, 12:])
             self.mean[one, 12:] = self.mean[best, 12:]
-
         self.judge()
 
+    @property
+    def wandering(self) -> float:
+        """How likely the clock is one that wanders."""
+        return float(softmax(self.foretold + np.array([0.0, -3.0]))[1])
+
     def judge(self) -> None:
-        """Offset and variance: the vertex and bend of the log weights, times the prior of two normals."""
+        """Offset and variance: those of either kind of clock, mixed."""
+        steady = self._found(0, exact=0.7)
+        self.steady = steady[0]
+        found = np.array([steady, self._found(1, exact=0.0)])
+        share = np.array([1 - self.wandering, self.wandering])
+        self.value = float(share @ found[:, 0])
+        self.variance = float(share @ (found[:, 1] + (found[:, 0] - self.value) ** 2))
+
+    @property
+    def _log_prior(self) -> np.ndarray:
+        """Of the offsets, before any frame: about the stated latency, and about where a steady clock is."""
+        return np.asarray(-0.5 * ((self.offset - np.array([[0.0], [self.steady]])) / 0.02) ** 2)
+
+    def _parabola(self, kind: int) -> tuple[int, float, float]:
+        """Where the weights with the prior are highest, and the bend and slope of the weights there."""
         inner = slice(1, self.NUMBER - 1)
-        best = 1 + int(np.argmax((self.weight - 0.5 * (self.offset / 0.02) ** 2)[inner]))
-        before, here, after = self.weight[best - 1 : best + 2]
-        bend = max((2 * here - before - after) / self.STEP_S**2, 0.0)
-        pull = bend * self.offset[best] + (after - before) / (2 * self.STEP_S)
+        best = 1 + int(np.argmax((self.weight + self._log_prior)[kind, inner]))
+        before, here, after = self.weight[kind, best - 1 : best + 2]
+        return best, max((2 * here - before - after) / self.STEP_S**2, 0.0), (after - before) / (2 * self.STEP_S)
+
+    def _found(self, kind: int, exact: float) -> tuple[float, float]:
+        """Offset and variance: the vertex and bend of the log weights, times the prior of two normals."""
+        about = self.steady if kind else 0.0
+        best, bend, slope = self._parabola(kind)
+        pull = bend * (self.offset[best] - about) + slope
         if bend > 1 / 0.002**2:
-            self.weight *= 1 / 0.002**2 / bend
+            self.weight[kind] *= 1 / 0.002**2 / bend
         parts = []
-        for share, sd in ((0.7, 0.005), (0.3, 0.02)):
+        for share, sd in ((exact, 0.005), (1 - exact, 0.02)):
             variance = 1 / (bend + 1 / sd**2)
             parts.append((share * np.sqrt(variance) / sd * np.exp(variance * pull**2 / 2), variance * pull, variance))
         evidence, mean, variance = np.array(parts).T
         evidence = evidence / evidence.sum()
         within = evidence @ mean
-        self.variance = float(evidence @ (variance + (mean - within) ** 2))
         low, high = self.offset[best] - self.STEP_S, self.offset[best] + self.STEP_S
-        self.value = float(np.clip(within, low, high))
+        return float(np.clip(about + within, low, high)), float(evidence @ (variance + (mean - within) ** 2))
 
     def _move(self, large: Dense, dt: float, psd: float) -> None:
         fade = np.exp(-dt / large.scale[3]) if large.scale[3] > 0 else 0.0
