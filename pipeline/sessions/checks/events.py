@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -128,6 +129,18 @@ def span(recorded: Recorded) -> Iterator[Finding]:
     yield Finding(SPAN, "red", found, expected, message)
 
 
+class _Path(NamedTuple):
+    """What was displayed: rising times (n,) in s and positions (n, 2) in mm."""
+
+    time_s: FloatArray
+    value_mm: FloatArray
+    is_display: bool
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """The positions (m, 2) in mm at these times (m,)."""
+        return np.column_stack([np.interp(time_s, self.time_s, self.value_mm[:, axis]) for axis in (0, 1)])
+
+
 def selections(recorded: Recorded) -> Iterator[Finding]:
     """The recorded selections compared with what was displayed then, or with the tracker if nothing was displayed.
 
@@ -144,10 +157,10 @@ def selections(recorded: Recorded) -> Iterator[Finding]:
     if known.sum() < _SELECTIONS_MIN:
         return
     time, at = time[known], at[known]
-    off = _apart(shown, time, at)
-    here = float(np.median(off))
+    path = _path(shown)
+    here = float(np.median(_apart(path, time, at)))
     found, expected = f"{here:.3g} mm from {shown.name}", "as displayed"
-    cause = _selection_cause(shown, time, at, here, recorded.px_per_mm) if here > _limit(shown, time, at) else ""
+    cause = _selection_cause(path, time, at, here, recorded.px_per_mm) if here > _limit(shown) else ""
     if not cause:
         yield Finding(SHOWN, "green", found, expected)
         return
@@ -155,19 +168,19 @@ def selections(recorded: Recorded) -> Iterator[Finding]:
     yield Finding(SHOWN, "red" if here > _OFF_RED_MM else "amber", found, expected, message)
 
 
-def _limit(shown: Positions, time: FloatArray, at: FloatArray) -> float:
+def _limit(shown: Positions) -> float:
     """How far apart they may be, in mm: 10 mm, or four times its noise for a sensor."""
     if shown.kind == "display":
         return _OFF_MM
     return max(_OFF_MM, 4.0 * float(np.sqrt(2.0)) * (shown.noise_sd_mm or 0.0))
 
 
-def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: float, px_per_mm: float | None) -> str:
+def _selection_cause(path: _Path, time: FloatArray, at: FloatArray, here: float, px_per_mm: float | None) -> str:
     """The mistake that explains most of the distance, in words; "" if none does."""
-    shifts = np.array([float(np.mean(_apart(shown, time + shift, at))) for shift in _SHIFTS_S])
+    shifts = np.array([float(np.mean(_apart(path, time + shift, at))) for shift in _SHIFTS_S])
     best = _middle_of_lowest(shifts)
     tried = mistakes(at, px_per_mm)
-    left = {cause: float(np.median(_apart(shown, time, points))) for cause, points in tried.items()}
+    left = {cause: float(np.median(_apart(path, time, points))) for cause, points in tried.items()}
     likely = min(left, key=lambda one: left[one])
     if left[likely] < min(_EXPLAINS * here, float(shifts[best]), _LEFT_MM):
         return likely
@@ -177,10 +190,10 @@ def _selection_cause(shown: Positions, time: FloatArray, at: FloatArray, here: f
             f"they fit {abs(by):.1f} s {'earlier' if by < 0 else 'later'}, so the events' clock is "
             f"{'late' if by < 0 else 'early'}; log events with the recorder's clock"
         )
-    found = _other_frame(_shown_at(shown, time), at, here, px_per_mm)
+    found = _other_frame(path.at(time), at, here, px_per_mm)
     if found:
         return found
-    if here > _OFF_RED_MM and shown.kind == "display":
+    if here > _OFF_RED_MM and path.is_display:
         return "they are of another clock or frame; log what was displayed, with the recorder's clock"
     return ""
 
@@ -202,16 +215,14 @@ def _within(shown: Positions, time: FloatArray) -> BoolArray:
     return found
 
 
-def _apart(shown: Positions, time: FloatArray, at: FloatArray) -> FloatArray:
-    """Distances (n,) in mm between the points `at` (n, 2) and the displayed positions at `time` (n,)."""
-    return np.asarray(np.linalg.norm(_shown_at(shown, time) - at, axis=1))
-
-
-def _shown_at(shown: Positions, time: FloatArray) -> FloatArray:
-    """The displayed positions (n, 2) in mm at these times."""
+def _path(shown: Positions) -> _Path:
     stamps, first = np.unique(shown.times.stamp_s - shown.times.late_s, return_index=True)
-    value = shown.value_mm[first]
-    return np.column_stack([np.interp(time, stamps, value[:, axis]) for axis in (0, 1)])
+    return _Path(stamps, shown.value_mm[first, :2], shown.kind == "display")
+
+
+def _apart(path: _Path, time: FloatArray, at: FloatArray) -> FloatArray:
+    """Distances (n,) in mm between the points `at` (n, 2) and the displayed positions at `time` (n,)."""
+    return np.asarray(np.linalg.norm(path.at(time) - at, axis=1))
 
 
 def _other_frame(there: FloatArray, at: FloatArray, here: float, px_per_mm: float | None) -> str:
