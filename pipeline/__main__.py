@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from pipeline.commands import planning
+from pipeline.commands import kept, planning, recording
+from pipeline.commands.options import Anonymise, CacheFolder, ExecutorName, Jobs, Out, Studies
 from pipeline.engine import threads
 
 _INTERRUPTED = 130
@@ -21,32 +22,6 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-
-Studies = Annotated[list[Path], typer.Argument(metavar="STUDY...", help="A study folder, or several.")]
-Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Where to write; with several studies a folder each in it.")
-]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to compute in. Default: one a processor.")]
-CacheFolder = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Where computed tables are kept.")]
-
-Anonymise = Annotated[
-    bool,
-    typer.Option(
-        "--anonymise",
-        help="Write P01, P02 … for participants' ids, everywhere, into a folder of its own; docs/privacy.md says what"
-        " this does not hide.",
-    ),
-]
-
-ExecutorName = Annotated[
-    str,
-    typer.Option(
-        "--executor",
-        metavar="WHERE",
-        help="Where to compute: process (processes of this machine), inline (this process), dask (a Dask cluster of"
-        " this machine), dask://host:port or tls://host:port (a Dask scheduler). The results are the same.",
-    ),
-]
 
 
 def _print_version(wanted: bool) -> None:
@@ -281,56 +256,8 @@ def explore(
     command.explore(study, options, out, jobs, executor)
 
 
-@app.command()
-def record(
-    study: Annotated[Path, typer.Argument(metavar="STUDY", help="A study folder whose study.yaml says recording:.")],
-    demo: Annotated[
-        bool,
-        typer.Option("--demo", help="Simulated senders, and the mouse is the phone; into a folder of its own."),
-    ] = False,
-    bots: Annotated[
-        bool, typer.Option("--bots", help="With --demo: simulated participants play the study, faster than it takes.")
-    ] = False,
-    participants: Annotated[int, typer.Option(min=1, max=999, help="How many the bots are.")] = 2,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="With --demo: the folder. Default: demo/ and the study's name.")
-    ] = None,
-    lan: Annotated[
-        bool, typer.Option("--lan", help="Serve pages to the network too, by TLS with a certificate made here.")
-    ] = False,
-    host: Annotated[
-        str | None,
-        typer.Option(help="With --lan: which of this computer's addresses to serve at."),
-    ] = None,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="The port to serve pages on.")] = 8443,
-    operator_lan: Annotated[
-        bool, typer.Option("--operator-lan", help="With --lan: the operator's page may be on another computer.")
-    ] = False,
-    certificate: Annotated[
-        Path | None, typer.Option("--cert", metavar="FILE", help="With --lan: a certificate of your own, in PEM.")
-    ] = None,
-    key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="Its private key, in PEM.")] = None,
-    goes_on: Annotated[
-        bool, typer.Option("--continue", help="Go on though study.yaml has changed since the first session.")
-    ] = False,
-) -> None:
-    """Run a study live: pages for operator, phone and questionnaire, a steady display, and logs that replay."""
-    from pipeline.commands import record as command
-
-    options = command.Options(host, port, demo, goes_on, lan, operator_lan, certificate, key)
-    command.record(study, options, out, participants if bots else None)
-
-
-@app.command()
-def marker(
-    number: Annotated[int, typer.Option("--id", min=0, max=49, help="Which of the 50 markers.")] = 7,
-    size_mm: Annotated[float, typer.Option(min=10, max=120, help="How wide its black square is.")] = 50.0,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where to write. Default: marker-7.pdf.")] = None,
-) -> None:
-    """Write a marker to print as a PDF, true to size: with it a webcam is a tracker."""
-    from pipeline.commands import marker as command
-
-    command.marker(number, size_mm, out)
+app.command()(recording.record)
+app.command()(recording.marker)
 
 
 @app.command()
@@ -393,41 +320,7 @@ def audit(
     command.audit(file, as_json)
 
 
-cache_app = typer.Typer(help="Show, prune and verify what earlier runs computed and kept.", no_args_is_help=True)
-app.add_typer(cache_app, name="cache")
-
-
-@cache_app.command("show")
-def cache_show(cache: CacheFolder = None) -> None:
-    """Show what the cache holds: entries, size and last use, stage by stage."""
-    from pipeline.commands import cache as command
-
-    command.show(cache)
-
-
-@cache_app.command("prune")
-def cache_prune(
-    older_than: Annotated[
-        float | None, typer.Option(min=0, metavar="DAYS", help="Remove what has not been used for this many days.")
-    ] = None,
-    keep_current: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="STUDY", help="Remove what this study, as it is now, does not use; may be repeated."),
-    ] = None,
-    cache: CacheFolder = None,
-) -> None:
-    """Remove entries; with both options, those to which both apply. What is needed again will be computed again."""
-    from pipeline.commands import cache as command
-
-    command.prune_cache(cache, older_than, keep_current or [])
-
-
-@cache_app.command("verify")
-def cache_verify(cache: CacheFolder = None) -> None:
-    """Compare every entry with the SHA-256 of what was written, and remove the damaged. Exit code 1: some were."""
-    from pipeline.commands import cache as command
-
-    command.verify_cache(cache)
+app.add_typer(kept.app, name="cache")
 
 
 def main() -> None:
