@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from pipeline.engine.code_digest import code_digest, code_digest_in
+from pipeline.engine.code_digest import code_digest, code_digest_in, imports
 from pipeline.stages import STAGES
 from tests.conftest import CLONE
 
@@ -66,6 +68,51 @@ def test_a_new_import_is_followed(copied: Path) -> None:
     (copied / path).write_bytes(importing)
     assert reached_by(copied, "pipeline/statistics/wilcoxon.py") == {"ingest", "compare"}
     (copied / path).write_bytes(original)
+
+
+def parsed(source: str) -> set[tuple[str, str]]:
+    """What Python's own parser finds: (module, name) of every import, and the modules that strings begin with."""
+    found: set[tuple[str, str]] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {(alias.name, "") for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.module is not None and node.level == 0, "a relative import is not followed"
+            found |= {(node.module, alias.name) for alias in node.names}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            named = re.match(r"(pipeline|fusion_core)(\.\w+)+", node.value)
+            found |= {(named.group(), "")} if named else set()
+    return found
+
+
+ODDLY_WRITTEN = """
+import a, b.c as d
+import e; from f.g import h
+if a: import i
+def one():
+	from j import (  # a comment (in two halves), no name
+		k as kk,
+		l,  # with, commas
+	)
+from m import *
+from n \\
+    import o, \\
+    p
+try: from q import(r)
+except ImportError: pass
+STAGE = 'pipeline.stages.one', f"{a}pipeline.two:{b}fusion_core.three", '''pipeline.four'''
+"""
+
+
+def test_an_import_is_found_however_it_is_written() -> None:
+    assert set(imports(ODDLY_WRITTEN)) == parsed(ODDLY_WRITTEN)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_import_that_pythons_parser_finds_is_found(package: str) -> None:
+    for path in (CLONE / package).rglob("*.py"):
+        source = path.read_text(encoding="utf-8")
+        assert set(imports(source)) >= parsed(source), path
 
 
 def test_every_file_that_is_no_python_reaches_the_stages_of_its_folder(copied: Path) -> None:
