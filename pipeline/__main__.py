@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -323,6 +325,13 @@ def audit(
 app.add_typer(kept.app, name="cache")
 
 
+@cache
+def _commands() -> Callable[[], None]:
+    """All commands, with their options read off the functions above; a process may run several, as tests do."""
+    command: Callable[[], None] = typer.main.get_command(app)
+    return command
+
+
 def main() -> None:
     """Run the command; an error that the user can correct is a message, not a traceback."""
     threads.limit_to_one_thread()
@@ -330,7 +339,7 @@ def main() -> None:
     from pipeline.errors import RUN_AGAIN, PipelineError
 
     try:
-        app()
+        _commands()()
     except BrokenPipeError:  # the reader of our output, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)

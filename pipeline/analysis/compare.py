@@ -13,7 +13,7 @@ import pandas as pd
 from pipeline.analysis.audit.beside_computed import compare_printed
 from pipeline.analysis.comparisons import all_requests, compared, people_of
 from pipeline.analysis.complete_cases import People, read_values
-from pipeline.analysis.descriptives import descriptives, differences, intervals_within
+from pipeline.analysis.descriptives import descriptives, differences, intervals_within, means_of_measures
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.fitts_law import fitts_law
 from pipeline.analysis.group_descriptives import by_group
@@ -48,13 +48,14 @@ def run(work: Work) -> Outcome:
     measured = work.entry("measure")
     values = read_values(measured, people_of(study, work.folder, work.pseudonyms))
     measures, observations = values.measures, values.observations
+    means = means_of_measures(study, measures)
     frames: dict[str, pd.DataFrame] = {
         "trials": tables.read("trials", measured),
         "measures": measures,
         "reliability": tables.read("reliability", measured),
-        "descriptives": tables.frame("descriptives", descriptives(study, measures, observations)),
-        "intervals_within": tables.frame("intervals_within", intervals_within(study, measures, observations)),
-        "differences": tables.frame("differences", differences(study, measures)),
+        "descriptives": tables.frame("descriptives", descriptives(means, observations)),
+        "intervals_within": tables.frame("intervals_within", intervals_within(means, observations)),
+        "differences": tables.frame("differences", differences(means)),
     }
     refuse_undefined(study, list(measures["measure"].unique()), tables.read("exclusions", measured))
     rows, left_out = compared(study, values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -17,14 +17,22 @@ from pipeline.study.measures import measure, measure_order
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 
+PersonMeans = Mapping[str, pd.DataFrame]
+"""Of each measure, in the order of reports: one row per participant and one column per condition."""
 
-def descriptives(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> list[Row]:
+
+def means_of_measures(study: Study, measures: pd.DataFrame) -> PersonMeans:
+    """The participants' means of every measure."""
+    names = sorted(set(measures["measure"]), key=measure_order)
+    return {name: person_means(study, measures, name) for name in names}
+
+
+def descriptives(means: PersonMeans, observations: pd.DataFrame) -> list[Row]:
     """n, mean, SD, median and the interval of the mean, one row per measure and condition."""
     rows: list[Row] = []
-    for name in sorted(set(measures["measure"]), key=measure_order):
-        wide = person_means(study, measures, name)
+    for name, wide in means.items():
         described_as = described_values(name, wide, observations)
-        for condition in study.conditions:
+        for condition in wide.columns:
             values = wide[condition].dropna().to_numpy(np.float64)
             if len(values):
                 rows.append({"measure": name, "condition": condition, **described_as(values)})
@@ -39,17 +47,18 @@ def described_values(name: str, wide: pd.DataFrame, observations: pd.DataFrame) 
     return lambda values: described(values, method, within_unit)
 
 
-def intervals_within(study: Study, measures: pd.DataFrame, observations: pd.DataFrame) -> list[Row]:
+def intervals_within(means: PersonMeans, observations: pd.DataFrame) -> list[Row]:
     """The Cousineau-Morey interval of each condition's mean, of the participants who met every condition.
 
     None of single answers 0 or 1, whose differences are no measurements; of shares it is cut at 0 and 1.
     """
     rows: list[Row] = []
-    for name, wide, method in _by_measure(study, measures, observations):
+    for name, wide in means.items():
+        method = _interval_method(name, wide, observations)
         complete = wide.dropna()
         values = complete.to_numpy(np.float64)
         intervals = [None] if method == WILSON else within_intervals(values, bounded=method == T_OF_SHARES)
-        for condition, bounds in zip(study.conditions, intervals, strict=False):
+        for condition, bounds in zip(wide.columns, intervals, strict=False):
             if bounds is not None:
                 cell = {"measure": name, "condition": condition, "n": len(complete)}
                 rows.append(
@@ -58,12 +67,12 @@ def intervals_within(study: Study, measures: pd.DataFrame, observations: pd.Data
     return rows
 
 
-def differences(study: Study, measures: pd.DataFrame) -> list[Row]:
+def differences(means: PersonMeans) -> list[Row]:
     """The baseline minus each other condition, of the participants who met every condition, with the t interval."""
     rows: list[Row] = []
-    for name in sorted(set(measures["measure"]), key=measure_order):
-        complete = person_means(study, measures, name).dropna()
-        first, *others = study.conditions
+    for name, wide in means.items():
+        complete = wide.dropna()
+        first, *others = wide.columns
         for other in others if len(complete) > 1 else ():
             apart = (complete[first] - complete[other]).to_numpy(np.float64)
             found = summarize(apart)
@@ -71,15 +80,6 @@ def differences(study: Study, measures: pd.DataFrame) -> list[Row]:
             lower = int(np.sum(apart > 0))
             rows.append({"measure": name, "contrast": f"{first} - {other}", "n": len(apart), **bounds, "lower": lower})
     return rows
-
-
-def _by_measure(
-    study: Study, measures: pd.DataFrame, observations: pd.DataFrame
-) -> Iterator[tuple[str, pd.DataFrame, str]]:
-    """Each measure with the participants' means by condition, and the method of the intervals of its means."""
-    for name in sorted(set(measures["measure"]), key=measure_order):
-        wide = person_means(study, measures, name)
-        yield name, wide, _interval_method(name, wide, observations)
 
 
 def _interval_method(name: str, wide: pd.DataFrame, observations: pd.DataFrame) -> str:

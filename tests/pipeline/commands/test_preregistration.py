@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,8 @@ from pipeline.study.preregistration import (
     registered_of,
 )
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
-from tests.pipeline.helpers import Ran, Steadyhand, run
+from tests.pipeline.helpers import Ran, Steadyhand, exit_code, run
+from tests.pipeline.made_once import made_once
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
@@ -58,11 +60,23 @@ def plan(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) ->
     return lambda *words: run(capsys, monkeypatch, "plan", *words)
 
 
+@pytest.fixture(scope="module")
+def preregistered(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A study that was preregistered before there were data; its power is simulated once for all tests."""
+
+    def make(root: Path) -> None:
+        (root / "study.yaml").write_text(SETTINGS, encoding="utf-8")
+        with pytest.MonkeyPatch.context() as patched:
+            assert exit_code(patched, "plan", root, "--preregister") == 0
+
+    yield from made_once(tmp_path_factory, "preregistered", make)
+
+
 @pytest.fixture
-def registered(folder: Folder, plan: Plan) -> Path:
-    """A study that was preregistered before there were data, and has them now."""
-    root = folder(SETTINGS)
-    assert plan(root, "--preregister").code == 0
+def registered(preregistered: Path, tmp_path: Path) -> Path:
+    """A copy of that study, which has data now."""
+    root = tmp_path / "study"
+    shutil.copytree(preregistered, root)
     (root / "measures.csv").write_text(MEASURES)
     return root
 

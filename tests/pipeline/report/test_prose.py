@@ -15,7 +15,7 @@ from pypdf import PdfReader
 
 from pipeline.analysis.comparisons import compared as rows_of
 from pipeline.analysis.complete_cases import Values
-from pipeline.analysis.descriptives import descriptives
+from pipeline.analysis.descriptives import descriptives, means_of_measures
 from pipeline.report.prose.glossary import explained
 from pipeline.report.prose.references import bibliography, escaped, used
 from pipeline.report.sections.comparisons import anchor
@@ -150,9 +150,8 @@ def a_study(
         tables.records("comparisons", tables.frame("comparisons", [{**row, "details": None} for row in rows]))
     )
     found = [{**whole, "details": row["details"]} for whole, row in zip(complete, rows, strict=True)]
-    described = list(
-        tables.records("descriptives", tables.frame("descriptives", descriptives(study, measures, observations)))
-    )
+    summaries = descriptives(means_of_measures(study, measures), observations)
+    described = list(tables.records("descriptives", tables.frame("descriptives", summaries)))
     return found, study_facts(conditions, study.alpha, described)
 
 
