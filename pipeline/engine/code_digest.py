@@ -47,21 +47,16 @@ def code_digest(module: str) -> str:
     return _running().digest(module)
 
 
-def code_digest_in(root: Path, module: str) -> str:
-    """The digest of a module, of all our modules it reaches, the files beside them, and the libraries they import.
-
-    `root` is the folder that holds our packages: a clone, or where Python keeps installed packages.
-    """
-    return _Code(root).digest(module)
-
-
 @cache
-def _running() -> _Code:
-    return _Code(_ROOT)
+def _running() -> Code:
+    return Code(_ROOT)
 
 
-class _Code:
-    """Our packages below a root, for the digests of several modules: listed once, and each file is read once."""
+class Code:
+    """Our packages as they are now, for the digests of several modules: listed once, and each file is read once.
+
+    `root` is the folder that holds them: a clone, or where Python keeps installed packages.
+    """
 
     def __init__(self, root: Path) -> None:
         self._root = root
@@ -72,7 +67,7 @@ class _Code:
         self._imports: dict[str, tuple[str, ...]] = {}
 
     def digest(self, module: str) -> str:
-        """The digest of a module and of all that it reaches."""
+        """The digest of a module, all of ours that it reaches, the files beside them, and versions of libraries."""
         read: set[str] = set()
         libraries: set[str] = set()
         followed: set[str] = set()

@@ -13,6 +13,7 @@ import matplotlib.ticker
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from pipeline.report.glyphs import FALLBACK, FAMILY, FONTS, showable
@@ -76,9 +77,19 @@ def styled(function: Callable[Drawn, Figure]) -> Callable[Drawn, Figure]:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """A figure as SVG, the same bytes for the same data."""
-    with mpl.rc_context(_STYLE):
-        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "Steadyhand"})
+    """A figure as SVG, the same bytes for the same data.
+
+    The canvas lays it out as it draws it. `savefig` would draw all of it once before, which takes a third of the time.
+    """
+    canvas, dpi = figure.canvas, figure.dpi
+    try:
+        with mpl.rc_context(_STYLE):
+            figure.dpi = mpl.rcParams["savefig.dpi"]
+            svg: Any = FigureCanvasSVG(figure)
+            svg.print_svg(path, metadata={"Date": None, "Creator": "Steadyhand"})
+    finally:
+        figure.set_canvas(canvas)
+        figure.dpi = dpi
 
 
 def draw(function: Callable[..., Figure], path: Path, *arguments: Any) -> None:

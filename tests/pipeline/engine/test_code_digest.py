@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.engine.code_digest import code_digest, code_digest_in, imports
+from pipeline.engine.code_digest import Code, code_digest, imports
 from pipeline.stages import STAGES
 from tests.conftest import CLONE
 
@@ -35,7 +35,8 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def digests(root: Path) -> dict[str, str]:
-    return {stage.name: code_digest_in(root, stage.module) for stage in STAGES}
+    code = Code(root)
+    return {stage.name: code.digest(stage.module) for stage in STAGES}
 
 
 def reached_by(root: Path, path: str, content: bytes | None = None, before: dict[str, str] | None = None) -> set[str]:
