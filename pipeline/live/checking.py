@@ -17,12 +17,16 @@ _EXAMINE_NS, _EXAMINE_RUNNING_NS = 2_000_000_000, 10_000_000_000
 
 
 def kept(run: StudyRun, reading: Reading) -> Watched:
-    """What is watched, with a reading kept for the checks, as it is logged."""
+    """What is watched, with a reading kept for the checks, as it is logged.
+
+    Of an orientation that was found from the motion only what the browser said is kept as the sender's own.
+    """
     setup, name, values = run.setup, reading.stream, reading.values
     arrival, stamp = reading.arrival_ns, reading.stamp_ns
     if stamp is None or setup.streams[name].stamps_arrival:
         stamp = arrival
-    turned = run.motion.upright if name == setup.motion_stream else _orientation_of(values)
+    was_found = run.finds_orientation and name == setup.turned_stream
+    turned = run.motion.upright if was_found else _orientation_of(values)
     watched = watch.kept(run.watched, name, Row(min(stamp, arrival), arrival, values, turned))
     if name == setup.tracker and len(watched.reached) < len(setup.corners_mm):
         watched = watch.reached(watched, setup.corners_mm, values)
@@ -47,7 +51,7 @@ def examine(run: StudyRun, at_ns: int) -> Stepped:
 
 
 def _heading_sd(run: StudyRun) -> float | None:
-    return None if run.setup.aligner is None else run.motion.sd
+    return run.motion.sd if run.finds_orientation else None
 
 
 def examined(run: StudyRun, examined: Examined) -> Stepped:

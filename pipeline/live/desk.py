@@ -22,6 +22,7 @@ _NS_PER_S = 1e9
 _LEAST_FREE_BYTES = 200_000_000
 _LATE_WRITE_MS = 2_000.0
 _LATELY_NS = 10_000_000_000
+_UNKNOWN = "Its orientation is not known yet: hold it still, then move it."
 _UNALIGNED = (
     "The phone's orientation is not known yet: hold it still for a second, then move it about in view of the tracker;"
     " or give a reason to start without it."
@@ -46,13 +47,18 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
         for name in used
         if health.is_silent(run.health[name], at_ns)
     ]
-    if run.phone is not None and run.setup.motion_stream in used and not run.motion.is_known:
+    if run.phone is not None and run.setup.turned_stream in used and is_unaligned(run):
         found.append(_UNALIGNED)
     if run.disk is not None and run.disk.fault is not None:
         found.append(run.disk.fault)
     elif run.disk is not None and run.disk.free_bytes < _LEAST_FREE_BYTES:
         found.append("The disk is nearly full. A study needs 200 MB.")
     return [*found, *(one.text for one in run.checks if one.light == "red")]
+
+
+def is_unaligned(run: StudyRun) -> bool:
+    """Whether the phone's orientation is to be found from its motion, and is not known yet."""
+    return run.finds_orientation and not run.motion.is_known
 
 
 def undone(run: StudyRun, person: plan.Person) -> list[Light]:
@@ -238,6 +244,12 @@ def lights(run: StudyRun, at_ns: int) -> Whole:
         lost = attempt.heard[name].lost if attempt is not None else 0
         light = health.light(one, at_ns, lost)
         problem = run.links.get(name)
+        if (
+            name == run.setup.turned_stream != run.setup.motion_stream
+            and is_unaligned(run)
+            and light["light"] == "green"
+        ):
+            light = {**light, "light": "amber", "text": f"{light['text']}. {_UNKNOWN}"}
         found[name] = {**light, "light": "red", "text": problem} if problem else light
     found |= {
         "senders": _senders_light(run, at_ns),
@@ -277,8 +289,8 @@ def _phone_light(run: StudyRun) -> dict[str, object]:
         return {"light": "red", "text": "No phone is connected. Scan the code with the phone."}
     if run.hello is not None and not run.hello.wake_lock and not run.setup.mouse:
         return {"light": "amber", "text": "Connected. Its screen may go dark: set its automatic lock to “never”."}
-    if run.setup.aligner is not None and not run.motion.is_known:
-        return {"light": "amber", "text": "Connected. Its orientation is not known yet: hold it still, then move it."}
+    if run.setup.motion_stream is not None and is_unaligned(run):
+        return {"light": "amber", "text": f"Connected. {_UNKNOWN}"}
     return {"light": "green", "text": "Connected."}
 
 

@@ -1,6 +1,7 @@
 """A phone's raw readings as they are logged: specific force, angular velocity, orientation in the tracker's frame.
 
-Everything is found from the data, nothing from the browser's name:
+Those of the phone's page, and those of another sender that brings no orientation. Everything is found from the data,
+nothing from the browser's name:
 
 - Sign. Browsers disagree on whether acceleration at rest points up or down. With the browser's own orientation, its
   mean along "up" over a second at rest says which; without one, W3C's rule is taken (up).
@@ -122,25 +123,31 @@ def moved(
     """
     if message.a is None or message.r is None:
         return state, None
+    return turned(aligner, state, message.a, tuple(rate * RAD_PER_DEG for rate in message.r), stamp_ns, arrival_ns)
+
+
+def turned(
+    aligner: Aligner, state: PhoneMotion, acceleration: Values, turning: Values, stamp_ns: int, arrival_ns: int
+) -> tuple[PhoneMotion, Values | None]:
+    """The same after an acceleration in m/s², gravity in it, and an angular velocity in rad/s."""
     origin = stamp_ns if state.origin_ns is None else state.origin_ns
     time = (stamp_ns - origin) * S_PER_NS
     if time <= state.moved_s:
         return state, None
-    turning = tuple(rate * RAD_PER_DEG for rate in message.r)
     state = changed(state, origin_ns=origin, moved_s=time)
-    state, upright = _upright(state, time, message.a, turning)
+    state, upright = _upright(state, time, acceleration, turning)
     state = changed(state, upright=upright if state.source == "browser" else None)
     if state.sign is None or upright is None:
         sign = state.sign if state.sign is not None else 1.0
-        return state, (*(sign * part for part in message.a), *turning, *(math.nan,) * 4)
-    force = tuple(state.sign * part for part in message.a)
+        return state, (*(sign * part for part in acceleration), *turning, *(math.nan,) * 4)
+    force = tuple(state.sign * part for part in acceleration)
     state = _headed(aligner, state, time, (arrival_ns - origin) * S_PER_NS, force, upright)
     if not state.is_known:
         return state, (*force, *turning, *(math.nan,) * 4)
     about = (0.0, 0.0, math.sin(state.angle / 2), math.cos(state.angle / 2))
-    turned = product(aligner.level_xyzw, product(about, upright))
-    length = math.sqrt(sum(part * part for part in turned))
-    return state, (*force, *turning, *(part / length for part in turned))
+    found = product(aligner.level_xyzw, product(about, upright))
+    length = math.sqrt(sum(part * part for part in found))
+    return state, (*force, *turning, *(part / length for part in found))
 
 
 def _upright(

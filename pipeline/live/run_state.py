@@ -85,6 +85,11 @@ class StudyRun:
         return plan.current(self.plan)
 
     @property
+    def finds_orientation(self) -> bool:
+        """Whether the phone's orientation is found from its motion: its page sends it, or a sender brings none."""
+        return self.setup.aligner is not None and (self.setup.motion_stream is not None or self.motion.source != "none")
+
+    @property
     def checks(self) -> tuple[Light, ...]:
         """The lights of the checks before a task, and of what the last readings claim."""
         found = self.watched.found
@@ -150,7 +155,8 @@ def tables(run: StudyRun) -> Actions:
 
 def activate(run: StudyRun, client: int | None, at_ns: int) -> Stepped:
     """Make a phone the active one, or none. Its clock is learned anew: it may be another phone."""
-    run = changed(run, phone=client, clock=Clock(), motion=PhoneMotion(), hello=None, watched=_forgotten(run))
+    motion = run.motion if run.setup.motion_stream is None else PhoneMotion()
+    run = changed(run, phone=client, clock=Clock(), motion=motion, hello=None, watched=_forgotten(run))
     run, actions = to_attempt(run, session_state.PhoneIs(client, at_ns))
     if client is None:
         return run, actions

@@ -37,8 +37,9 @@ class Setup:
     """What does not change while a study is run.
 
     `simulated` says so where readings are, `mouse` that a pointer is the hand. `links` are the addresses, by role, that
-    phones and questionnaires join at. `motion_stream` is the stream of the phone's own motion, if it is used, and
-    `aligner` what finds its orientation. `guided` are the checks before a task, and `corners_mm` what one of them wants
+    phones and questionnaires join at. `motion_stream` is the stream of the phone's own motion, if it is used,
+    `turned_stream` that one, or another sender's accelerations, and `aligner` finds the orientation of its readings
+    that bring none. `guided` are the checks before a task, and `corners_mm` what one of them wants
     reached; there are none where sensors are simulated.
     """
 
@@ -56,6 +57,7 @@ class Setup:
     links: tuple[tuple[str, str], ...] = ()
     aligner: Aligner | None = None
     motion_stream: str | None = None
+    turned_stream: str | None = None
     guided: tuple[str, ...] = ()
     corners_mm: tuple[tuple[float, ...], ...] = ()
 
@@ -126,13 +128,15 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
     assert study.recording is not None and study.task is not None  # noqa: S101 - checked
     _knows_language(study.recording, where)
     motion = next((name for name, one in study.recording.senders.items() if one.phone is not None), None)
+    streams = live_streams(study, where)
+    turned = motion or _may_lack_orientation(study.recording, streams)
     shown = {study.shown[condition] for condition in study.conditions}
     targets_mm = tuple((float(x), float(y)) for x, y in targets(study.task))
     return Setup(
         study,
         study.recording,
         study.task,
-        live_streams(study, where),
+        streams,
         {name: build_estimator(study, name) for name in shown},
         targets_mm,
         topics,
@@ -140,8 +144,9 @@ def set_up(study: Study, folder: Path, *, mouse: bool = False, simulated: str = 
         version("steadyhand"),
         mouse,
         simulated,
-        aligner=None if motion is None else _aligner(study, motion),
+        aligner=None if turned is None else _aligner(study, turned),
         motion_stream=motion,
+        turned_stream=turned,
         guided=() if simulated else checks.guided(study),
         corners_mm=tuple(watch.corners(study.task.path_mm, targets_mm)),
     )
@@ -155,6 +160,14 @@ def _knows_language(recording: Recording, where: str) -> None:
             f'{where}: recording: language: the pages have no texts in "{recording.language}"; use'
             f" {' or '.join(known)}, or leave it out for the language of each browser"
         )
+
+
+def _may_lack_orientation(recording: Recording, streams: Mapping[str, LiveStream]) -> str | None:
+    """The first stream of accelerations that are not simulated."""
+    return next(
+        (name for name, one in recording.senders.items() if one.demo is None and streams[name].content != "position"),
+        None,
+    )
 
 
 def _aligner(study: Study, name: str) -> Aligner | None:

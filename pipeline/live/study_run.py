@@ -7,6 +7,7 @@ What is decided or answered is a record (`plan`), saved before anything else fol
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -39,6 +40,7 @@ from pipeline.live.events import (
     Write,
 )
 from pipeline.live.messages import Answer, Do, Drawn, Hello, Motion, Orientation, Ping, Select, Submit
+from pipeline.live.orientation import PhoneMotion
 from pipeline.live.outgoing import AnswerSaved, Done, PhaseOfTask, Pong
 from pipeline.live.run_state import Stepped, StudyRun, activate, form, settled, tables, tell_everybody, to_attempt
 from pipeline.sessions.logs.mcap import Message
@@ -83,8 +85,27 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
         stream = run.setup.streams[name]
         measured = (reading.arrival_ns if stream.stamps_arrival else stamp) - stream.late_ns
         news["motion"] = orientation.seen(run.setup.aligner, run.motion, measured, reading.arrival_ns, reading.values)
-    run = changed(run, watched=checking.kept(run, reading), **news)
+    run, reading = _turned(changed(run, **news), reading)
+    run = changed(run, watched=checking.kept(run, reading))
     return to_attempt(run, reading) if run.attempt is not None else (run, NOTHING)
+
+
+def _turned(run: StudyRun, reading: Reading) -> tuple[StudyRun, Reading]:
+    """An acceleration that brings no orientation with the one that is found from the motion, NaN while it is unknown.
+
+    A phone's page has it found already (`_moved`), from what the browser says too.
+    """
+    setup, values = run.setup, reading.values
+    if setup.aligner is None or reading.stream != setup.turned_stream or setup.motion_stream is not None:
+        return run, reading
+    if math.isfinite(values[9]):
+        return (changed(run, motion=PhoneMotion()) if run.finds_orientation else run), reading
+    stream = setup.streams[reading.stream]
+    stamp = reading.arrival_ns if stream.stamps_arrival or reading.stamp_ns is None else reading.stamp_ns
+    motion, found = orientation.turned(
+        setup.aligner, run.motion, values[:3], values[3:6], stamp - stream.late_ns, reading.arrival_ns
+    )
+    return changed(run, motion=motion), reading if found is None else changed(reading, values=found)
 
 
 def _tick(run: StudyRun, tick: Tick) -> Stepped:

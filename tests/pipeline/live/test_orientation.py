@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.live import orientation, run_state, study_run
+from pipeline.live import desk, orientation, run_state, study_run
 from pipeline.live.clerk import agreement
 from pipeline.live.events import Joined, Reading, Said, Show, Tick, Write
 from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Ping
@@ -152,3 +152,61 @@ def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: P
     assert agreed[0] <= 1e-9
     assert agreed[1] > 200
     assert sum(one.topic == study_run.RAW for one in messages) >= len(logged)
+
+
+def test_of_a_sender_that_brings_no_orientation_it_is_found_too_and_the_log_replays(tmp_path: Path) -> None:
+    text = STUDY.replace("imu: {demo: {}}}", "imu: {udp_json: {port: 9700}}}")
+    study, setup = study_in(
+        tmp_path, text.replace("{kinect: kinect, fusion: fusion}", "{kinect: fusion, fusion: fusion}")
+    )
+    run = run_state.begin(setup, setup.empty_plan())
+    messages: list[Message] = []
+
+    def happens(event: object) -> None:
+        nonlocal run
+        run, actions = study_run.step(run, event)  # type: ignore[arg-type]
+        messages.extend(action.message for action in actions if isinstance(action, Write))
+        for action in actions:
+            if isinstance(action, Show):
+                at = action.made_ns
+                happens(Said("phone", 2, Drawn(action.message.n, at / 1e6), at))  # type: ignore[union-attr]
+
+    happens(Joined("operator", 1, ns(-1)))
+    happens(Joined("phone", 2, ns(-1)))
+    time, turning, force = swaying(12.0, 60.0, np.random.default_rng(3))
+    for row, at in enumerate(time.tolist()):
+        if row % 2 == 0:
+            happens(Reading("tracker", None, ns(at + 0.001), place_m(max(at - 0.1, 0.0))))
+        values = (*(force[row] / 1000).tolist(), *turning[row].tolist(), *[np.nan] * 4)
+        happens(Reading("imu", None, ns(at + 0.005), values, row + 1, ns(at) / 1e6))
+        if row == 10:
+            light = desk.lights(run, ns(at + 0.006)).content["lights"]["imu"]  # type: ignore[index]
+            assert (light["light"], "orientation is not known yet" in light["text"]) == ("amber", True)
+            assert any("orientation is not known yet" in one for one in desk.red_lights(run, ns(at + 0.006)))
+        if row == 400:
+            assert not any("orientation" in one for one in desk.red_lights(run, ns(at + 0.006)))
+            happens(Said("operator", 1, Do("start", "nobody presses the button", "d"), ns(at + 0.006)))
+        happens(Tick(ns(at + 0.007)))
+    logged = [one.values for one in messages if one.topic == "/phone/imu" and one.values is not None]
+    assert len(logged) > 200
+    assert all(np.isfinite(values).all() for values in logged)
+    path = tmp_path / "data/P01_kinect.mcap"
+    path.parent.mkdir()
+    write(path, {"participant": "P01", "condition": "kinect"}, messages)
+    agreed = agreement(study, tmp_path, path, "P01", "kinect")
+    assert agreed is not None
+    assert agreed[0] <= 1e-9
+    assert agreed[1] > 200
+
+
+def test_what_a_sender_says_of_its_orientation_is_taken_as_it_is(tmp_path: Path) -> None:
+    _, setup = study_in(tmp_path, STUDY.replace("imu: {demo: {}}}", "imu: {udp_json: {port: 9700}}}"))
+    run = run_state.begin(setup, setup.empty_plan())
+    without, within = (0.0, 9.8, 0.0, 0.0, 0.0, 0.0, *[np.nan] * 4), (0.0, 9.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    run, _ = study_run.step(run, Reading("imu", None, ns(0.0), within))
+    assert not run.finds_orientation
+    run, _ = study_run.step(run, Reading("imu", None, ns(0.1), without))
+    assert run.finds_orientation
+    run, _ = study_run.step(run, Reading("imu", None, ns(0.2), within))
+    assert not run.finds_orientation
+    assert [row.turned_xyzw for row in run.watched.streams["imu"].newest] == [within[6:], None, within[6:]]
