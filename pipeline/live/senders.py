@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from pipeline.errors import PipelineError
 from pipeline.live import cameras
 from pipeline.live.access import LOOPBACK, Access
-from pipeline.live.adapters import foxglove, lsl, lsl_outlets, osc, rosbridge, udp
+from pipeline.live.adapters import apps, foxglove, lsl, lsl_outlets, osc, rosbridge, udp
 from pipeline.live.adapters.client import Client
 from pipeline.live.adapters.feeds import feed
 from pipeline.live.events import Link
@@ -32,6 +32,8 @@ def check(setup: Setup, where: str) -> None:
         content = setup.streams[name].content
         if sender.rosbridge is not None:
             rosbridge.check(name, content, sender.rosbridge, where)
+        if sender.app is not None:
+            apps.check(name, content, sender.app, where)
         if sender.lsl is not None:
             lsl_outlets.check(name, content, sender.lsl, where)
     cameras.check(setup, where)
@@ -50,6 +52,10 @@ async def opened(setup: Setup, loop: Loop, access: Access, folder: Path) -> list
         if sender.osc is not None:
             addresses = osc.expected(setup, sender.osc.port)
             receivers[sender.osc.port] = osc.Receiver(addresses, loop.newcomers, loop.happens, loop.now_ns)
+        if sender.app is not None:
+            receivers[sender.app.port] = apps.Receiver(
+                *apps.expected(setup, sender.app.port), loop.newcomers, loop.happens, loop.now_ns
+            )
     for webcam in cameras.webcams(setup, folder, loop.happens, loop.now_ns):
         await webcam.begin()
         loop.refused.append(webcam.refused)

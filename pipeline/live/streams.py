@@ -25,7 +25,7 @@ from pipeline.tables.columns import S_PER_NS
 
 _MM_PER_M = 1000.0
 _ALL_AXES = ("x", "y", "z")
-KINDS = ("phone", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")
+KINDS = ("phone", "app", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")
 """The senders that work."""
 _OF_OTHER_LOGS = ("unit", "turning_unit", "fields", "child", "parent", "stamp_unit", "arrival")
 

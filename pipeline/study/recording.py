@@ -16,16 +16,16 @@ from pipeline.study.units import G_M_S2, RAD_PER_DEG
 
 Port = Annotated[int, Field(ge=1, le=65535)]
 SignedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
-Unit = Literal["mm", "cm", "m", "g", "m_s2", "deg_s", "rad_s"]
+Unit = Literal["mm", "cm", "m", "g", "m_s2", "-g", "-m_s2", "deg_s", "rad_s"]
 
 METRES: Mapping[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-M_S2: Mapping[str, float] = {"g": G_M_S2, "m_s2": 1.0}
+M_S2: Mapping[str, float] = {"g": G_M_S2, "m_s2": 1.0, "-g": -G_M_S2, "-m_s2": -1.0}
 RAD_S: Mapping[str, float] = {"deg_s": RAD_PER_DEG, "rad_s": 1.0}
-"""What one of a unit is in SI."""
+"""What one of a unit is in SI; with a minus where an accelerometer's axis that points up has −1 at rest, as in iOS."""
 
 _TLX, WEIGHTED_TLX = "nasa_tlx", "weighted_tlx"
 
-SENDERS = ("phone", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")
+SENDERS = ("phone", "app", "udp_json", "osc", "lsl", "camera", "rosbridge", "foxglove", "demo")
 """The kinds of senders."""
 
 
@@ -50,6 +50,17 @@ class Osc(Frozen):
     address: str = Field(pattern="^/")
     source: str | None = None
     fields: tuple[Annotated[int, Field(ge=0, le=63)], ...] = (0, 1, 2)
+
+
+class App(Frozen):
+    """An app that sends a phone's motion by UDP in a form of its own: `zig_sim` (an iPhone's), or `hyperimu`.
+
+    Neither has a key, so it is heard as `Osc` is.
+    """
+
+    name: Literal["zig_sim", "hyperimu"]
+    port: Port
+    source: str | None = None
 
 
 class Lsl(Frozen):
@@ -122,6 +133,7 @@ class Sender(Frozen):
     """
 
     phone: Literal["motion"] | None = None
+    app: App | None = None
     udp_json: UdpJson | None = None
     osc: Osc | None = None
     lsl: Lsl | None = None
@@ -153,6 +165,12 @@ class Sender(Frozen):
     def kind(self) -> str:
         """Which of the kinds it is."""
         return next(kind for kind in SENDERS if getattr(self, kind) is not None)
+
+    @property
+    def port(self) -> int | None:
+        """The UDP port that it sends to, if it does."""
+        listened = self.udp_json or self.osc or self.app
+        return None if listened is None else listened.port
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -262,4 +280,11 @@ class Recording(Frozen):
     @model_validator(mode="after")
     def _fits_together(self) -> Recording:
         unique("questionnaires", tuple(one.id for one in self.questionnaires))
+        ports: dict[int, str] = {}
+        for name, sender in self.senders.items():
+            kind = f"the app of {name}" if sender.app is not None else sender.kind
+            if sender.port is not None and ports.setdefault(sender.port, kind) != kind:
+                raise ValueError(
+                    f"senders.{name}: port {sender.port} is that of {ports[sender.port]} already; choose another"
+                )
         return self

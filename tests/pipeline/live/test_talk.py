@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from pipeline.errors import PipelineError
 from pipeline.live import senders
 from pipeline.live.adapters import foxglove, rosbridge
-from pipeline.live.adapters.feeds import Feed, feed, of_numbers
+from pipeline.live.adapters.feeds import Feed, feed, figures_of, of_numbers
 from pipeline.live.adapters.lsl_outlets import Found, unfit
-from pipeline.live.units import units
-from pipeline.study.recording import Foxglove, Lsl, Rosbridge, Sender
+from pipeline.live.units import in_si, units
+from pipeline.study.recording import Demo, Foxglove, Lsl, Rosbridge, Sender
 from tests.pipeline.live.servers import (
     CDR_IMU,
     CDR_POSITION,
@@ -314,3 +314,10 @@ def test_a_feed_is_that_of_its_stream_and_sender(tmp_path: Path) -> None:
     _, setup = study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}", f"senders: {{tracker: {sender}"))
     of = feed(setup, "tracker")
     assert (of.stream, of.content, of.units.metres, of.unstamped) == ("tracker", "position", 0.01, True)
+
+
+def test_what_points_down_at_rest_is_turned_about_and_what_turns_is_not() -> None:
+    figures = figures_of("imu", None, ((0.0, 0.0, -1.0), (1.0, 2.0, 3.0)))
+    values = in_si(units(Sender(demo=Demo(), unit="-g")), "acceleration", figures)
+    assert values is not None
+    assert values[:6] == pytest.approx((0.0, 0.0, 9.80665, 1.0, 2.0, 3.0))
