@@ -67,6 +67,8 @@ def _ready(folder: Path) -> Any:
         if any(sender.udp_json is not None for sender in setup.recording.senders.values()):
             console.say(f'Senders        "key": "{access.sensors}"')
         for name, sender in setup.recording.senders.items():
+            if sender.port is not None:
+                console.say(f"{name}: by UDP to {access.host}, port {sender.port}")
             if sender.camera is not None and not (sender.camera.calibration or sender.camera.field_of_view_deg):
                 usual = f"{USUAL_FIELD_OF_VIEW_DEG:.0f}°"
                 console.say(f"{name}: no field_of_view_deg: {usual} is assumed, so z may be a third off (docs/live.md)")

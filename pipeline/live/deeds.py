@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from pipeline.live import desk, offers, plan, session, session_state
+from pipeline.live import clocks, desk, offers, plan, session, session_state
 from pipeline.live.changes import changed
 from pipeline.live.events import Accept, Action, Open, Resolve, Said, Tell
 from pipeline.live.messages import Do
@@ -43,7 +43,8 @@ def _start(run: StudyRun, reason: str, at_ns: int) -> Stepped:
     opened = Open(person.id, condition, desk.facts(run, person, index, reason, at_ns))
     attempt, begun = session.begin(run.setup.attempt(person.id, condition), run.phone, at_ns)
     welcome = () if run.phone is None else (Tell(run.phone, run.setup.welcome(index + 1)),)
-    return changed(run, phase="session", attempt=attempt), (*actions, *saved, opened, *welcome, *begun)
+    of_clocks = clocks.opening(run, at_ns)
+    return changed(run, phase="session", attempt=attempt), (*actions, *saved, opened, *of_clocks, *welcome, *begun)
 
 
 def _abort(run: StudyRun, reason: str, at_ns: int) -> Stepped:

@@ -243,7 +243,7 @@ def lights(run: StudyRun, at_ns: int) -> Whole:
     for name, one in run.health.items():
         lost = attempt.heard[name].lost if attempt is not None else 0
         light = health.light(one, at_ns, lost)
-        problem = run.links.get(name)
+        problem = run.links.get(name) or (None if one.count else _not_yet(run, name))
         if (
             name == run.setup.turned_stream != run.setup.motion_stream
             and is_unaligned(run)
@@ -274,6 +274,12 @@ def lights(run: StudyRun, at_ns: int) -> Whole:
     )
 
 
+def _not_yet(run: StudyRun, name: str) -> str | None:
+    """What is said of a sender by UDP of which nothing has come, as a firewall or a wrong address leave it."""
+    port = run.setup.recording.senders[name].port
+    return None if port is None else f"Nothing has come to UDP port {port}: see the sender's address, and the firewall."
+
+
 def _senders_light(run: StudyRun, at_ns: int) -> dict[str, object]:
     """What was sent and not taken: amber for ten seconds after each."""
     dropped = run.dropped
@@ -295,7 +301,11 @@ def _phone_light(run: StudyRun) -> dict[str, object]:
 
 
 def _clock_light(run: StudyRun) -> dict[str, object]:
+    """How well the phone's clock is known; amber where that of any sender was set."""
     mapping = run.clock.mapping
+    were_set = ", ".join(name for name, one in run.one_way.items() if one.steps)
+    if were_set and not run.clock.steps:
+        return {"light": "amber", "text": f"The clock of the sender of {were_set} was set; it is known anew."}
     if mapping is None:
         return {"light": "off" if run.phone is None else "amber", "text": "The phone's clock is not known yet."}
     text = f"Known to ± {mapping.uncertainty_ms:.1f} ms."

@@ -11,9 +11,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipeline.live import checking, clock, deeds, desk, forms, health, orientation, session_state
+from pipeline.live import checking, clocks, deeds, desk, forms, health, orientation, session_state
 from pipeline.live.changes import changed
-from pipeline.live.clock import OneWay
 from pipeline.live.events import (
     NOTHING,
     Action,
@@ -41,12 +40,12 @@ from pipeline.live.events import (
 )
 from pipeline.live.messages import Answer, Do, Drawn, Hello, Motion, Orientation, Ping, Select, Submit
 from pipeline.live.orientation import PhoneMotion
-from pipeline.live.outgoing import AnswerSaved, Done, PhaseOfTask, Pong
+from pipeline.live.outgoing import AnswerSaved, Done, PhaseOfTask
 from pipeline.live.run_state import Stepped, StudyRun, activate, form, settled, tables, tell_everybody, to_attempt
 from pipeline.sessions.logs.mcap import Message
 
 LEAST_FREE_BYTES = 200_000_000
-CLOCK, RAW = "/recorder/clock", "/phone/raw"
+RAW = "/phone/raw"
 _LIGHTS_NS = 200_000_000
 _TRACE_NS = 100_000_000
 _TRACES = 60
@@ -72,14 +71,9 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
     name = reading.stream
     if name not in run.health:
         return run, NOTHING
-    news: dict[str, object] = {}
-    if reading.stamp_ns is None and reading.sent_ms is not None:
-        known = clock.arrived(run.one_way.get(name, OneWay()), reading.sent_ms, reading.arrival_ns / _NS_PER_MS)
-        mapping = known.mapping
-        stamp = None if mapping is None else mapping.to_ns(reading.sent_ms)
-        news["one_way"], reading = {**run.one_way, name: known}, changed(reading, stamp_ns=stamp)
+    run, reading, of_clock = clocks.stamped(run, reading)
     state = health.heard(run.health[name], reading.arrival_ns, reading.stamp_ns)
-    news["health"] = {**run.health, name: state}
+    news: dict[str, object] = {"health": {**run.health, name: state}}
     if name == run.setup.tracker and run.setup.aligner is not None and run.motion.heading is not None:
         stamp = reading.arrival_ns if reading.stamp_ns is None else reading.stamp_ns
         stream = run.setup.streams[name]
@@ -87,7 +81,10 @@ def _reading(run: StudyRun, reading: Reading) -> Stepped:
         news["motion"] = orientation.seen(run.setup.aligner, run.motion, measured, reading.arrival_ns, reading.values)
     run, reading = _turned(changed(run, **news), reading)
     run = changed(run, watched=checking.kept(run, reading))
-    return to_attempt(run, reading) if run.attempt is not None else (run, NOTHING)
+    if run.attempt is None:
+        return run, NOTHING
+    run, actions = to_attempt(run, reading)
+    return run, (*of_clock, *actions)
 
 
 def _turned(run: StudyRun, reading: Reading) -> tuple[StudyRun, Reading]:
@@ -130,28 +127,6 @@ def _disk(run: StudyRun, disk: Disk) -> Stepped:
 
 def _woke(run: StudyRun, woke: Woke) -> Stepped:
     return to_attempt(run, session_state.Aborted(f"the computer stood still for {woke.seconds:.1f} s", woke.at_ns))
-
-
-def _wall_clock(run: StudyRun, wall: WallClock) -> Stepped:
-    """Stamps go on as before, whatever the wall clock does; the log says what it did."""
-    if run.attempt is None or run.attempt.phase == "ended":
-        return run, NOTHING
-    content = {"sender": "wall clock", "offset_ms": wall.off_ms}
-    write = Write(Message(CLOCK, "anything", wall.at_ns, wall.at_ns, event=content))
-    if not wall.was_set:
-        return run, (write,)
-    run, noted = to_attempt(
-        run, session_state.Noted(f"the wall clock is {wall.off_ms:.0f} ms off now", wall.at_ns, "wall_clock")
-    )
-    return run, (write, *noted)
-
-
-def _clock_offset(run: StudyRun, measured: ClockOffset) -> Stepped:
-    """What a sender's clock was measured to be off goes into the log; stamps have it taken off already."""
-    if run.attempt is None or run.attempt.phase == "ended":
-        return run, NOTHING
-    content = {"sender": measured.sender, "offset_ms": measured.offset_ms}
-    return run, (Write(Message(CLOCK, "anything", measured.at_ns, measured.at_ns, event=content)),)
 
 
 def _linked(run: StudyRun, link: Link) -> Stepped:
@@ -221,40 +196,14 @@ def _said(run: StudyRun, event: Said) -> Stepped:
     return (run, NOTHING) if answer is None else answer(run, event, event.message)
 
 
-def _pinged(run: StudyRun, event: Said, ping: Ping) -> Stepped:
-    at_ms = event.at_ns / _NS_PER_MS
-    pong = Tell(event.client, Pong(ping.t1, at_ms, at_ms))
-    if ping.last is None or event.client != run.phone:
-        return run, (pong,)
-    known, before = clock.exchanged(run.clock, ping.last), run.clock
-    run = changed(run, clock=known)
-    actions: list[Action] = [pong]
-    if run.attempt is not None and run.attempt.phase != "ended":
-        mapping = known.mapping
-        fitted = {} if mapping is None else {"offset_ms": mapping.offset_ms, "drift_ppm": mapping.drift * 1e6}
-        uncertain = {} if mapping is None else {"uncertainty_ms": mapping.uncertainty_ms}
-        content = {"sender": "phone", **vars(ping.last), **fitted, **uncertain}
-        actions.append(Write(Message(CLOCK, "anything", event.at_ns, event.at_ns, event=content)))
-        if known.steps > before.steps:
-            run, noted = to_attempt(run, session_state.Noted("the phone's clock was set", event.at_ns, "clock_step"))
-            actions += noted
-    return run, tuple(actions)
-
-
-def phone_ns(run: StudyRun, t_ms: float, at_ns: int) -> int:
-    """The recorder's time of a phone's time stamp; the message's arrival while the phone's clock is unknown."""
-    mapping = run.clock.mapping
-    return at_ns if mapping is None else min(mapping.to_ns(t_ms), at_ns)
-
-
 def _drew(run: StudyRun, event: Said, drawn: Drawn) -> Stepped:
-    at = phone_ns(run, drawn.t, event.at_ns)
+    at = clocks.phone_ns(run, drawn.t, event.at_ns)
     run = changed(run, drawn=(*run.drawn[-240:], event.at_ns))
     return to_attempt(run, session_state.PhoneDrew(drawn.n, at, event.at_ns))
 
 
 def _pressed(run: StudyRun, event: Said, select: Select) -> Stepped:
-    at = phone_ns(run, select.t, event.at_ns)
+    at = clocks.phone_ns(run, select.t, event.at_ns)
     if run.attempt is None:
         return checking.tapped(run, (event.at_ns - at) / _NS_PER_MS)
     return to_attempt(run, session_state.PhonePressed(select.n, at, event.at_ns))
@@ -263,7 +212,7 @@ def _pressed(run: StudyRun, event: Said, select: Select) -> Stepped:
 def _oriented(run: StudyRun, event: Said, message: Orientation) -> Stepped:
     if run.setup.aligner is None:
         return run, NOTHING
-    stamp = phone_ns(run, message.t, event.at_ns)
+    stamp = clocks.phone_ns(run, message.t, event.at_ns)
     return changed(run, motion=orientation.oriented(run.motion, message, stamp)), NOTHING
 
 
@@ -272,7 +221,7 @@ def _moved(run: StudyRun, event: Said, message: Motion) -> Stepped:
     setup, at = run.setup, event.at_ns
     if setup.aligner is None or setup.motion_stream is None:
         return run, NOTHING
-    stamp = phone_ns(run, message.t, at)
+    stamp = clocks.phone_ns(run, message.t, at)
     motion, values = orientation.moved(setup.aligner, run.motion, message, stamp, at)
     run, actions = changed(run, motion=motion), list[Action]()
     if run.attempt is not None and run.attempt.phase != "ended":
@@ -302,7 +251,7 @@ def _greeted(run: StudyRun, event: Said, hello: Hello) -> Stepped:
 
 
 _ANSWERS: Mapping[type, Callable[[StudyRun, Said, Any], Stepped]] = {
-    Ping: _pinged,
+    Ping: clocks.pinged,
     Motion: _moved,
     Orientation: _oriented,
     Drawn: _drew,
@@ -315,7 +264,7 @@ _ANSWERS: Mapping[type, Callable[[StudyRun, Said, Any], Stepped]] = {
 _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Reading: _reading,
     Link: _linked,
-    ClockOffset: _clock_offset,
+    ClockOffset: clocks.measured,
     Tick: _tick,
     Said: _said,
     Joined: _joined,
@@ -324,7 +273,7 @@ _STEPS: Mapping[type, Callable[[StudyRun, Any], Stepped]] = {
     Saved: _saved,
     Closed: _closed,
     Woke: _woke,
-    WallClock: _wall_clock,
+    WallClock: clocks.wall_clock,
     Dropped: lambda run, event: (changed(run, dropped=event), NOTHING),
     Offered: lambda run, event: (changed(run, offers=event.offers), NOTHING),
     Examined: checking.examined,

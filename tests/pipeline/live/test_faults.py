@@ -13,7 +13,7 @@ import yaml
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pipeline.errors import PipelineError
-from pipeline.live import desk, run_state, study_run
+from pipeline.live import clocks, desk, run_state, study_run
 from pipeline.live.adapters import websocket
 from pipeline.live.clerk import Clerk
 from pipeline.live.events import (
@@ -184,7 +184,36 @@ def test_a_phone_s_clock_that_is_set_is_followed_noted_and_amber(lab: Lab) -> No
     assert (light["light"], "was set once" in light["text"]) == ("amber", True)
     assert lab.run.phase == "session"
     theirs = lab.now / MS - 60_000.0
-    assert study_run.phone_ns(lab.run, theirs, lab.now + 10 * MS) == pytest.approx(lab.now, abs=5 * MS)
+    assert clocks.phone_ns(lab.run, theirs, lab.now + 10 * MS) == pytest.approx(lab.now, abs=5 * MS)
+
+
+def test_a_sender_s_own_times_can_be_had_back_and_its_clock_that_is_set_is_noted(lab: Lab) -> None:
+    sent: dict[int, float] = {}
+
+    def sends(seconds: float, ahead_ms: float) -> list[Action]:
+        found: list[Action] = []
+        for number in range(round(seconds * 100)):
+            found += lab.goes_on(0.01, imu=False)
+            own_ms = (lab.now - (5 + number % 3) * MS) / MS + ahead_ms
+            sent[lab.now] = own_ms
+            values = (0.001 * number, 9.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+            found += lab.happens(Reading("imu", None, lab.now, values, None, own_ms))
+        return found
+
+    sends(1.0, 0.0)
+    started = lab.does("start")
+    actions = [*started, *sends(2.0, 0.0), *sends(3.0, -3_600_000.0)]
+    assert notes(actions).count("clock_step") == 1
+    light = desk.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
+    assert (light["light"], light["text"]) == ("amber", "The clock of the sender of imu was set; it is known anew.")
+    offset_ms, checked = float("nan"), 0
+    for one in (action.message for action in actions if isinstance(action, Write)):
+        if one.topic == clocks.CLOCK and one.event and one.event["sender"] == "imu":
+            offset_ms = float(str(one.event["offset_ms"]))
+        elif one.topic == "/phone/imu" and one.arrival_ns in sent and one.stamp_ns < one.arrival_ns:
+            assert one.stamp_ns / MS - offset_ms == pytest.approx(sent[one.arrival_ns], abs=1e-3)
+            checked += 1
+    assert checked > 100
 
 
 def test_after_a_lost_tracker_the_task_may_be_done_again(lab: Lab) -> None:

@@ -206,7 +206,7 @@ def test_over_real_sockets(tmp_path: Path) -> None:
             offer = await offered(operator, "127.0.0.2")
             assert (offer["stream"], offer["sends"], offer["accepted"]) == ("tracker", "/hand/position", None)
             lights = (await hears(operator, "lights"))["lights"]
-            assert lights["tracker"]["text"] == "Nothing has come yet."
+            assert lights["tracker"]["text"].startswith(f"Nothing has come to UDP port {running.udp_port}: ")
             assert f"{NOT_ACCEPTED} (" in lights["senders"]["text"]
             await says(operator, type="do", what="accept", text=offer["id"], id="d1")
             await hears(operator, "done", id="d1")

@@ -223,7 +223,8 @@ def test_hostile_pages_and_senders_change_nothing(tmp_path: Path) -> None:
             await says(phone, type="ping", t1=5)
             assert (await hears(phone, "pong"))["t1"] == 5
             lights = await hears(operator, "lights")
-            assert lights["lights"]["tracker"] == {"light": "red", "text": "Nothing has come yet."}
+            said = f"Nothing has come to UDP port {running.udp_port}: see the sender's address, and the firewall."
+            assert lights["lights"]["tracker"] == {"light": "red", "text": said}
             while (senders := (await hears(operator, "lights"))["lights"]["senders"])["light"] != "amber":
                 pass
             for reason in (
