@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.live import lever_arm
 from pipeline.live.changes import changed
 from pipeline.live.events import NOTHING, Reading, Values, Write
 from pipeline.live.session_shown import show
@@ -30,7 +31,9 @@ def read(state: Session, reading: Reading) -> Stepped:
     used = stream.name in state.attempt.uses
     origin = arrival if state.origin_ns is None else state.origin_ns
     sample = sample_of(stream, stamp, arrival, reading.values, origin) if used else None
-    if used and sample is None:  # logged, a replay would carry its orientation on and use it
+    if sample is not None and stream.content == "position":
+        sample = lever_arm.less(state, stream, sample, stamp)
+    if used and sample is None:  # logged, a replay would use it: carry its orientation on, say
         heard = changed(_numbered(heard, reading.seq), arrival_ns=arrival, dropped=heard.dropped + 1)
         return with_heard(state, reading.stream, heard), NOTHING
     heard = changed(
@@ -45,7 +48,8 @@ def read(state: Session, reading: Reading) -> Stepped:
     if sample is not None:
         estimated = state.attempt.estimator.update(estimated, stream.name, sample)
     all_heard = {**state.heard, reading.stream: heard}
-    state = changed(state, heard=all_heard, clock_ns=arrival, origin_ns=origin, estimated=estimated)
+    arms = lever_arm.after(state, stream, stamp, reading.values)
+    state = changed(state, heard=all_heard, clock_ns=arrival, origin_ns=origin, estimated=estimated, arms=arms)
     write = Write(Message(stream.topic, stream.content, stamp, arrival, np.array(reading.values)))
     if not stream.is_sensor:
         return state, (write,)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.live import lever_arm
 from pipeline.live.changes import changed
 from pipeline.live.events import NOTHING, Show, Write
 from pipeline.live.outgoing import Shown
@@ -29,7 +30,7 @@ def show(state: Session, at_ns: int) -> Stepped:
     mean, _ = state.attempt.estimator.predict(state.estimated, (instant - state.origin_ns) * S_PER_NS)
     if not np.isfinite(mean).all():
         return state, NOTHING
-    estimate = Estimate(state.n + 1, instant, tuple(mean.tolist()))
+    estimate = Estimate(state.n + 1, instant, tuple((mean + lever_arm.now(state)).tolist()))
     state = changed(
         state,
         n=estimate.n,

@@ -10,13 +10,17 @@ from fusion_core import Estimator
 from pipeline.live.changes import changed
 from pipeline.live.events import Actions, Reading, Tick, Values
 from pipeline.live.streams import LiveStream
+from pipeline.statistics.arrays import FloatArray
 
 Phase = Literal["practice", "countdown", "running", "ended"]
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """What does not change during an attempt; `uses` are the streams that change what the estimator shows."""
+    """What does not change during an attempt; `uses` are the streams that change what the estimator shows.
+
+    `armed` is the stream of the phone whose lever arm is taken off positions, and added to what is shown.
+    """
 
     participant: str
     condition: str
@@ -31,6 +35,7 @@ class Attempt:
     countdown_ns: int
     abort_after_ns: int
     confirm_ns: int
+    armed: str | None = None
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,8 @@ class Session:
     """The state of an attempt.
 
     `clock_ns` is the newest instant that was given to anything. `waiting` says that there was something new to show
-    while the phone could take nothing.
+    while the phone could take nothing. `arms` are the lever arms (3,) in mm in the tracker's frame, by when the phone
+    was turned so, of the last seconds.
     """
 
     attempt: Attempt
@@ -90,6 +96,7 @@ class Session:
     last_press_ns: int = 0
     seconds_left: int = 0
     heard: Mapping[str, Heard] = field(default_factory=dict)
+    arms: tuple[tuple[int, FloatArray], ...] = ()
     ignored_presses: int = 0
     ended_by: str = ""
 

@@ -72,11 +72,17 @@ class Setup:
 
     def uses(self, condition: str) -> frozenset[str]:
         """The streams that change what a condition shows."""
-        return sensors_used(self.study, self.study.shown[condition])
+        armed = self._armed(condition)
+        return sensors_used(self.study, self.study.shown[condition]) | ({armed} if armed else set())
+
+    def _armed(self, condition: str) -> str | None:
+        """The phone whose lever arm a condition's estimator takes into account, as a report does (`recording.show`)."""
+        armed = (name for name, one in self.streams.items() if one.arm_mm.any())
+        return next((name for name in armed if name in self.estimator(condition).sensors), None)
 
     def attempt(self, participant: str, condition: str) -> Attempt:
         """The settings of an attempt."""
-        recording = self.recording
+        recording, armed = self.recording, self._armed(condition)
         return Attempt(
             participant,
             condition,
@@ -91,6 +97,7 @@ class Setup:
             round(recording.countdown_s * _NS_PER_S),
             round(recording.abort_after_s * _NS_PER_S),
             round(recording.selection.confirm_ms * 1e6),
+            armed,
         )
 
     def welcome(self, task_number: int) -> Welcome:

@@ -32,7 +32,11 @@ _OF_OTHER_LOGS = ("unit", "turning_unit", "fields", "child", "parent", "stamp_un
 
 @dataclass(frozen=True)
 class LiveStream:
-    """A stream that readings come from. `late_ns` is subtracted from its stamps, as `stamp: arrival` says."""
+    """A stream that readings come from. `late_ns` is subtracted from its stamps, as `stamp: arrival` says.
+
+    Of a phone, `mounting` (3, 3) turns the accelerometer's axes into the body's, and `arm_mm` (3,) goes from it to the
+    point that the tracker sees.
+    """
 
     name: str
     topic: str
@@ -42,6 +46,8 @@ class LiveStream:
     late_ns: int
     axes: tuple[int, ...]
     gravity_mm_s2: FloatArray = field(default_factory=lambda: np.zeros(3))
+    mounting: FloatArray = field(default_factory=lambda: np.eye(3))
+    arm_mm: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 def live_streams(study: Study, where: str) -> dict[str, LiveStream]:
@@ -54,10 +60,11 @@ def live_streams(study: Study, where: str) -> dict[str, LiveStream]:
         common = (name, stream.topic)
         stamps, late_ns = stream.stamp == "arrival", round(late / S_PER_NS)
         if isinstance(stream, AccelerationStream):
-            if stream.calibrate_s or any(stream.lever_arm_mm) or any(stream.mounting_xyzw[:3]):
+            if stream.calibrate_s:
                 raise PipelineError(
-                    f"{where}: streams.{name}: a live study does not correct for the phone's mounting; leave out"
-                    " mounting_xyzw, lever_arm_mm and calibrate_s, or show fusion_adaptive, which finds it"
+                    f"{where}: streams.{name}: calibrate_s: a live study learns no mounting; write what"
+                    " `steadyhand fit` finds of a recording into mounting_xyzw and lever_arm_mm, or show"
+                    " fusion_adaptive, which finds it by itself"
                 )
             of_body = study.recording.senders[name].axes
             if not np.isfinite(units(study.recording.senders[name]).back_xyzw).all():
@@ -66,7 +73,8 @@ def live_streams(study: Study, where: str) -> dict[str, LiveStream]:
                 )
             axes = tuple(_ALL_AXES.index(axis) for axis in study.axes)
             gravity = np.array(stream.gravity_mm_s2)
-            found[name] = LiveStream(*common, "acceleration", True, stamps, late_ns, axes, gravity)
+            mounting, arm = rotation(np.array(stream.mounting_xyzw)), np.array(stream.lever_arm_mm)
+            found[name] = LiveStream(*common, "acceleration", True, stamps, late_ns, axes, gravity, mounting, arm)
         elif isinstance(stream, PositionStream | ReferenceStream):
             is_sensor = isinstance(stream, PositionStream)
             of_stream = study.axes_of(name) if is_sensor else study.axes
@@ -76,6 +84,9 @@ def live_streams(study: Study, where: str) -> dict[str, LiveStream]:
             raise PipelineError(
                 f"{where}: recording: senders: {name} is of kind {stream.kind}, which is not recorded live"
             )
+    mounted = [name for name, one in found.items() if one.arm_mm.any() or not np.array_equal(one.mounting, np.eye(3))]
+    if len(mounted) > 1:
+        raise PipelineError(f"{where}: streams: {' and '.join(mounted)} both state a mounting; a live study takes one")
     return found
 
 
@@ -89,7 +100,7 @@ def sample_of(
         return Sample(time, arrival, np.array(values)[axes] * _MM_PER_M)
     if not all(map(math.isfinite, values[6:10])):
         return None
-    turn, force = rotation(np.array(values[6:10])), np.array(values[:3]) * _MM_PER_M
+    turn, force = rotation(np.array(values[6:10])) @ stream.mounting, np.array(values[:3]) * _MM_PER_M
     acceleration = turn @ force + stream.gravity_mm_s2
     return Sample(time, arrival, acceleration[axes], turn[axes], force)
 

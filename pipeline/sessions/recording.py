@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.accuracy import interpolate
 from fusion_core.phone.calibration import Body
-from fusion_core.phone.orientation import nearest, rotate
+from fusion_core.phone.orientation import rotate
 from pipeline.sessions.estimators import build_estimator, sensor, sensors
 from pipeline.sessions.phone import Imu, Phone, aligned, phone
 from pipeline.statistics.arrays import FloatArray, run_of
@@ -41,18 +41,47 @@ _AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
+class Arm:
+    """The lever arm (n, d) in mm as the body was turned at `time` (n,), known since `arrival` (n,), both rising."""
+
+    time: FloatArray
+    arrival: FloatArray
+    arm_mm: FloatArray
+
+    def at(self, time: FloatArray, known_by: FloatArray) -> FloatArray:
+        """The newest (m, d) measured by each `time` (m,) of what had arrived by `known_by` (m,); NaN where none had.
+
+        What comes later is not used, though it may be nearer: a running study does not have it yet.
+        """
+        measured, arrived = (
+            np.searchsorted(*both, side="right") for both in ((self.time, time), (self.arrival, known_by))
+        )
+        newest = np.minimum(measured, arrived) - 1
+        found: FloatArray = self.arm_mm[np.maximum(newest, 0)]
+        found[newest < 0] = np.nan
+        return found
+
+    def along(self, index: list[int]) -> Arm:
+        """Some of the axes."""
+        return Arm(self.time, self.arrival, self.arm_mm[:, index])
+
+
+@dataclass(frozen=True)
 class Mounted:
     """Samples that take a phone's mounting into account, which is known from `from_s` on.
 
-    Their positions are those of the accelerometer; `arm_mm` (n, d) at `time` (n,) goes from it back to the point that
-    the tracker sees.
+    Their positions are those of the accelerometer; `arm` goes from it back to the point that the tracker sees, along
+    the analysed axes. None where the two are one.
     """
 
     from_s: float
     imu: str
     samples: dict[str, Samples]
-    time: FloatArray
-    arm_mm: FloatArray
+    arm: Arm | None
+
+    def back(self, time: FloatArray) -> FloatArray | float:
+        """The arm (m, d) in mm at each instant, by what is known then."""
+        return 0.0 if self.arm is None else self.arm.at(time, time)
 
 
 @dataclass(frozen=True)
@@ -245,21 +274,27 @@ def _mounted(
         if found.calibrated is None or found.lever_arm_mm is None:
             continue
         index = [_AXES.index(axis) for axis in study.axes]
-        arm = found.calibrated.rotation @ found.lever_arm_mm
+        arm = _arm(found.calibrated, found.lever_arm_mm) if found.lever_arm_mm.any() else None
         corrected = dict(samples)
         corrected[name] = _of_axes(found.calibrated.acceleration(), study, name)
         for stream, sensing in study.sensor_streams.items():
-            if sensing.kind == "position":
-                moved = _less_lever_arm(whole[stream], found.calibrated, arm)
-                corrected[stream] = _of_axes(moved, study, stream)
-        return Mounted(found.mounted_from_s, name, corrected, found.calibrated.time, arm[:, index])
+            if sensing.kind == "position" and arm is not None:
+                corrected[stream] = _of_axes(_less(arm, whole[stream]), study, stream)
+        return Mounted(found.mounted_from_s, name, corrected, None if arm is None else arm.along(index))
     return None
 
 
-def _less_lever_arm(positions: Samples, body: Body, arm: FloatArray) -> Samples:
-    """Positions less the lever arm, as the body was turned when each was measured."""
-    value = positions.value - arm[nearest(body.time, positions.time)]
-    return Samples(positions.time, positions.arrival, value)
+def _arm(body: Body, lever_arm_mm: FloatArray) -> Arm:
+    """The lever arm as the body was turned, without what was measured before something that had arrived already."""
+    rows = body.time >= np.maximum.accumulate(body.time)
+    return Arm(body.time[rows], body.arrival[rows], (body.rotation @ lever_arm_mm)[rows])
+
+
+def _less(arm: Arm, positions: Samples) -> Samples:
+    """Positions less the lever arm, without those that arrived before any orientation."""
+    value = positions.value - arm.at(positions.time, positions.arrival)
+    known = np.isfinite(value).all(axis=1)
+    return Samples(positions.time[known], positions.arrival[known], value[known])
 
 
 def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track:
@@ -272,7 +307,7 @@ def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track
     after = times > known.from_s
     better = estimator.replay(known.samples, times[after])
     mean, sd = track.mean.copy(), track.sd.copy()
-    mean[after] = better.mean + known.arm_mm[nearest(known.time, times[after])]
+    mean[after] = better.mean + known.back(times[after])
     sd[after] = better.sd
     return Track(times, mean, sd)
 
@@ -294,7 +329,7 @@ def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
         return None
     fixed = loaded.mounted if loaded.mounted is not None and loaded.mounted.from_s == -np.inf else None
     found = smooth(FusionKalman(_in_time(study)), fixed.samples if fixed else loaded.samples, loaded.times)
-    value = found.mean + (fixed.arm_mm[nearest(fixed.time, loaded.times)] if fixed else 0.0)
+    value = found.mean + (fixed.back(loaded.times) if fixed else 0.0)
     known = np.isfinite(value).all(axis=1)
     return SMOOTHED, Samples(loaded.times[known], loaded.times[known], value[known])
 

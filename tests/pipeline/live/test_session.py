@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from fusion_core import Samples
 from pipeline.engine.stage import Work
+from pipeline.errors import PipelineError
 from pipeline.live import session, session_state
 from pipeline.live.clerk import agreement
 from pipeline.live.events import Action, Close, Reading, Show, Tell, Tick, Write
@@ -22,14 +23,15 @@ from pipeline.live.session_words import NOTES
 from pipeline.live.setup import Setup
 from pipeline.live.streams import sample_of
 from pipeline.sessions import ingest, recording
-from pipeline.sessions.estimators import build_estimator, sensors_used
+from pipeline.sessions.estimators import build_estimator
 from pipeline.sessions.logs.mcap import Message, write
 from pipeline.study.session import Session as StudySession
-from tests.pipeline.live.studies import study_in
+from tests.pipeline.live.studies import STUDY, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 MS = 1_000_000
 ESTIMATORS = ("raw", "kinect", "window", "fusion", "adaptive")
+MOUNTINGS = ("lever_arm_mm: [40, -10, 25], mounting_xyzw: [0.1, 0, 0.05, 1]", "mounting_xyzw: [0, 0.2, 0, 1]")
 
 
 @dataclass
@@ -62,8 +64,9 @@ def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
 
 def begun(setup: Setup, estimator: str = "fusion", **changes: object) -> Played:
     """An attempt that shows an estimator, in its countdown."""
-    shown, uses = build_estimator(setup.study, estimator), sensors_used(setup.study, estimator)
-    attempt = replace(setup.attempt("P01", "fusion"), estimator=shown, uses=uses)
+    study = setup.study.model_copy(update={"shown": {"kinect": "kinect", "fusion": estimator}})
+    setup = replace(setup, study=study, estimators={estimator: build_estimator(study, estimator)})
+    attempt = setup.attempt("P01", "fusion")
     attempt = replace(attempt, **changes)  # type: ignore[arg-type]
     state, actions = session.begin(attempt, 1, EPOCH_NS)
     return Played(state, list(actions))
@@ -107,6 +110,56 @@ def test_the_log_replays_to_what_was_shown_whatever_happens(
     setup: Setup,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
+    replays(name, happenings, setup, tmp_path_factory.mktemp("replay"))
+
+
+@pytest.mark.parametrize("name", ["kinect", "fusion", "adaptive"])
+@pytest.mark.parametrize("mounting", MOUNTINGS)
+@settings(max_examples=8)
+@given(happenings=HAPPENINGS)
+def test_so_it_does_with_a_phone_s_mounting(
+    name: str,
+    mounting: str,
+    happenings: list[tuple[str, int, int, int, float]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    folder = tmp_path_factory.mktemp("replay")
+    replays(name, happenings, study_in(folder, mounted(mounting))[1], folder)
+
+
+def test_what_is_shown_moves_with_the_phone_s_lever_arm(tmp_path: Path) -> None:
+    setup = study_in(tmp_path, mounted("lever_arm_mm: [40, -10, 0]"))[1]
+    played = begun(setup, "raw", countdown_ns=0)
+    assert not [one for one in played.happens(tracker(0.0, 100.0)) if isinstance(one, Show | Write)]  # turned how?
+    played.happens(imu(-150.0, arrival_ms=1.0))  # the tracker is 100 ms late
+    played.happens(tracker(2.0, 100.0))
+    assert played.state.sent[-1].mean_mm == pytest.approx((100.0, 500.0))
+    turned = (0.0, 9.80665, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5))  # by 90° about z
+    at = EPOCH_NS + 3 * MS
+    played.happens(PhoneDrew(played.state.sent[-1].n, at, at))
+    played.happens(Reading("imu", at, at, turned))
+    assert played.state.sent[-1].mean_mm == pytest.approx((100.0 - 40.0 + 10.0, 500.0 + 10.0 + 40.0))
+
+
+def test_what_a_live_study_cannot_do_about_mountings_is_said(tmp_path: Path) -> None:
+    with pytest.raises(PipelineError, match="imu: calibrate_s: a live study learns no mounting"):
+        study_in(tmp_path, mounted("calibrate_s: 30"))
+    text = mounted("lever_arm_mm: [1, 0, 0]").replace(
+        "  display:",
+        "  second: {topic: /second, kind: acceleration,"
+        " gravity_mm_s2: [0, -9806.65, 0], mounting_xyzw: [0, 0, 1, 1]}\n  display:",
+    )
+    with pytest.raises(PipelineError, match="imu and second both state a mounting; a live study takes one"):
+        study_in(tmp_path, text.replace("imu: {demo: {}}}", "imu: {demo: {}}, second: {demo: {}}}"))
+
+
+def mounted(mounting: str) -> str:
+    """The study with what a phone's stream says of its mounting."""
+    return STUDY.replace("noise_sd_mm_s2: 100,", f"noise_sd_mm_s2: 100, {mounting},")
+
+
+def replays(name: str, happenings: list[tuple[str, int, int, int, float]], setup: Setup, folder: Path) -> None:
+    """Whatever happens, the log replays to what was shown by that estimator."""
     played = begun(setup, name, countdown_ns=0)
     now, sent = EPOCH_NS, [0]
     for number, (what, on_us, stamp_us, back, figure) in enumerate(happenings):
@@ -126,7 +179,6 @@ def test_the_log_replays_to_what_was_shown_whatever_happens(
             event = Tick(now) if what == "tick" else PhoneIs(1 if what == "come" else None, now)
         actions = played.happens(event)
         sent += [one.message.n for one in actions if isinstance(one, Show)]  # type: ignore[union-attr]
-    folder = tmp_path_factory.mktemp("replay")
     shown = [one for one in played.messages if one.topic == "/display/position"]
     path = folder / "P01_fusion.mcap"
     if not played.messages:
