@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _EXTRA = ("starlette", "uvicorn", "websockets", "segno", "cryptography", "pythonosc")
 _NOT_IN_A_DEMO = ("simulation", "repeats", "printed", "trials", "measures", "preregistration", "exclusions")
+_OF_A_MOUNTING = ("mounting_xyzw", "lever_arm_mm", "calibrate_s")  # a simulated phone is where the tracker looks
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,11 @@ def _demo_folder(folder: Path, out: Path | None, with_bots: bool) -> Path:
     senders: dict[str, Any] = {name: {"demo": {}} for name in study.sensor_streams}
     recording = {"questionnaires": ["nasa_tlx"], **(content.get("recording") or {}), "senders": senders}
     kept = {key: value for key, value in content.items() if key not in _left_out(with_bots)}
-    kept["streams"] = {name: one for name, one in content["streams"].items() if one.get("kind") != "reference"}
+    kept["streams"] = {
+        name: {key: value for key, value in one.items() if key not in _OF_A_MOUNTING}
+        for name, one in content["streams"].items()
+        if one.get("kind") != "reference"
+    }
     kept |= {"data_origin": "simulated", "recording": recording}
     kept["notes"] = "A demo, played live: simulated sensors, and a simulated hand or the pointer of a mouse."
     text = yaml.safe_dump(kept, sort_keys=False, allow_unicode=True, width=110)

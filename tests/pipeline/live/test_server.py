@@ -494,7 +494,8 @@ def test_what_stands_in_the_way_is_said_with_its_remedy(
 def test_a_demo_played_by_bots_is_a_study_with_a_report(
     told: Callable[..., tuple[int, str]], tmp_path: Path, steadyhand: Steadyhand
 ) -> None:
-    study_in(tmp_path / "study")
+    mounted = STUDY.replace("noise_sd_mm_s2: 100,", "noise_sd_mm_s2: 100, lever_arm_mm: [40, 0, 0],")
+    study_in(tmp_path / "study", mounted)
     code, text = told(tmp_path / "study", "--demo", "--bots", "--participants", "1", "--out", tmp_path / "demo")
     assert (code, text) == (0, "")
     assert not (tmp_path / "study/data").exists()
