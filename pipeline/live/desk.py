@@ -21,6 +21,7 @@ _NS_PER_MS = 1e6
 _NS_PER_S = 1e9
 _LEAST_FREE_BYTES = 200_000_000
 _LATE_WRITE_MS = 2_000.0
+_LOW_BATTERY = 0.2
 _LATELY_NS = 10_000_000_000
 _UNKNOWN = "Its orientation is not known yet: hold it still, then move it."
 _UNALIGNED = (
@@ -293,6 +294,10 @@ def _senders_light(run: StudyRun, at_ns: int) -> dict[str, object]:
 def _phone_light(run: StudyRun) -> dict[str, object]:
     if run.phone is None:
         return {"light": "red", "text": "No phone is connected. Scan the code with the phone."}
+    if run.is_away or run.is_hidden:
+        return {"light": "red", "text": "Connected, and its page is not in view or out of reach: wake the phone up."}
+    if run.battery is not None and run.battery < _LOW_BATTERY:
+        return {"light": "amber", "text": f"Connected. Its battery is at {run.battery:.0%}: plug it in."}
     if run.hello is not None and not run.hello.wake_lock and not run.setup.mouse:
         return {"light": "amber", "text": "Connected. Its screen may go dark: set its automatic lock to “never”."}
     if run.setup.motion_stream is not None and is_unaligned(run):

@@ -46,7 +46,8 @@ class StudyRun:
 
     `phone` is the connection of the active phone, `phones` all of them, `ids` which phone each is of, `operators` those
     of operator's pages, the one that may act first. `asked` remembers what is being saved, by token: whom to tell, and
-    how. `links` says of streams whose sender is not connected what is wrong. `offers` are the senders that are not
+    how. The active phone was heard at `heard_ns`, None before it has asked for the time; `is_away` since it is silent.
+    `links` says of streams whose sender is not connected what is wrong. `offers` are the senders that are not
     heard, `accepted` the address of the one that the operator lets feed a stream.
     """
 
@@ -60,6 +61,10 @@ class StudyRun:
     operators: tuple[int, ...] = ()
     forms: tuple[int, ...] = ()
     hello: Hello | None = None
+    heard_ns: int | None = None
+    is_away: bool = False
+    is_hidden: bool = False
+    battery: float | None = None
     clock: Clock = field(default_factory=Clock)
     motion: PhoneMotion = field(default_factory=PhoneMotion)
     one_way: Mapping[str, OneWay] = field(default_factory=dict)
@@ -157,6 +162,7 @@ def activate(run: StudyRun, client: int | None, at_ns: int) -> Stepped:
     """Make a phone the active one, or none. Its clock is learned anew: it may be another phone."""
     motion = run.motion if run.setup.motion_stream is None else PhoneMotion()
     run = changed(run, phone=client, clock=Clock(), motion=motion, hello=None, watched=_forgotten(run))
+    run = changed(run, heard_ns=None, is_away=False, is_hidden=False, battery=None)
     run, actions = to_attempt(run, session_state.PhoneIs(client, at_ns))
     if client is None:
         return run, actions

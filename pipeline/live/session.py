@@ -168,7 +168,8 @@ def _listen(state: Session, at_ns: int) -> Stepped:
 
 def _phone_is(state: Session, event: PhoneIs) -> Stepped:
     if event.client is None:
-        gone = event.at_ns if state.phone_gone_ns is None else state.phone_gone_ns
+        since = event.at_ns if event.gone_ns is None else event.gone_ns
+        gone = since if state.phone_gone_ns is None else state.phone_gone_ns
         state = changed(state, phone=None, phone_gone_ns=gone, under_way=())
         return note(state, event.at_ns, "phone_away", "")
     heard = {name: changed(one, highest=-1) for name, one in state.heard.items()}  # a page counts from 0 again

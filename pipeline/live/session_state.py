@@ -131,10 +131,11 @@ class PhonePressed:
 
 @dataclass(frozen=True)
 class PhoneIs:
-    """The phone is this connection now; None: it is gone."""
+    """The phone is this connection now; None: it is gone, if it is known since when, since `gone_ns`."""
 
     client: int | None
     at_ns: int
+    gone_ns: int | None = None
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipeline.live import checking, clocks, deeds, desk, forms, health, orientation, session_state
+from pipeline.live import checking, clocks, deeds, desk, forms, health, orientation, presence, session_state
 from pipeline.live.changes import changed
 from pipeline.live.events import (
     NOTHING,
@@ -38,7 +38,19 @@ from pipeline.live.events import (
     Woke,
     Write,
 )
-from pipeline.live.messages import Answer, Do, Drawn, Hello, Motion, Orientation, Ping, Select, Submit
+from pipeline.live.messages import (
+    Answer,
+    Battery,
+    Do,
+    Drawn,
+    Hello,
+    Motion,
+    Orientation,
+    Ping,
+    Select,
+    Submit,
+    Visible,
+)
 from pipeline.live.orientation import PhoneMotion
 from pipeline.live.outgoing import AnswerSaved, Done, PhaseOfTask
 from pipeline.live.run_state import Stepped, StudyRun, activate, form, settled, tables, tell_everybody, to_attempt
@@ -106,9 +118,10 @@ def _turned(run: StudyRun, reading: Reading) -> tuple[StudyRun, Reading]:
 
 
 def _tick(run: StudyRun, tick: Tick) -> Stepped:
+    run, missed = presence.missed(run, tick.at_ns)
     run, actions = to_attempt(run, tick)
     run, examine = checking.examine(run, tick.at_ns)
-    actions = (*actions, *examine)
+    actions = (*missed, *actions, *examine)
     if not run.traces or tick.at_ns - run.traces[-1][0] >= _TRACE_NS:
         run = changed(run, traces=(*run.traces[1 - _TRACES :], desk.trace(run, tick.at_ns)))
     if tick.at_ns - run.lights_ns < _LIGHTS_NS:
@@ -192,8 +205,14 @@ def _left(run: StudyRun, event: Left) -> Stepped:
 def _said(run: StudyRun, event: Said) -> Stepped:
     if event.role == "phone" and event.client != run.phone and not isinstance(event.message, Ping | Hello):
         return run, NOTHING
+    back: Actions = NOTHING
+    if event.role == "phone" and event.client == run.phone:
+        run, back = presence.heard(run, event)
     answer = _ANSWERS.get(type(event.message))
-    return (run, NOTHING) if answer is None else answer(run, event, event.message)
+    if answer is None:
+        return run, back
+    run, actions = answer(run, event, event.message)
+    return run, (*back, *actions)
 
 
 def _drew(run: StudyRun, event: Said, drawn: Drawn) -> Stepped:
@@ -256,6 +275,8 @@ _ANSWERS: Mapping[type, Callable[[StudyRun, Said, Any], Stepped]] = {
     Orientation: _oriented,
     Drawn: _drew,
     Select: _pressed,
+    Visible: presence.hidden,
+    Battery: presence.charged,
     Hello: _greeted,
     Answer: forms.answered,
     Submit: forms.submitted,

@@ -40,7 +40,7 @@ from pipeline.live.events import (
 )
 from pipeline.live.journal import PART, Journal
 from pipeline.live.loop import Clock, Outbox
-from pipeline.live.messages import Do, Drawn, Exchange, Ping
+from pipeline.live.messages import Battery, Do, Drawn, Exchange, Ping, Visible
 from pipeline.live.outgoing import Refused, Say, Shown, Whole
 from pipeline.live.run_state import StudyRun
 from pipeline.live.watch import Light
@@ -177,7 +177,7 @@ def test_a_phone_s_clock_that_is_set_is_followed_noted_and_amber(lab: Lab) -> No
 
     pings(2.0, 0.0)
     lab.does("start")
-    lab.goes_on(1.5)
+    pings(1.5, 0.0)
     assert notes(pings(1.0, 0.0)) == []
     assert notes(pings(3.0, 60_000.0)) == ["clock_step"]
     light = desk.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
@@ -214,6 +214,35 @@ def test_a_sender_s_own_times_can_be_had_back_and_its_clock_that_is_set_is_noted
             assert one.stamp_ns / MS - offset_ms == pytest.approx(sent[one.arrival_ns], abs=1e-3)
             checked += 1
     assert checked > 100
+
+
+def test_a_phone_that_sleeps_is_away_though_its_connection_seems_to_live(lab: Lab) -> None:
+    def speaks() -> list[Action]:
+        return lab.happens(Said("phone", PHONE, Ping(lab.now / MS), lab.now))
+
+    lab.goes_on(0.5)
+    lab.does("start")
+    assert notes(lab.goes_on(1.5)) == []  # it has never asked for the time: nothing is known of its silence
+    speaks()
+    assert notes([*lab.goes_on(0.9), *speaks()]) == []
+    assert notes(lab.goes_on(1.5)) == ["phone_away"]
+    light = desk.lights(lab.run, lab.now).content["lights"]["phone"]  # type: ignore[index]
+    assert light["light"] == "red" and "wake the phone up" in light["text"]
+    assert notes([*speaks(), *lab.goes_on(0.5)]) == ["phone_back"]
+    assert lab.run.phase == "session"
+    actions = lab.goes_on(2.2)
+    assert any(isinstance(one, Close) and one.set_aside for one in actions)
+    assert lab.run.attempt is not None and lab.run.attempt.ended_by == "the phone was away for over 2 s"
+
+
+def test_a_hidden_page_is_noted_and_a_low_battery_said(lab: Lab) -> None:
+    lab.goes_on(0.5)
+    lab.does("start")
+    assert notes(lab.happens(Said("phone", PHONE, Visible(False, lab.now / MS), lab.now))) == ["phone_hidden"]
+    assert notes(lab.happens(Said("phone", PHONE, Visible(True, lab.now / MS), lab.now))) == ["phone_visible"]
+    lab.happens(Said("phone", PHONE, Battery(0.12), lab.now))
+    light = desk.lights(lab.run, lab.now).content["lights"]["phone"]  # type: ignore[index]
+    assert light == {"light": "amber", "text": "Connected. Its battery is at 12%: plug it in."}
 
 
 def test_after_a_lost_tracker_the_task_may_be_done_again(lab: Lab) -> None:
