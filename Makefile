@@ -6,7 +6,7 @@ STUDY ?= studies/peephole
 steadyhand := .venv/bin/steadyhand
 python := .venv/bin/python
 
-.PHONY: help report check replay simulate record marker explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits bench-live soak lock clean
+.PHONY: help report check replay simulate record marker explore power plan test compiled mutants test-browser test-pdf test-exports lint docs bench limits bench-live test-live soak lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -85,6 +85,9 @@ limits: .venv/installed ## how much a study may hold: seconds and memory of larg
 
 bench-live: .venv/installed ## how soon a live study shows a reading, with 1 and 8 phones and under a flood (a quiet machine)
 	@$(python) -m tests.benchmarks.live $(ARGS)
+
+test-live: .venv/installed ## the same briefly; fails where a reading is lost or takes four times as long as it may
+	@$(python) -m tests.benchmarks.live 14
 
 soak: .venv/installed ## PHONES=8 for MINUTES=30: does memory stay flat, is a reading lost?
 	@$(python) -m tests.benchmarks.live soak $(or $(MINUTES),30) $(or $(PHONES),8)
