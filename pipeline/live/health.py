@@ -9,6 +9,7 @@ from pipeline.live.changes import changed
 _RECENT_NS = 2_000_000_000
 _SILENT_NS = 300_000_000
 _GAP_AMBER_MS = 150.0
+_LATE_AMBER_MS = 250.0  # half of what an estimator looks back, as usual
 _NS_PER_MS = 1e6
 _SMOOTHED = 0.05
 
@@ -70,5 +71,8 @@ def light(health: Health, at_ns: int, lost: int) -> dict[str, object]:
         return {"light": "red", "text": f"Silent for {silent_s:.1f} s.", **figures}
     late = "" if health.late_ms is None else f", {health.late_ms:.0f} ms late"
     text = f"{rate:.1f} Hz, gap {health.gap_ms:.0f} ms{late}"
-    amber = health.gap_ms > _GAP_AMBER_MS
+    is_late = health.late_ms is not None and health.late_ms > _LATE_AMBER_MS
+    if is_late:
+        text += ". That is too late to be shown: have each reading sent at once, not in batches."
+    amber = health.gap_ms > _GAP_AMBER_MS or is_late
     return {"light": "amber" if amber else "green", "text": text, **figures}

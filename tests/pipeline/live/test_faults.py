@@ -245,6 +245,17 @@ def test_a_hidden_page_is_noted_and_a_low_battery_said(lab: Lab) -> None:
     assert light == {"light": "amber", "text": "Connected. Its battery is at 12%: plug it in."}
 
 
+def test_readings_that_come_in_batches_are_amber(lab: Lab) -> None:
+    for batch in range(5):
+        lab.at_ms += 1000
+        for number in range(30):  # a second's, all at once
+            stamp = lab.now - (1000 - 33 * number) * MS
+            lab.happens(Reading("tracker", stamp, lab.now + number, (0.001 * batch, 0.5, 1.0)))
+    light = desk.lights(lab.run, lab.now).content["lights"]["tracker"]  # type: ignore[index]
+    assert light["light"] == "amber"
+    assert light["text"].endswith("too late to be shown: have each reading sent at once, not in batches.")
+
+
 def test_after_a_lost_tracker_the_task_may_be_done_again(lab: Lab) -> None:
     lab.goes_on(0.5)
     lab.does("start")
