@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -34,6 +34,27 @@ class Estimator(Protocol):
 
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
         """What the estimator would have shown at `times`, each from the samples that had arrived by then."""
+
+
+@runtime_checkable
+class Resuming(Estimator, Protocol):
+    """An estimator whose replay can be done piece by piece, so that a long recording need not be in memory whole."""
+
+    @property
+    def resumes(self) -> bool:
+        """Whether it can with its settings."""
+
+    def resume(self, state: Any, samples: Mapping[str, Samples], times: FloatArray) -> tuple[Track, Any]:
+        """What `replay` of all samples so far would show at rising `times`, and the state after these samples.
+
+        `state` is that after the piece before, at first `start()`. A piece has every sample that arrives in a stretch
+        of time, and its times are of that stretch. The first goes on at least to the first position.
+        """
+
+
+def resuming(estimator: Estimator) -> Resuming | None:
+    """The estimator if it can be replayed piece by piece."""
+    return estimator if isinstance(estimator, Resuming) and estimator.resumes else None
 
 
 def require_readings(sensors: Mapping[str, Sensor], samples: Mapping[str, Samples]) -> None:
@@ -72,10 +93,16 @@ def replay_loop(estimator: Estimator, samples: Mapping[str, Samples], times: Flo
 
     `times` (n,) in s, in any order; the track's mean and SD are (n, d) in mm.
     """
+    return resume_loop(estimator, estimator.start(), samples, times)[0]
+
+
+def resume_loop(
+    estimator: Estimator, state: Any, samples: Mapping[str, Samples], times: FloatArray
+) -> tuple[Track, Any]:
+    """The same from a state on, and the state after all samples."""
     dimension = next(iter(estimator.sensors.values())).dimension
     mean = np.full((len(times), dimension), np.nan)
     sd = np.full((len(times), dimension), np.nan)
-    state = estimator.start()
     pending = arrivals(estimator.sensors, samples)
     upcoming = next(pending, None)
     for index in np.argsort(times, kind="stable"):
@@ -84,7 +111,10 @@ def replay_loop(estimator: Estimator, samples: Mapping[str, Samples], times: Flo
             state = estimator.update(state, *upcoming)
             upcoming = next(pending, None)
         mean[index], sd[index] = estimator.predict(state, time)
-    return Track(times, mean, sd)
+    while upcoming is not None:
+        state = estimator.update(state, *upcoming)
+        upcoming = next(pending, None)
+    return Track(times, mean, sd), state
 
 
 def unknown(dimension: int) -> tuple[FloatArray, FloatArray]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fusion_core.checks import require_not_negative, require_positive
-from fusion_core.estimator import replay_loop, unknown
+from fusion_core.estimator import replay_loop, resume_loop, unknown
 from fusion_core.samples import FloatArray, Sample, Samples, Track
 from fusion_core.sensors import Sensor, position_sensor
 
@@ -51,6 +51,21 @@ class Raw:
         mean[known] = frames.value[newest[known]]
         sd[known] = tracker.noise_sd
         return Track(times, mean, sd)
+
+    @property
+    def resumes(self) -> bool:
+        """Always."""
+        return True
+
+    def resume(
+        self, state: Sample | None, samples: Mapping[str, Samples], times: FloatArray
+    ) -> tuple[Track, Sample | None]:
+        """`replay` of one piece of a recording, which begins with the frame held."""
+        track, frames = self.replay(samples, times), samples.get(position_sensor(self.sensors))
+        if state is not None:
+            held = np.isnan(track.sd[:, 0])
+            track.mean[held], track.sd[held] = self.predict(state, np.nan)
+        return track, frames[len(frames) - 1] if frames is not None and len(frames) else state
 
 
 @dataclass(frozen=True)
@@ -101,6 +116,17 @@ class Smoother:
     def replay(self, samples: Mapping[str, Samples], times: FloatArray) -> Track:
         """The plain loop."""
         return replay_loop(self, samples, times)
+
+    @property
+    def resumes(self) -> bool:
+        """Always."""
+        return True
+
+    def resume(
+        self, state: Smoothed | None, samples: Mapping[str, Samples], times: FloatArray
+    ) -> tuple[Track, Smoothed | None]:
+        """The plain loop over one piece of a recording."""
+        return resume_loop(self, state, samples, times)
 
 
 @dataclass(frozen=True)

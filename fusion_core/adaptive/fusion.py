@@ -132,11 +132,11 @@ class FusionAdaptive:
         steps.go_through(self.model, room.state, room.phone, reading, _NO_TIMES, _NO_ROWS, _NO_ROWS, _NO_ROWS)
         return room
 
-    def _copied(self, memory: Memory) -> Memory:
-        """A copy with room for a row more, less the rows that are no longer needed."""
+    def _copied(self, memory: Memory, more: int = 1) -> Memory:
+        """A copy with room for some rows more, less the rows that are no longer needed."""
         count = memory.state["count"][0, ROWS]
         first = steps.oldest_needed(self.model, memory.state, memory.phone)
-        room = Memory(memory.state.copy(), layout.room(int(count - first) + 1))
+        room = Memory(memory.state.copy(), layout.room(int(count - first) + more))
         for to, of in zip(room.phone[:3], memory.phone[:3], strict=True):
             to[: count - first] = of[first:count]
         room.state["count"][0, ROWS] = count - first
@@ -188,13 +188,30 @@ class FusionAdaptive:
         back = np.argsort(order, kind="stable")
         return Track(times, mean[back], sd[back])
 
+    @property
+    def resumes(self) -> bool:
+        """Always."""
+        return True
+
+    def resume(self, state: Memory, samples: Mapping[str, Samples], times: FloatArray) -> tuple[Track, Memory]:
+        """`replay` of one piece of a recording, from the state after the piece before."""
+        require_readings(self.sensors, samples)
+        mean, sd = np.empty((2, len(times), self.dimension))
+        room = self._copied(state, 2 * self._most_kept(samples) + _ROOM)
+        steps.go_through(self.model, room.state, room.phone, self._readings(samples), times, mean, sd, _NO_ROWS)
+        return Track(times, mean, sd), room
+
     def found(self, samples: Mapping[str, Samples]) -> list[Found]:
         """What the sensors turned out to be like by the end of a recording, beside what they are stated to be."""
         require_readings(self.sensors, samples)
         memory = layout.empty(2 * self._most_kept(samples) + _ROOM)
         readings = self._readings(samples)
         steps.go_through(self.model, memory.state, memory.phone, readings, _NO_TIMES, _NO_ROWS, _NO_ROWS, _NO_ROWS)
-        return found(self.model, memory)
+        return self.found_by(memory)
+
+    def found_by(self, state: Memory) -> list[Found]:
+        """The same after some readings."""
+        return found(self.model, state)
 
     def _most_kept(self, samples: Mapping[str, Samples]) -> int:
         """The largest number of the phone's readings within the time that rows are kept."""

@@ -49,16 +49,18 @@ def replay(
     history: History,
     history_s: float,
     constants: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
+    span: tuple[int, int],
+) -> tuple[FloatArray, FloatArray, tuple[int, int]]:
     """Mean and SD (n, dimension) at rising `times`, from readings in order of arrival, the first of them a position.
 
     Unless they are empty, `constants` are filled with the mean (n, constants) and covariance (n, constants, constants)
-    of the constants. `history` is working memory: it needs more rows than there are readings in any `history_s`.
+    of the constants. `history` is working memory: it needs more rows than there are readings in any `history_s`. Its
+    rows in use are `span` (oldest, count), at first (0, 0); the span at the end is returned too.
     """
     dimension = len(model.axes)
     mean, sd = np.full((len(times), dimension), np.nan), np.full((len(times), dimension), np.nan)
     recent, adapted, of_position = history.time, history.adapted, np.zeros(len(model.states))
-    oldest, count, upcoming = int(0), int(0), 0  # noqa: RUF046, UP018 - for a bare 0 all is compiled once more
+    (oldest, count), upcoming = span, 0
     for index in range(len(times)):
         while upcoming < len(arrival) and arrival[upcoming] <= times[index]:
             time, sensor = readings.time[upcoming], readings.sensor[upcoming]
@@ -80,4 +82,4 @@ def replay(
             write_prediction(
                 model.states, model.axes, history.mean, history.covariance, row, of_position, noise, mean, sd, index
             )
-    return mean, sd
+    return mean, sd, (oldest, count)

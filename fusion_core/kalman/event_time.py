@@ -189,17 +189,35 @@ class EventTime:
         """Mean and SD (n, d) at `times`, in any order; fills `constants` unless they are empty (rising times only)."""
         room, wanted = self._room(readings), np.asarray(times, dtype=np.float64)
         if (wanted[1:] >= wanted[:-1]).all():
-            found: tuple[FloatArray, FloatArray] = event_replay.replay(
-                self.model, readings, arrival, wanted, room, self.history_s, constants
+            found: tuple[FloatArray, FloatArray, object] = event_replay.replay(
+                self.model, readings, arrival, wanted, room, self.history_s, constants, (0, 0)
             )
-            return found
+            return found[:2]
         order = np.argsort(times, kind="stable")
         mean, sd = np.full((2, len(times), self.dimension), np.nan)
         rising = wanted[order]
-        mean[order], sd[order] = event_replay.replay(
-            self.model, readings, arrival, rising, room, self.history_s, constants
+        mean[order], sd[order], _ = event_replay.replay(
+            self.model, readings, arrival, rising, room, self.history_s, constants, (0, 0)
         )
         return mean, sd
+
+    def resume(self, state: Recent, samples: Mapping[str, Samples], times: FloatArray) -> tuple[Track, Recent]:
+        """`replay` of one piece of a recording, from the state after the piece before."""
+        readings, arrival = self._readings(samples, begun=state.history is not None)
+        before, kept = state.history, 0 if state.history is None else len(state.history.time)
+        within = readings.time if before is None else np.concatenate([before.time, readings.time])
+        room = self._empty_history(2 * _most_within(np.sort(within), self.history_s) + kept + 8)
+        for column, known in zip(room, before or (), strict=before is not None):
+            column[:kept] = known
+        # One time more than is asked for, so that the readings after the last are in the state as well.
+        rising = np.append(np.asarray(times, dtype=np.float64), np.max(arrival, initial=np.max(times, initial=-np.inf)))
+        biases = len(self.model.constants)
+        nothing = np.empty((0, biases)), np.empty((0, biases, biases))
+        mean, sd, (oldest, count) = event_replay.replay(
+            self.model, readings, arrival, rising, room, self.history_s, nothing, (0, kept)
+        )
+        history = History._make([column[oldest:count].copy() for column in room]) if count else None
+        return Track(times, mean[:-1], sd[:-1]), Recent(history, state.waiting, state.too_late)
 
     def _room(self, readings: Readings) -> History:
         """A history with more rows than the readings need at any time."""
@@ -241,16 +259,20 @@ class EventTime:
         return replace(self, model=model)
 
     def _readings(
-        self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray] | None = None
+        self, samples: Mapping[str, Samples], couplings: Mapping[str, FloatArray] | None = None, begun: bool = False
     ) -> tuple[Readings, FloatArray]:
-        """All readings in order of arrival from the first position on, followed by those that waited for it."""
+        """All readings in order of arrival from the first position on, followed by those that waited for it.
+
+        With `begun` there was a position before, and no reading waits.
+        """
         streams = {name: samples[name] for name in self.sensors if name in samples and len(samples[name])}
         time = np.concatenate([np.zeros(0), *(stream.time for stream in streams.values())])
         arrival = np.concatenate([np.zeros(0), *(stream.arrival for stream in streams.values())])
         numbers = [np.full(len(stream), self._index[name], np.int64) for name, stream in streams.items()]
         sensor = np.concatenate([np.zeros(0, np.int64), *numbers])
         order = np.argsort(arrival, kind="stable")
-        order = self._from_first(time[order], sensor[order], order)
+        if not begun:
+            order = self._from_first(time[order], sensor[order], order)
         # Each stream goes to its places at once: the couplings of a long recording are not held twice.
         places = np.full(len(time), -1)
         places[order] = np.arange(len(order))

@@ -148,6 +148,16 @@ class FusionKalman:
         require_readings(self.sensors, samples)
         return self.steps.replay(samples, times)
 
+    @property
+    def resumes(self) -> bool:
+        """Not with fixed gains, which look for regular stamps in the whole recording."""
+        return self.path == "event_time"
+
+    def resume(self, state: Any, samples: Mapping[str, Samples], times: FloatArray) -> tuple[Track, Any]:
+        """`replay` of one piece of a recording, from the state after the piece before."""
+        require_readings(self.sensors, samples)
+        return self.event_time.resume(state, samples, times)
+
 
 def _operator(name: str, sensor: Sensor, states: int) -> FloatArray:
     """The weights (states,) of the sum of one axis's states that a sensor observes."""

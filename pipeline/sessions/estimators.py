@@ -37,6 +37,11 @@ def sensors(study: Study) -> dict[str, Sensor]:
     return {name: sensor(study, stream) for name, stream in study.sensor_streams.items()}
 
 
+def of_space(of_axes: Sensor) -> Sensor:
+    """The same sensor with all three axes."""
+    return Sensor(of_axes.operator, of_axes.noise_sd, of_axes.latency_s, 3, of_axes.rate_hz)
+
+
 _POSITIONS_ONLY = ("raw", "one_euro", "holt", "position_kalman")  # whatever sensors there are
 
 

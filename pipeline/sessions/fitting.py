@@ -17,7 +17,8 @@ from fusion_core.accuracy import interpolate, rmse
 from fusion_core.likelihood import Fitted, log_likelihood_by_replay, maximise, position_log_likelihood
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, sensors
-from pipeline.sessions.recording import SETTLED_S, Recording, arrived
+from pipeline.sessions.piecewise import arrived
+from pipeline.sessions.recording import SETTLED_S, Recording
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 

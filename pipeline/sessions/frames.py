@@ -20,7 +20,7 @@ import numpy.typing as npt
 from fusion_core.accuracy import interpolate
 from fusion_core.samples import Samples
 from pipeline.sessions.checks.motion import Interval, compare_positions
-from pipeline.sessions.recording import arrived
+from pipeline.sessions.piecewise import arrived
 from pipeline.statistics.arrays import FloatArray
 
 _BLOCK_S = 2.0

@@ -20,6 +20,7 @@ from fusion_core.phone.orientation import (
 from pipeline.sessions.tilt import tilts
 from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.streams import AccelerationStream
+from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Columns
 
 HEADING_SD_RAD = 0.3
@@ -66,12 +67,17 @@ Tracker = tuple[Samples, Sensor]
 """Positions of all three axes, and the sensor they are from."""
 
 
-def phone(rows: Columns, times: tuple[FloatArray, FloatArray], sensor: Sensor) -> Imu:
-    """The readings of a stream from its rows of `imu` and their times of measurement and arrival."""
+def logged_readings(
+    rows: Columns, stream: AccelerationStream, sensor: Sensor, origin_ns: int
+) -> tuple[Imu, FloatArray]:
+    """The readings of a stream from its rows of `imu`, with the orientations in the log (n, 4)."""
+    late_ns = round((stream.latency_s if stream.stamped_on_arrival else 0.0) / S_PER_NS)
+    times = (rows["time_ns"] - late_ns - origin_ns) * S_PER_NS, (rows["arrival_ns"] - origin_ns) * S_PER_NS
     force, turning = (
         np.column_stack([rows[name.format(axis)] for axis in "xyz"]) for name in ("a{}_mm_s2", "g{}_rad_s")
     )
-    return Imu(*times, force, turning, sensor)
+    logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])
+    return Imu(*times, force, turning, sensor), logged
 
 
 def aligned(imu: Imu, logged: FloatArray, stream: AccelerationStream, tracker: Tracker | None) -> Phone:

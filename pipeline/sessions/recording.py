@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,13 @@ import pyarrow.compute as pc
 
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.accuracy import interpolate
+from fusion_core.estimator import resuming
 from fusion_core.phone.calibration import Body
 from fusion_core.phone.orientation import rotate
-from pipeline.sessions.estimators import build_estimator, sensor, sensors
-from pipeline.sessions.phone import Imu, Phone, aligned, phone
+from pipeline.sessions import piecewise
+from pipeline.sessions.estimators import build_estimator, of_space, sensor, sensors, sensors_used
+from pipeline.sessions.long_phone import LongPhone, long_phone
+from pipeline.sessions.phone import Imu, Phone, aligned, logged_readings
 from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.settings import Study
 from pipeline.study.streams import (
@@ -89,7 +93,7 @@ class Recording:
     """One session. Times are seconds since `origin_ns`; `times` are the instants of every estimator's track.
 
     `samples` holds the sensors, the analysed axes only; `reference` is in the tracker's frame and clock; `phones` says
-    where orientations came from.
+    where orientations came from. The readings of a `long_phone` are in neither: they are read anew, in pieces.
     """
 
     origin_ns: int
@@ -99,6 +103,7 @@ class Recording:
     display: Samples | None
     phones: dict[str, Phone] = field(default_factory=dict)
     mounted: Mounted | None = None
+    long_phone: LongPhone | None = None
 
     def to_ns(self, time: FloatArray) -> np.ndarray[Any, np.dtype[np.int64]]:
         """Seconds since the origin as the tables' nanoseconds."""
@@ -133,25 +138,29 @@ def where_judged(
     return (judged, truth[run_of(judged)]) if judged.any() else None
 
 
-def load(study: Study, entry: Path) -> Recording:
-    """A session's recording from its ingested tables."""
-    imu, positions, readings = (tables.read_arrow(name, entry) for name in ("imu", "positions", "readings"))
+def load(study: Study, entry: Path, may_be_long: bool = False) -> Recording:
+    """A session's recording from its ingested tables; `may_be_long` leaves a long phone in its table where it can."""
+    long = long_phone(study, entry) if may_be_long else None
+    positions, readings = (tables.read_arrow(name, entry) for name in ("positions", "readings"))
+    imu = tables.of_rows("imu", []) if long is not None else tables.read_arrow("imu", entry)
+    arrivals_ns = np.zeros(0, np.int64) if long is None else long.arrivals_ns()
     first = [pc.min(table["arrival_ns"]).as_py() for table in (imu, positions) if len(table)]
-    origin_ns = min(first, default=0)
+    origin_ns = min([*first, *arrivals_ns[:1].tolist()], default=0)
     whole: dict[str, Samples] = {}
     for name, stream in study.streams.items():
         if not isinstance(stream, AccelerationStream):
             table = readings if isinstance(stream, VelocityStream | LinearStream) else positions
             whole[name] = _vectors(tables.of_stream(table, name), stream, origin_ns)
-    raw = _raw_phones(study, imu, origin_ns)
-    times = _instants(study, imu, positions, origin_ns)
+    raw = _raw_phones(study, imu, origin_ns) if long is None else {}
+    times = _instants(study, imu, positions, origin_ns) if long is None else _rising_s(arrivals_ns, origin_ns)
     rows = len(imu) + len(positions)
-    del imu, positions, readings  # a phone's orientations take as much memory again
+    del imu, positions, readings, arrivals_ns  # a phone's orientations take as much memory again
     tables.give_back(rows)
-    phones = _phones(study, raw, whole)
+    phones = _phones(study, raw, whole) if long is None else {long.name: long.phone()}
     samples = {
         name: _of_axes(phones[name].body.acceleration() if name in phones else whole[name], study, name)
         for name in study.sensor_streams
+        if long is None or name != long.name
     }
     return Recording(
         origin_ns,
@@ -161,6 +170,7 @@ def load(study: Study, entry: Path) -> Recording:
         _only_stream_of(study, DisplayStream, whole),
         phones,
         _mounted(study, samples, whole, phones),
+        long,
     )
 
 
@@ -191,14 +201,6 @@ def _positions(entry: Path) -> tuple[pa.Table, int]:
     return table, pc.min(table["arrival_ns"]).as_py() if len(table) else 0
 
 
-def arrived(samples: Samples, since_s: float, until_s: float) -> Samples:
-    """The readings that arrived from `since_s` until `until_s`."""
-    kept = (samples.arrival >= since_s) & (samples.arrival < until_s)
-    rotation = None if samples.rotation is None else samples.rotation[kept]
-    force = None if samples.force is None else samples.force[kept]
-    return Samples(samples.time[kept], samples.arrival[kept], samples.value[kept], rotation, force)
-
-
 def shown_axes(study: Study, name: str) -> tuple[str, ...]:
     """Those of the analysed axes that a stream of positions has."""
     return tuple(study.axes_of(name)) if name in study.sensor_streams else tuple(study.axes)
@@ -223,11 +225,8 @@ def _raw_phones(study: Study, imu: pa.Table, origin_ns: int) -> dict[str, tuple[
     found = {}
     for name, stream in study.sensor_streams.items():
         if isinstance(stream, AccelerationStream):
-            rows = tables.of_stream(imu, name)
-            time_ns, arrival_ns = _times(rows, stream.latency_s if stream.stamped_on_arrival else 0.0)
-            times = (time_ns - origin_ns) * S_PER_NS, (arrival_ns - origin_ns) * S_PER_NS
-            logged = np.column_stack([rows[column] for column in ("qx", "qy", "qz", "qw")])
-            found[name] = phone(rows, times, _of_space(sensor(study, stream))), logged
+            rows, in_space = tables.of_stream(imu, name), of_space(sensor(study, stream))
+            found[name] = logged_readings(rows, stream, in_space, origin_ns)
     return found
 
 
@@ -235,17 +234,12 @@ def _phones(study: Study, raw: dict[str, tuple[Imu, FloatArray]], whole: dict[st
     """The phone of every stream of accelerations, with all three axes."""
     tracker = None
     if study.tracker is not None:
-        tracker = whole[study.tracker], _of_space(sensor(study, study.sensor_streams[study.tracker]))
+        tracker = whole[study.tracker], of_space(sensor(study, study.sensor_streams[study.tracker]))
     found = {}
     for name, stream in study.sensor_streams.items():
         if isinstance(stream, AccelerationStream):
             found[name] = aligned(*raw.pop(name), stream, tracker)
     return found
-
-
-def _of_space(of_axes: Sensor) -> Sensor:
-    """The same sensor with all three axes."""
-    return Sensor(of_axes.operator, of_axes.noise_sd, of_axes.latency_s, 3, of_axes.rate_hz)
 
 
 def _of_axes(samples: Samples, study: Study, name: str) -> Samples:
@@ -299,6 +293,10 @@ def _less(arm: Arm, positions: Samples) -> Samples:
 
 def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track:
     """What the study's estimator of that name would have shown at rising `times` (n,) in s."""
+    pieces = in_pieces(study, name, loaded, times)
+    if pieces is not None:
+        tracks = [track for track, _ in pieces]
+        return Track(times, *(np.concatenate([getattr(track, key) for track in tracks]) for key in ("mean", "sd")))
     estimator: Estimator = build_estimator(study, name)
     track = estimator.replay(loaded.samples, times)
     known = loaded.mounted
@@ -312,12 +310,53 @@ def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track
     return Track(times, mean, sd)
 
 
+def in_pieces(study: Study, name: str, loaded: Recording, times: FloatArray) -> Iterator[tuple[Track, Any]] | None:
+    """The parts of an estimator's track at rising `times` (n,) in s, with its state after each.
+
+    None where no phone is a long one, or the estimator, which then does not use it, cannot go on from a state.
+    """
+    estimator, phone = resuming(build_estimator(study, name)), loaded.long_phone
+    if phone is None or estimator is None:
+        return None
+    if phone.name not in sensors_used(study, name):
+        return piecewise.replayed(estimator, loaded.samples, None, times)
+    pieces = (_of_axes(piece, study, phone.name) for piece in phone.pieces(loaded.origin_ns))
+    return piecewise.replayed(estimator, loaded.samples, (phone.name, pieces), times)
+
+
 def tracked(study: Study, name: str, loaded: Recording) -> Shown:
     """What the estimator would have shown at every instant of the recording, from its first estimate on."""
-    track = show(study, name, loaded, loaded.times)
+    return _known(loaded, show(study, name, loaded, loaded.times))
+
+
+def tracked_in_parts(study: Study, name: str, loaded: Recording) -> Iterator[Shown]:
+    """The same, some instants at a time where that is possible and the phone is a long one."""
+    pieces = in_pieces(study, name, loaded, loaded.times)
+    if pieces is None:
+        yield tracked(study, name, loaded)
+        return
+    for track, _ in pieces:
+        yield _known(loaded, track)
+
+
+def _known(loaded: Recording, track: Track) -> Shown:
+    """The part of a track that has estimates."""
     known: np.ndarray[Any, np.dtype[np.bool_]] = np.all(np.isfinite(track.mean), axis=1)
     where = run_of(known)
     return Shown(loaded.to_ns(track.time[where]), track.mean[where], track.sd[where])
+
+
+def within(study: Study, name: str, loaded: Recording, begin_s: float, end_s: float) -> Samples:
+    """A sensor's readings, at least those that were measured from `begin_s` until `end_s`."""
+    phone = loaded.long_phone
+    if phone is None or phone.name != name:
+        return loaded.samples[name]
+    parts: list[Samples] = []
+    for piece in phone.pieces(loaded.origin_ns):
+        inside = (piece.time >= begin_s) & (piece.time <= end_s)
+        if inside.any() or not parts:
+            parts.append(piecewise.marked(_of_axes(piece, study, name), inside))
+    return piecewise.joined(parts)
 
 
 def reference(study: Study, loaded: Recording) -> tuple[str, Samples] | None:
@@ -343,10 +382,14 @@ def _instants(study: Study, imu: pa.Table, positions: pa.Table, origin_ns: int) 
     """The arrivals of the accelerations; of the frames where there is no IMU."""
     accelerations, frames = study.stream_of_kind("acceleration"), study.stream_of_kind("position")
     rows = tables.of_stream(imu, accelerations) if accelerations else tables.of_stream(positions, frames or "")
-    arrival = rows["arrival_ns"]
-    if (arrival[1:] <= arrival[:-1]).any():
-        arrival = np.unique(arrival)
-    times: FloatArray = (arrival - origin_ns) * S_PER_NS
+    return _rising_s(rows["arrival_ns"], origin_ns)
+
+
+def _rising_s(arrival_ns: np.ndarray[Any, np.dtype[np.int64]], origin_ns: int) -> FloatArray:
+    """Arrivals (n,) in s since the origin, each instant once."""
+    if (arrival_ns[1:] <= arrival_ns[:-1]).any():
+        arrival_ns = np.unique(arrival_ns)
+    times: FloatArray = np.asarray((arrival_ns - origin_ns) * S_PER_NS)
     return times
 
 

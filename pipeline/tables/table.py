@@ -215,12 +215,19 @@ def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
     return pa.concat_tables([*merged, *parts]) if merged or parts else TABLES[name].schema.empty_table()
 
 
-def read_parts(name: str, folder: Path) -> Iterator[pa.Table]:
+def rows(name: str, folder: Path) -> int:
+    """How many rows a table has; none where there is no such file."""
+    with suppress(FileNotFoundError), _opened(name, folder / f"{name}.parquet") as file:
+        return int(file.metadata.num_rows)
+    return 0
+
+
+def read_parts(name: str, folder: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
     """As `read_arrow` of one folder, some rows after the other: of a large table they are never in memory together."""
     with suppress(FileNotFoundError), _opened(name, folder / f"{name}.parquet") as file:
         left = file.metadata.num_rows
         for group in range(file.num_row_groups):
-            part = file.read_row_group(group, use_threads=False)
+            part = file.read_row_group(group, columns, use_threads=False)
             left -= len(part)
             yield part
         if left:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fusion_core import ESTIMATORS, Estimator, Samples, Sensor, replay_loop
+from fusion_core.estimator import Resuming
 from fusion_core.phone.orientation import rotate
 
 SENSORS = {"tracker": Sensor("position", 8.0, 0.1, 3), "imu": Sensor("acceleration", 100.0, 0.0, 3)}
@@ -163,3 +165,23 @@ def test_stated_sds_are_positive_and_the_same_for_every_axis(name: str) -> None:
     track = build(name).replay(recording(6), TIMES[5:])
     assert (track.sd > 0).all()
     np.testing.assert_allclose(track.sd, np.repeat(track.sd[:, :1], 3, axis=1), rtol=1e-12)  # sums by BLAS
+
+
+@estimators
+@pytest.mark.parametrize("kind", ["regular", "irregular", "shuffled"])
+def test_a_replay_piece_by_piece_is_that_of_the_whole_to_the_last_bit(name: str, kind: str) -> None:
+    estimator = build(name)
+    if not (isinstance(estimator, Resuming) and estimator.resumes):
+        pytest.skip("is replayed as a whole")
+    samples = recording(3, regular=kind == "regular", shuffled=kind == "shuffled")
+    whole, state, parts = estimator.replay(samples, TIMES), estimator.start(), []
+    for since, until in pairwise((-np.inf, 0.4, 0.41, 1.3, 1.7, np.inf)):
+        inside = {key: (one.arrival >= since) & (one.arrival < until) for key, one in samples.items()}
+        piece = {
+            key: Samples(one.time[inside[key]], one.arrival[inside[key]], one.value[inside[key]])
+            for key, one in samples.items()
+        }
+        track, state = estimator.resume(state, piece, TIMES[(since <= TIMES) & (until > TIMES)])
+        parts.append(track)
+    np.testing.assert_array_equal(np.concatenate([part.mean for part in parts]), whole.mean)
+    np.testing.assert_array_equal(np.concatenate([part.sd for part in parts]), whole.sd)
