@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ _LAG_STEP_S = 0.005
 _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
 _BLOCKS_MAX = 200_000  # to draw from: 2 kB each, and those a few ms apart are nearly the same
+_ROWS_AT_ONCE = 2**18  # of what is gone through part by part
 _FLAT = 1e-6  # costs that differ by less than this share say nothing: while the reference is still, any shift fits
 
 
@@ -53,7 +55,13 @@ def interpolate(samples: Samples, time: FloatArray) -> FloatArray:
 
 def rmse(estimate: FloatArray, reference: FloatArray) -> float:
     """Root mean square Euclidean distance in mm between (n, d) and (n, d)."""
-    return float(np.sqrt(np.mean(np.sum((estimate - reference) ** 2, axis=1))))
+    return float(np.sqrt(np.mean(squared_distances(estimate, reference))))
+
+
+def squared_distances(estimate: FloatArray, reference: FloatArray) -> FloatArray:
+    """Squared Euclidean distances (n,) in mm² between (n, d) and (n, d)."""
+    found: FloatArray = np.sum((estimate - reference) ** 2, axis=1)
+    return found
 
 
 def stated_sd(sd: FloatArray) -> float:
@@ -63,7 +71,13 @@ def stated_sd(sd: FloatArray) -> float:
 
 def coverage_95(estimate: FloatArray, sd: FloatArray, reference: FloatArray) -> float:
     """Share of (instant, axis) where the reference is within 1.96 stated SDs of the estimate."""
-    return float(np.mean(np.abs(estimate - reference) <= 1.96 * sd))
+    return float(np.mean(covered_95(estimate, sd, reference)))
+
+
+def covered_95(estimate: FloatArray, sd: FloatArray, reference: FloatArray) -> BoolArray:
+    """Where (n, d) the reference is within 1.96 stated SDs of the estimate."""
+    found: BoolArray = np.abs(estimate - reference) <= 1.96 * sd
+    return found
 
 
 def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.random.Generator) -> Interval:
@@ -104,10 +118,13 @@ def _surrounded(known: FloatArray, time: FloatArray) -> BoolArray:
     if len(known) < 2:
         return np.zeros(len(time), dtype=np.bool_)
     gaps = np.concatenate([[0], np.cumsum(np.diff(known) > GAP_S)])
-    begin = np.searchsorted(known, time - LAG_RANGE_S, side="right") - 1
-    end = np.searchsorted(known, time + LAG_RANGE_S, side="left")
-    inside = (begin >= 0) & (end < len(known))
-    surrounded: BoolArray = inside & (gaps[begin] == gaps[np.minimum(end, len(known) - 1)])
+    surrounded = np.empty(len(time), dtype=np.bool_)
+    for first in range(0, len(time), _ROWS_AT_ONCE):
+        part = slice(first, first + _ROWS_AT_ONCE)
+        begin = np.searchsorted(known, time[part] - LAG_RANGE_S, side="right") - 1
+        end = np.searchsorted(known, time[part] + LAG_RANGE_S, side="left")
+        inside = (begin >= 0) & (end < len(known))
+        surrounded[part] = inside & (gaps[begin] == gaps[np.minimum(end, len(known) - 1)])
     return surrounded
 
 
@@ -122,6 +139,33 @@ def _segments(known: FloatArray, value: FloatArray) -> lag_steps.Segments:
     )
 
 
+class _Signal(NamedTuple):
+    """The rows `at` (n,) of `value` (m, d), which are not copied: a long signal's would take gigabytes."""
+
+    value: FloatArray
+    at: npt.NDArray[np.int32]
+
+    def means(self) -> FloatArray:
+        """The mean of each column (d,), to the last bit as `value[at].mean(axis=0)`."""
+        if self.value.shape[1] == 1:  # NumPy adds a single column up in pairs
+            return np.asarray(self.value[self.at].mean(axis=0))
+        total = np.zeros(self.value.shape[1])
+        for begin in range(0, len(self.at), _ROWS_AT_ONCE):
+            rows = self.value[self.at[begin : begin + _ROWS_AT_ONCE]]
+            total = np.add.reduce(np.vstack([total, rows]) if begin else rows, axis=0)
+        return total / len(self.at)
+
+    def spectrum(self, axis: int, mean: float, length: int) -> npt.NDArray[np.complex128]:
+        """The transform of one column less its mean, filled up with zeros to `length`."""
+        from scipy import fft
+
+        padded = np.zeros(length)
+        for begin in range(0, len(self.at), _ROWS_AT_ONCE):
+            rows = self.at[begin : begin + _ROWS_AT_ONCE]
+            padded[begin : begin + len(rows)] = self.value[rows, axis] - mean
+        return np.asarray(fft.rfft(padded, overwrite_x=True))
+
+
 def cross_correlation(
     first: FloatArray, second: FloatArray, farthest: int | None = None
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
@@ -130,20 +174,23 @@ def cross_correlation(
     Returns shifts in samples, −(n−1) … n−1, or those up to `farthest`, and at each the mean of first[t]·second[t +
     shift] over the overlap: the peak sits at a positive shift where `first` is ahead of `second` (paper, Fig. 9).
     """
+    rows = np.arange(len(first), dtype=np.int32)
+    return _correlation(_Signal(first, rows), _Signal(second, rows), farthest)
+
+
+def _correlation(first: _Signal, second: _Signal, farthest: int | None) -> tuple[npt.NDArray[np.int64], FloatArray]:
     from scipy import fft
 
-    n = len(first)
+    n = len(first.at)
     length = fft.next_fast_len(2 * n - 1, real=True)
-    means = first.mean(axis=0), second.mean(axis=0)
-    spectrum = np.zeros(0)
-    for axis in range(first.shape[1]):  # one after the other: the spectra take six times the memory of the signals
-        a, b = (
-            fft.rfft(signal[:, axis] - mean[axis], length) for signal, mean in zip((first, second), means, strict=True)
-        )
+    means = first.means(), second.means()
+    spectrum: Any = None
+    for axis in range(first.value.shape[1]):  # one after the other: the spectra take six times the signals' memory
+        a = first.spectrum(axis, means[0][axis], length)
         np.conj(a, out=a)
-        a *= b
-        spectrum = a if axis == 0 else np.add(spectrum, a, out=spectrum)
-        del a, b
+        a *= second.spectrum(axis, means[1][axis], length)
+        spectrum = a if spectrum is None else np.add(spectrum, a, out=spectrum)
+        del a
     circular = fft.irfft(spectrum, length)  # negative shifts are at its end
     most = n - 1 if farthest is None else min(n - 1, farthest)
     shifts = np.arange(-most, most + 1)
@@ -179,10 +226,21 @@ def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tupl
     if end - begin < 2 * LAG_RANGE_S:
         return None
     grid = np.arange(begin, end, step)
-    track = estimate[np.searchsorted(time, grid + step * 1e-3, side="right") - 1]
-    arrived = tracker.value[np.searchsorted(tracker.arrival, grid + step * 1e-3, side="right") - 1]
-    shifts, correlation = cross_correlation(track, arrived, int(LAG_RANGE_S / step) + 1)
+    grid += step * 1e-3
+    track = _Signal(estimate, _newest(time, grid))
+    arrived = _Signal(tracker.value, _newest(tracker.arrival, grid))
+    del grid
+    shifts, correlation = _correlation(track, arrived, int(LAG_RANGE_S / step) + 1)
     return np.asarray(shifts * step, dtype=np.float64), correlation
+
+
+def _newest(time: FloatArray, wanted: FloatArray) -> npt.NDArray[np.int32]:
+    """The row (n,) of the newest of rising `time` that is not after each of the times `wanted` (n,); −1 if none is."""
+    found = np.empty(len(wanted), np.int32)
+    for begin in range(0, len(wanted), _ROWS_AT_ONCE):
+        part = slice(begin, begin + _ROWS_AT_ONCE)
+        found[part] = np.searchsorted(time, wanted[part], side="right") - 1
+    return found
 
 
 def slow_stretches(
@@ -208,10 +266,13 @@ def stretches(time: FloatArray, holds: BoolArray, shortest_s: float) -> Iterator
 
 
 def jitter(time: FloatArray, estimate: FloatArray, reference: Samples) -> float:
-    """SD in mm of the track within slow stretches of the reference, pooled over them, axes summed; NaN if none."""
+    """SD in mm of the track within slow stretches of the reference, pooled over them, axes summed; NaN if none.
+
+    `time` (n,) rises.
+    """
     total, freedom = 0.0, 0
     for begin, end in slow_stretches(reference):
-        inside = estimate[(time >= begin) & (time <= end)]
+        inside = estimate[np.searchsorted(time, begin) : np.searchsorted(time, end, side="right")]
         if len(inside) > 1:
             total += float(np.sum((inside - inside.mean(axis=0)) ** 2))
             freedom += len(inside) - 1

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from fusion_core import Samples, accuracy
 from fusion_core.accuracy import noise
@@ -17,12 +16,14 @@ from pipeline.sessions import excerpts, movements, recording
 from pipeline.sessions.estimators import sensors
 from pipeline.sessions.fusion_checks import fusion_check_rows
 from pipeline.sessions.growing import Growing
+from pipeline.sessions.judged import judged
 from pipeline.sessions.phone import described
-from pipeline.sessions.recording import Recording, Shown, where_judged
+from pipeline.sessions.recording import Recording, Tracked
 from pipeline.sessions.sensors_found import sensors_found_rows
 from pipeline.sessions.target_widths import widths_mm
+from pipeline.sessions.tracks import newest_at, tracks_of
 from pipeline.sessions.trials import coordinates, selections_by_trial, trial_table, with_movements
-from pipeline.statistics.arrays import FloatArray, run_of
+from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
 from pipeline.tables.columns import S_PER_NS
@@ -36,8 +37,8 @@ def run(work: Work) -> Outcome:
     """Write one session's accuracy, agreement, noise, trials, selections and movements, and its figures' tables."""
     study, session = work.study, work.session
     ingested = work.entry("ingest")
-    loaded = recording.load(study, ingested)
-    tracks = _tracks(study, tables.read_parts("tracks", work.entry("fuse")))
+    loaded = recording.load(study, ingested, may_be_long=True)
+    tracks = tracks_of(study, work.entry("fuse"))
     reference = recording.reference(study, loaded)
     rows = [accuracy_row(work, loaded, reference, name, rows) for name, rows in tracks.items()]
     known = [row for row in rows if row]
@@ -67,65 +68,43 @@ def run(work: Work) -> Outcome:
     return Outcome()
 
 
-def _tracks(study: Study, parts: Iterable[pa.Table]) -> dict[str, Shown]:
-    """What each estimator would have shown, by its name, from parts of the table `tracks`."""
-    axes = len(study.axes)
-    found = {
-        name: (Growing(np.int64), Growing(np.float64, axes), Growing(np.float64, axes)) for name in study.estimators
-    }
-    for part in parts:
-        for name in pc.unique(part["estimator"]).to_pylist():
-            if name not in found:
-                continue
-            rows = tables.matching(part, "estimator", name)
-            time_ns, mean, sd = found[name]
-            time_ns.add(rows["time_ns"])
-            for column, values in (("{}_mm", mean), ("sd_{}_mm", sd)):
-                values.add(np.column_stack([rows[column.format(axis)] for axis in study.axes]))
-    tables.give_back(sum(len(columns[0]) for columns in found.values()))
-    arrays = {name: [column.whole() for column in columns] for name, columns in found.items()}
-    return {name: Shown(*columns) for name, columns in arrays.items() if len(columns[0])}
-
-
 def accuracy_row(
-    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, shown: Shown
+    work: Work, loaded: Recording, named: tuple[str, Samples] | None, estimator: str, tracked: Tracked
 ) -> Row | None:
     """The estimator's row of `accuracy`; None without a reference on its grid."""
     study, tracker = work.study, work.study.tracker
-    on_grid = _on_grid(study, loaded, named, shown)
-    if named is None or tracker is None or on_grid is None:
+    if named is None or tracker is None:
         return None
     name, reference = named
-    time, mean, sd, truth = on_grid
-    random = recording.seeded(work.session.id, estimator)
-    lag = accuracy.lag(time, mean, reference, random)
-    return {
+    time, mean = Growing(np.float64), Growing(np.float64, len(study.axes))
+    squared, variance, covered = Growing(np.float64), Growing(np.float64), Growing(np.bool_, len(study.axes))
+    for part in judged(study, loaded, named, tracked):
+        time.add(part.time)
+        mean.add(part.mean)
+        squared.add(accuracy.squared_distances(part.mean, part.truth))
+        variance.add(np.sum(part.sd**2, axis=1))
+        covered.add(accuracy.covered_95(part.mean, part.sd, part.truth))
+    if not len(time):
+        return None
+    row: Row = {
         "study": work.study_name,
         "session": work.session.id,
         "estimator": estimator,
         "reference": name,
-        "rmse_mm": accuracy.rmse(mean, truth),
-        "sd_mm": accuracy.stated_sd(sd),
-        "coverage_95": accuracy.coverage_95(mean, sd, truth),
+        "rmse_mm": float(np.sqrt(np.mean(squared.whole()))),
+        "sd_mm": float(np.sqrt(np.mean(variance.whole()))),
+        "coverage_95": float(np.mean(covered.whole())),
+    }
+    del squared, variance, covered
+    random = recording.seeded(work.session.id, estimator)
+    lag = accuracy.lag(time.whole(), mean.whole(), reference, random)
+    return row | {
         "lag_s": lag.value,
         "lag_low_s": lag.low,
         "lag_high_s": lag.high,
-        "lead_xcorr_s": accuracy.lead_by_cross_correlation(time, mean, loaded.samples[tracker]),
-        "jitter_mm": accuracy.jitter(time, mean, reference),
+        "lead_xcorr_s": accuracy.lead_by_cross_correlation(time.whole(), mean.whole(), loaded.samples[tracker]),
+        "jitter_mm": accuracy.jitter(time.whole(), mean.whole(), reference),
     }
-
-
-def _on_grid(
-    study: Study, loaded: Recording, named: tuple[str, Samples] | None, shown: Shown
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """Time (n,) in s, mean, stated SD and reference (n, d) in mm, where accuracy is judged; None if nowhere."""
-    time = loaded.to_s(shown.time_ns)
-    judged = where_judged(study, loaded, named, time)
-    if judged is None:
-        return None
-    on_grid, truth = judged
-    where = run_of(on_grid)
-    return time[where], shown.mean[where], shown.sd[where], truth
 
 
 def calibration_rows(
@@ -133,23 +112,23 @@ def calibration_rows(
     session: str,
     loaded: Recording,
     reference: tuple[str, Samples] | None,
-    tracks: Mapping[str, Shown],
+    tracks: Mapping[str, Tracked],
 ) -> Iterator[Row]:
     """How many errors are within k stated SDs, where accuracy is judged; no rows for an estimator that states no SD."""
-    for name, shown in tracks.items():
-        on_grid = _on_grid(study, loaded, reference, shown)
-        if on_grid is None:
-            continue
-        _, mean, sd, truth = on_grid
-        error, known = np.abs(mean - truth), sd > 0
-        for percent in _PERCENT_OF_SD if known.any() else ():
-            within = int(np.sum(error[known] <= percent / 100 * sd[known]))
+    for name, tracked in tracks.items():
+        within, count = dict.fromkeys(_PERCENT_OF_SD, 0), 0
+        for _, mean, sd, truth in judged(study, loaded, reference, tracked):
+            error, known = np.abs(mean - truth), sd > 0
+            count += int(known.sum())
+            for percent in _PERCENT_OF_SD if known.any() else ():
+                within[percent] += int(np.sum(error[known] <= percent / 100 * sd[known]))
+        for percent in _PERCENT_OF_SD if count else ():
             yield {
                 "session": session,
                 "estimator": name,
                 "percent_of_sd": percent,
-                "within": within,
-                "n": int(known.sum()),
+                "within": within[percent],
+                "n": count,
             }
 
 
@@ -185,9 +164,10 @@ def _noise(study: Study, session: str, loaded: Recording) -> tuple[list[Row], pa
     residuals = [tables.of_rows("noise_residuals", [])]
     stretch = _still(study, loaded)
     for name, sensor in sensors(study).items():
-        samples = loaded.samples[name]
-        left = noise.residuals(samples, *stretch) if stretch else np.empty((0, sensor.dimension))
-        if stretch is None or len(left) == 0:
+        if stretch is None:
+            continue
+        left = noise.residuals(recording.within(study, name, loaded, *stretch), *stretch)
+        if len(left) == 0:
             continue
         rows.append(
             {
@@ -241,19 +221,25 @@ def _trials(events: Sequence[Row]) -> Iterator[_Trial]:
         yield _Trial(number, dict(start), selected, target)
 
 
-def trial_rows(work: Work, events: Sequence[Row], tracks: Mapping[str, Shown]) -> Iterator[Row]:
+def trial_rows(work: Work, events: Sequence[Row], tracks: Mapping[str, Tracked]) -> Iterator[Row]:
     """Each trial as recorded, and what each estimator would have shown when the participant selected."""
-    for number, start, selected, target in _trials(events):
+    trials = list(_trials(events))
+    selected_ns = np.array([trial.selected["time_ns"] for trial in trials if trial.selected is not None], np.int64)
+    known = {
+        name: dict(zip(selected_ns.tolist(), newest_at(track, selected_ns), strict=True))
+        for name, track in tracks.items()
+    }
+    for number, start, selected, target in trials:
         trial = {**work.session.ids, "trial": number}
         if selected is None:
             yield trial | {"estimator": "recorded"}
             continue
         duration_s = float(selected["time_ns"] - start["time_ns"]) * S_PER_NS
         shown: dict[str, Row] = {"recorded": {axis: selected[f"{axis}_mm"] for axis in "xyz"}}
-        for name, track in tracks.items():
-            at = int(np.searchsorted(track.time_ns, selected["time_ns"], side="right")) - 1
-            if at >= 0:
-                shown[name] = dict(zip(work.study.axes, track.mean[at].tolist(), strict=True))
+        for name, places in known.items():
+            place = places[selected["time_ns"]]
+            if place is not None:
+                shown[name] = dict(zip(work.study.axes, place.tolist(), strict=True))
         for name, where in shown.items():
             squared = _squared_error(where, target)
             error = None if squared is None else float(np.sqrt(squared))

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from fusion_core import Samples, accuracy
 from pipeline.sessions.growing import Growing
 from pipeline.sessions.logs.log import IntArray
-from pipeline.sessions.recording import SETTLED_S, Recording, Shown
+from pipeline.sessions.recording import SETTLED_S, Recording, Tracked, within
 from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -25,7 +25,7 @@ _STRETCHES = 120  # of a session at the most
 _STRETCH_NS = 1_000_000_000  # at the least
 
 
-def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
+def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Tracked]) -> pd.DataFrame:
     """The table `excerpts`: the stretch and axis in which the tracker turns most. `raw`, the tracker, is left out."""
     name = study.stream_of_kind("position")
     if name is None or len(loaded.samples[name]) == 0:
@@ -40,15 +40,17 @@ def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, 
         parts.append(_cut(begin, "reference", of_reference, loaded.reference.time, loaded.reference.value[:, column]))
     felt = study.stream_of_kind("acceleration")
     if felt is not None:
-        samples = loaded.samples[felt]
+        samples = within(study, felt, loaded, begin, begin + EXCERPT_S)
         parts.append(
             _cut(begin, "acceleration", felt, samples.time, samples.value[:, study.axes_of(felt).index(letter)])
         )
     of_estimates = study.axes.index(letter)
-    for estimator, shown in tracks.items():
-        if study.estimators[estimator].type != "raw":
+    for estimator, tracked in tracks.items():
+        for shown in tracked.parts() if study.estimators[estimator].type != "raw" else ():
             mean, sd = shown.mean[:, of_estimates], shown.sd[:, of_estimates]
-            parts.append(_cut(begin, "estimate", estimator, loaded.to_s(shown.time_ns), mean, sd))
+            part = _cut(begin, "estimate", estimator, loaded.to_s(shown.time_ns), mean, sd)
+            if len(part):
+                parts.append(part)
     return tables.as_table("excerpts", pd.concat(parts).assign(session=session, axis=letter))
 
 
@@ -92,17 +94,21 @@ def _turn_mm(value: FloatArray) -> float:
     return max(turns)
 
 
-def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Shown]) -> pd.DataFrame:
+def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[str, Tracked]) -> pd.DataFrame:
     """The table `lead_curves`: each estimator's cross-correlation with the tracker, at leads within ±0.5 s."""
     name = study.tracker
     parts = [tables.frame("lead_curves", [])]
     if name is None or len(loaded.samples[name]) == 0:
         return parts[0]
     tracker = loaded.samples[name]
-    for estimator, shown in tracks.items():
-        time, mean = loaded.to_s(shown.time_ns), shown.mean
-        settled = run_of(time >= tracker.arrival[0] + SETTLED_S)
-        curve = accuracy.lead_curve(time[settled], mean[settled], tracker)
+    for estimator, tracked in tracks.items():
+        times, means = Growing(np.float64), Growing(np.float64, len(study.axes))
+        for shown in tracked.parts():
+            time = loaded.to_s(shown.time_ns)
+            settled = run_of(time >= tracker.arrival[0] + SETTLED_S)
+            times.add(time[settled])
+            means.add(shown.mean[settled])
+        curve = accuracy.lead_curve(times.whole(), means.whole(), tracker)
         if curve is None or not np.max(np.abs(curve[1])) > 0:
             continue
         near = np.abs(curve[0]) <= accuracy.LAG_RANGE_S

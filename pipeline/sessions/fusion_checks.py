@@ -9,9 +9,12 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fusion_core import FusionAdaptive, Raw, Samples
+from fusion_core.accuracy import squared_distances
 from pipeline.sessions.checks.finding import Finding, Status, of, rows_of
 from pipeline.sessions.estimators import fusing, sensors
-from pipeline.sessions.recording import Recording, Shown, where_judged
+from pipeline.sessions.growing import Growing
+from pipeline.sessions.judged import judged
+from pipeline.sessions.recording import Recording, Tracked
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
@@ -39,7 +42,7 @@ def fusion_check_rows(
     session: str,
     loaded: Recording,
     reference: tuple[str, Samples] | None,
-    tracks: Mapping[str, Shown],
+    tracks: Mapping[str, Tracked],
 ) -> list[Row]:
     """Rows of the table `checks`."""
     return rows_of([*used(loaded), *against_tracker(study, loaded, reference, tracks)], session)
@@ -67,7 +70,7 @@ def used(loaded: Recording) -> Iterator[Finding]:
 
 
 def against_tracker(
-    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, tracks: Mapping[str, Shown]
+    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, tracks: Mapping[str, Tracked]
 ) -> Iterator[Finding]:
     """Each fusing estimator's error against that of its tracker's last frame, held. Needs a recorded reference.
 
@@ -116,26 +119,27 @@ def _takes_the_sensors(study: Study) -> bool:
 
 
 def _beside_tracker(
-    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, shown: Shown
+    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, tracked: Tracked
 ) -> _Beside | None:
     """None without a recorded reference where the estimate is; accuracy is judged at the same instants."""
     tracker = study.tracker
     if reference is None or reference[0] == SMOOTHED or tracker is None:
         return None
-    time = loaded.to_s(shown.time_ns)
-    judged = where_judged(study, loaded, reference, time)
-    if judged is None:
+    samples, raw = {tracker: loaded.samples[tracker]}, Raw({tracker: sensors(study)[tracker]})
+    of_estimate, of_tracker, times = Growing(np.float64), Growing(np.float64), Growing(np.float64)
+    for time, mean, _, truth in judged(study, loaded, reference, tracked):
+        held = raw.replay(samples, time).mean
+        estimated, alone = (squared_distances(one, truth) for one in (mean, held))
+        known = np.isfinite(estimated) & np.isfinite(alone)
+        of_estimate.add(estimated[known])
+        of_tracker.add(alone[known])
+        times.add(time[known])
+    if not len(times):
         return None
-    on_grid, truth = judged
-    samples = {tracker: loaded.samples[tracker]}
-    held = Raw({tracker: sensors(study)[tracker]}).replay(samples, time[on_grid]).mean
-    estimated, alone = (np.sum((one - truth) ** 2, axis=1) for one in (shown.mean[on_grid], held))
-    known = np.isfinite(estimated) & np.isfinite(alone)
-    if not known.any():
-        return None
-    rmse_mm, alone_mm = (float(np.sqrt(np.mean(one[known]))) for one in (estimated, alone))
+    estimated, alone = of_estimate.whole(), of_tracker.whole()
+    rmse_mm, alone_mm = (float(np.sqrt(np.mean(one))) for one in (estimated, alone))
     slightly = alone_mm < rmse_mm <= _PLAIN * alone_mm
-    beyond_chance = slightly and _above_zero((estimated - alone)[known], time[on_grid][known])
+    beyond_chance = slightly and _above_zero(estimated - alone, times.whole())
     return _Beside(rmse_mm, alone_mm, rmse_mm > _PLAIN * alone_mm or beyond_chance)
 
 

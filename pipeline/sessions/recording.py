@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
-from fusion_core.accuracy import interpolate
 from fusion_core.estimator import resuming
 from fusion_core.phone.calibration import Body
 from fusion_core.phone.orientation import rotate
@@ -122,20 +121,16 @@ class Shown:
     mean: FloatArray
     sd: FloatArray
 
+    def parts(self) -> Iterator[Shown]:
+        """All of it at once, as it is in memory; `tracks.Stored` has more parts."""
+        yield self
 
-def where_judged(
-    study: Study, loaded: Recording, reference: tuple[str, Samples] | None, time: FloatArray
-) -> tuple[np.ndarray[Any, np.dtype[np.bool_]], FloatArray] | None:
-    """At which times (n,) in s accuracy is judged, and the reference there (k, d) in mm; None if at none.
 
-    That is from 1 s after the first frame's arrival on, wherever the reference is known.
-    """
-    tracker = study.tracker
-    if reference is None or tracker is None or len(loaded.samples[tracker]) == 0:
-        return None
-    truth = interpolate(reference[1], time)
-    judged = (time >= loaded.samples[tracker].arrival[0] + SETTLED_S) & np.isfinite(truth).all(axis=1)
-    return (judged, truth[run_of(judged)]) if judged.any() else None
+class Tracked(Protocol):
+    """What an estimator would have shown, some instants after the others."""
+
+    def parts(self) -> Iterator[Shown]:
+        """The parts in order of time."""
 
 
 def load(study: Study, entry: Path, may_be_long: bool = False) -> Recording:
