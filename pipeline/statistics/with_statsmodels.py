@@ -92,14 +92,14 @@ def gee(
 
 def adjusted_p(p_values: Sequence[float], method: str) -> list[float]:
     """p values adjusted over all of them, by one of statsmodels' own names of methods."""
-    with _quiet(), _nothing_to_collect():
+    with _quiet(), nothing_to_collect():
         from statsmodels.stats.multitest import multipletests
 
         return [float(p) for p in multipletests(p_values, method=method)[1]]
 
 
 @contextmanager
-def _nothing_to_collect() -> Iterator[None]:
+def nothing_to_collect() -> Iterator[None]:
     """For calls that collect garbage: `multipletests` does so each time, and goes through 50 ms of other objects."""
     gc.freeze()
     try:

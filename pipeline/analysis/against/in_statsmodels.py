@@ -9,6 +9,7 @@ from pipeline.analysis.against.problems import P_ADJUSTED, Family, Groups, Model
 from pipeline.analysis.against.theirs import Call, Calls, Found, NotOffered, fitted
 from pipeline.statistics.mixed import Factor
 from pipeline.statistics.multiplicity import METHODS
+from pipeline.statistics.with_statsmodels import nothing_to_collect
 from pipeline.study.comparison import Comparison
 
 
@@ -99,7 +100,8 @@ def _mixedlm(data: Model, _entry: Comparison) -> Found:
 def _multipletests(data: Family, _entry: Comparison) -> Found:
     from statsmodels.stats.multitest import multipletests
 
-    return {"p_adjusted": multipletests(list(data.p_values), method=METHODS[data.method])[1][data.place]}
+    with nothing_to_collect():
+        return {"p_adjusted": multipletests(list(data.p_values), method=METHODS[data.method])[1][data.place]}
 
 
 CALLS: Calls = {
