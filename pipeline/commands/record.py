@@ -30,6 +30,7 @@ class Options:
     demo: bool = False
     goes_on: bool = False
     lan: bool = False
+    plain: bool = False
     operator_lan: bool = False
     certificate: Path | None = None
     key: Path | None = None
@@ -73,6 +74,10 @@ def _ready(folder: Path) -> Any:
             if sender.camera is not None and not (sender.camera.calibration or sender.camera.field_of_view_deg):
                 usual = f"{USUAL_FIELD_OF_VIEW_DEG:.0f}°"
                 console.say(f"{name}: no field_of_view_deg: {usual} is assumed, so z may be a third off (docs/live.md)")
+        if access.in_network and certificates is None:
+            console.say(
+                "Without TLS a phone gives its pages no motion, and all that they say can be read in the network."
+            )
         if certificates is not None and certificates.authority is not None:
             console.say(f"Phones trust these pages once they trust this computer: {access.origin}/ca says how.")
             console.say(f"Its certificate's SHA-256: {certificates.fingerprint()}")

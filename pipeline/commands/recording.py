@@ -32,6 +32,10 @@ def record(
         typer.Option(help="With --lan: which of this computer's addresses to serve at."),
     ] = None,
     port: Annotated[int, typer.Option(min=1, max=65535, help="The port to serve pages on.")] = 8443,
+    plain: Annotated[
+        bool,
+        typer.Option("--plain", help="With --lan: without TLS. Phones only display then; an app sends the motion."),
+    ] = False,
     operator_lan: Annotated[
         bool, typer.Option("--operator-lan", help="With --lan: the operator's page may be on another computer.")
     ] = False,
@@ -46,7 +50,7 @@ def record(
     """Run a study live: pages for operator, phone and questionnaire, a steady display, and logs that replay."""
     from pipeline.commands import record as command
 
-    options = command.Options(host, port, demo, goes_on, lan, operator_lan, certificate, key)
+    options = command.Options(host, port, demo, goes_on, lan, plain, operator_lan, certificate, key)
     command.record(study, options, out, participants if bots else None)
 
 

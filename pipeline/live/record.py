@@ -38,7 +38,8 @@ _SOMEWHERE = "203.0.113.1"  # an address for examples (RFC 5737): only the way t
 class Serving:
     """How a study is served. `goes_on`: even if study.yaml has changed since the first session.
 
-    In a network (`lan`) at `host`, or where that is None at the address that this computer has there.
+    In a network (`lan`) at `host`, or where that is None at the address that this computer has there; `plain` without
+    TLS, for phones that only show what is displayed.
     """
 
     host: str | None = None
@@ -46,6 +47,7 @@ class Serving:
     demo: bool = False
     goes_on: bool = False
     lan: bool = False
+    plain: bool = False
     operator_lan: bool = False
     certificate: Path | None = None
     key: Path | None = None
@@ -78,12 +80,16 @@ def secured(options: Serving, folder: Path, now: datetime) -> tuple[Access, Cert
         host = options.host or LOOPBACK[0]
         if host not in LOOPBACK:
             raise PipelineError(f"--host {host}: pages are served on this computer alone unless --lan is given; add it")
-        if options.certificate is not None or options.operator_lan:
-            raise PipelineError("--cert, --key and --operator-lan are for a network: add --lan")
+        if options.certificate is not None or options.operator_lan or options.plain:
+            raise PipelineError("--cert, --key, --plain and --operator-lan are for a network: add --lan")
         return Access("http", host, options.port), None
     host = options.host or lan_address()
     if host in LOOPBACK or host in ("0.0.0.0", "::"):  # noqa: S104 - refused
         raise PipelineError(f"--host {host}: with --lan, name one address of this computer in the network")
+    if options.plain:
+        if options.certificate is not None or options.operator_lan:
+            raise PipelineError("--plain serves without TLS: leave out --cert, --key and --operator-lan, or --plain")
+        return Access("http", host, options.port), None
     if options.certificate is not None and options.key is not None:
         certificates = given(options.certificate, options.key, now)
     else:

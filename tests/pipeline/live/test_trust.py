@@ -112,6 +112,25 @@ def test_a_phone_that_trusts_the_authority_joins_and_another_does_not(tmp_path: 
     in_network(tmp_path / "study", made, play)
 
 
+def test_without_tls_a_phone_joins_as_a_display_and_the_operator_stays_here(tmp_path: Path) -> None:
+    access, certificates = secured(Serving(host=_LAN, port=free_port(), lan=True, plain=True), tmp_path, NOW)
+    assert (access.origin, certificates) == (f"http://{_LAN}:{access.port}", None)
+
+    async def play(running: Running) -> None:
+        where = f"ws://{_LAN}:{access.port}/socket"
+        ours: dict[str, Any] = {"origin": access.origin, "local_addr": (_PHONE, 0)}
+        async with websockets.connect(f"{where}/phone", additional_headers=running.headers("phone"), **ours) as phone:
+            assert json.loads(await phone.recv())["type"] == "welcome"
+        async with websockets.connect(
+            f"{where}/operator", additional_headers=running.headers("operator"), **ours
+        ) as page:
+            with pytest.raises(websockets.ConnectionClosed):
+                await page.recv()
+        assert (await running.asks("GET", "/ca.crt"))[0] == 404
+
+    served(tmp_path / "study", play, access=access)
+
+
 @pytest.mark.parametrize("role", ROLES)
 def test_a_role_is_had_by_its_own_token_and_from_where_it_may_be(tmp_path: Path, made: Certificates, role: str) -> None:
     assert made.authority is not None
@@ -229,6 +248,8 @@ def test_what_stands_in_the_way_of_a_network_is_said_with_its_remedy(
     assert "certificates are made for addresses only" in said(host="lab.example", lan=True)
     assert "give both" in said(lan=True, certificate=made.certificate)
     assert "add --lan" in said(operator_lan=True)
+    assert "add --lan" in said(plain=True)
+    assert "leave out --cert, --key and --operator-lan" in said(host=_LAN, lan=True, plain=True, operator_lan=True)
     own: dict[str, Any] = {"host": _LAN, "lan": True, "certificate": made.certificate}
     assert "has ended on" in said(NOW + timedelta(days=400), **own, key=made.key)
     assert "is not the key of" in said(**own, key=made.key.with_name("authority.key"))
