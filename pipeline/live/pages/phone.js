@@ -220,6 +220,7 @@ function show() {
   at("message").textContent = words(state, ready, waits);
   at("message").classList.toggle("count", state === "countdown");
   at("badge").textContent = phone.task ? badge(state, target) : "";
+  view.placeMessage();
 }
 
 function words(state, ready, waits) {

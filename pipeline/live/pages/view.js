@@ -5,6 +5,7 @@ import { draw, placed } from "./picture.js";
 import { buttonSize } from "./press.js";
 
 const BUTTON_MARGIN_PX = 16;
+const BADGE_PX = 40; // the line at the top that says which task it is
 const COLOURS = ["ink", "soft", "paper", "beyond", "path", "target"];
 
 export class View {
@@ -35,9 +36,17 @@ export class View {
     const largest = task.window === "true_size" ? (pxPerMm() ?? Infinity) : Infinity;
     const box = placed(task, width, height, { side, room: size + BUTTON_MARGIN_PX, largest });
     Object.assign(this.button.style, { width: `${size}px`, height: `${size}px` });
-    Object.assign(this.message.style, { left: `${box.left + box.width / 2}px`, top: `${box.top + box.height / 2}px` });
     this.stage.classList.toggle("left", side === "left");
     this.box = box;
+    this.placeMessage();
+  }
+
+  // In the middle of the window, or as far below as its words need: upright, the window is low and some sentences are long.
+  placeMessage() {
+    if (!this.box) return;
+    const { left, top, width, height } = this.box;
+    const highest = BADGE_PX + this.message.offsetHeight / 2;
+    Object.assign(this.message.style, { left: `${left + width / 2}px`, top: `${Math.max(top + height / 2, highest)}px` });
   }
 
   // Whether there was a place to draw on.

@@ -13,6 +13,18 @@ from tests.browser.live.server import LiveServer, until
 
 SIZES = {390: 844, 854: 480, 1440: 900}
 _CHECKS = (Path(__file__).parent.parent / "checks.js").read_text(encoding="utf-8")
+# The phone's stage does not scroll, so what does not fit on it is lost.
+_CUT_OFF = """
+[...document.querySelectorAll("#stage p, #stage button")].filter((it) => it.checkVisibility()).flatMap((it, _, all) => {
+  const box = it.getBoundingClientRect();
+  const name = it.id || it.tagName;
+  const cut = box.top < 0 || box.left < 0 || box.bottom > innerHeight || box.right > innerWidth;
+  const over = all.filter((other) => {
+    const its = other.getBoundingClientRect();
+    return it !== other && its.left < box.right && box.left < its.right && its.top < box.bottom && box.top < its.bottom;
+  });
+  return [...(cut ? [`${name} is cut off`] : []), ...over.map((other) => `${name} lies over ${other.id}`)];
+})"""
 Scene = Callable[[Tab, LiveServer], None]
 
 
@@ -142,6 +154,7 @@ def _of_page(tab: Tab, server: LiveServer, checker: str | None) -> Iterator[str]
     # By the protocol, since the page's own policy lets no script in that is not its own.
     tab.evaluate(f"{_CHECKS};0")
     yield from tab.evaluate("overflowFaults()")
+    yield from tab.evaluate(_CUT_OFF)
     if checker is not None:
         tab.evaluate(f"{checker};0")
         yield from tab.evaluate("accessibilityFaults()")
