@@ -125,7 +125,7 @@ def _turned(imu: Imu, rows: Sequence[Row]) -> Iterator[Light]:
     own = np.array([row.turned_xyzw or (np.nan,) * 4 for row in rows])
     if len(own) != len(imu.force_m_s2):
         return
-    by_sender = replace(imu, orientation_xyzw=own)
+    by_sender = replace(imu, orientation=own)
     finding = next(gyroscope(Recorded(imus=(by_sender,))), None)
     if finding is None:
         return

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+import mmap
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
 
 Array = np.ndarray[Any, Any]
 
+_SPILLED = 2**18  # rows that wait in memory to be written
+_AT_ONCE = 2**16
 _MORE = 16  # a full array grows by one in so many rows
 
 
@@ -38,6 +44,67 @@ class Growing:
     def _resize(self, count: int) -> None:
         # Nobody else has seen the array yet, which is what the check of references would find out.
         self._rows.resize((count, *self._rows.shape[1:]), refcheck=False)
+
+
+class Spilling(Growing):
+    """The same in a file without a name in `folder`, once there are many; None: always in memory.
+
+    `whole` then is mapped from the file, and takes memory where it is looked at, until `let_go`.
+    """
+
+    def __init__(self, folder: Path | None, kind: npt.DTypeLike, *width: int) -> None:
+        super().__init__(kind, *width)
+        self._folder = folder
+        self._file: IO[bytes] | None = None
+        self._written = 0
+
+    def __len__(self) -> int:
+        return self._written + super().__len__()
+
+    def add(self, rows: Array) -> None:
+        """Copy rows to the end."""
+        super().add(rows)
+        if self._folder is not None and super().__len__() > _SPILLED:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 - `whole` closes it
+            self._file.write(self._rows[: self._count].data)
+            self._written, self._count = len(self), 0
+
+    def whole(self) -> Array:
+        """All rows so far. Nothing may be added to them any more."""
+        if self._file is None:
+            return super().whole()
+        count = len(self)
+        with self._file as file:
+            file.write(self._rows[: self._count].data)
+            file.flush()
+            shape = (count, *self._rows.shape[1:])
+            self._rows = self._rows[:0]
+            return np.memmap(file, self._rows.dtype, "r", shape=shape)
+
+
+def let_go(rows: Array) -> None:
+    """Rows that are mapped from a file, or a view of them, take no memory until they are looked at again."""
+    mapped = getattr(rows, "_mmap", None)
+    if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
+        mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def in_memory(rows: Array) -> Array:
+    """The rows themselves, or a copy where they are mapped from a file."""
+    if getattr(rows, "_mmap", None) is None:
+        return rows
+    found = np.empty(rows.shape, rows.dtype)
+    for part in parts_of(len(rows)):
+        found[part] = rows[part]
+        let_go(rows)
+    return found
+
+
+def parts_of(count: int) -> Iterator[slice]:
+    """Slices of so many rows, some at a time."""
+    for begin in range(0, count, _AT_ONCE):
+        yield slice(begin, begin + _AT_ONCE)
 
 
 class MostlyAlike:

@@ -13,10 +13,11 @@ from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError, SessionError, did_you_mean
 from pipeline.sessions.checks import check_rows
 from pipeline.sessions.checks.of_log import of_log
+from pipeline.sessions.growing import let_go, parts_of
 from pipeline.sessions.logs import read_logs
 from pipeline.sessions.logs.log import IntArray, Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
-from pipeline.sessions.usable import usable, within_a_day
+from pipeline.sessions.usable import finite, usable, within_a_day
 from pipeline.sessions.wanted import of_events, of_stream, wanted_by
 from pipeline.study.memory import free_bytes, shortage
 from pipeline.study.pseudonyms import SOMEONE_ELSE, Pseudonyms
@@ -40,7 +41,7 @@ def run(work: Work) -> Outcome:
     """One session's positions, imu, events, quality and checks; SessionError with the reason if it cannot be used."""
     study, session = work.study, work.session
     _require_memory(session)
-    limits = Limits(study.log_limits.unpacked_mib * 2**20, study.log_limits.messages)
+    limits = Limits(study.log_limits.unpacked_mib * 2**20, study.log_limits.messages, work.out)
     log = read_logs(session.files, wanted_by(study), limits)
     participant, condition = _participant_and_condition(session, log, study, work.pseudonyms)
     in_part = list(log.faults)
@@ -178,8 +179,8 @@ def _nearest(topic: str, log: Log) -> str:
 def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
     """The readings that are finite and of the same day as the others, and notes about those left out or late."""
     width = 3 if stream.kind != "acceleration" else 6
-    finite = np.isfinite(readings.values[:, :width]).all(axis=1)
-    notes = [] if finite.all() else [f"{int((~finite).sum())} samples left out: NaN or infinite"]
+    known = finite(readings.values, width)
+    notes = [] if known.all() else [f"{int((~known).sum())} samples left out: NaN or infinite"]
     in_time = np.ones(readings.read, bool)
     for times in (readings.stamp_ns, readings.arrival_ns):
         in_time &= within_a_day(times)
@@ -188,7 +189,7 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
     late_s = float(np.median(readings.arrival_ns - readings.stamp_ns)) * S_PER_NS
     if stream.kind in _NEEDED and abs(late_s) > _SAME_CLOCK_S:
         raise SessionError(f"topic {stream.topic}: {_of_two_clocks(readings, late_s)}")
-    keep = finite & in_time
+    keep = known & in_time
     delay_s = (readings.arrival_ns - readings.stamp_ns)[keep] * S_PER_NS
     delay_s += stream.latency_s if stream.stamped_on_arrival else 0.0
     if np.any(delay_s > _LATE_S):
@@ -196,7 +197,10 @@ def _usable(readings: Readings, stream: Stream) -> tuple[Readings, list[str]]:
             f"{int((delay_s > _LATE_S).sum())} samples arrive over {_LATE_S:g} s late, and may come too late to fuse"
         )
     if stream.kind == "acceleration" and keep.any():
-        unknown = int(np.isnan(readings.values[keep, 6]).sum())
+        unknown = 0
+        for part in parts_of(len(keep)):
+            unknown += int(np.isnan(readings.values[part, 6][keep[part]]).sum())
+            let_go(readings.values)
         if unknown:
             notes.append(f"{unknown} samples without an orientation in the log")
     return usable(readings, keep), notes
@@ -217,6 +221,7 @@ def _parts(session: str, name: str, stream: Stream, readings: Readings) -> Itera
     order = np.lexsort((readings.stamp_ns, readings.arrival_ns))
     for begin in range(0, max(len(order), 1), tables.ROWS_AT_ONCE):
         yield _part(session, name, stream, readings, order[begin : begin + tables.ROWS_AT_ONCE])
+        let_go(readings.values)
 
 
 def _part(session: str, name: str, stream: Stream, readings: Readings, which: IntArray) -> pa.Table:

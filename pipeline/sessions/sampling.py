@@ -37,8 +37,12 @@ class Sampling(NamedTuple):
 
 def sampling(stamp_ns: IntArray) -> Sampling:
     """What stamps (n,), in any order, say of missing samples."""
-    stamps, count = np.unique(stamp_ns, return_counts=True)
-    steps = np.diff(stamps).astype(np.float64) * S_PER_NS
+    stamps, doubled = stamp_ns, np.zeros(0, np.int64)
+    if (stamp_ns[1:] <= stamp_ns[:-1]).any():
+        stamps, count = np.unique(stamp_ns, return_counts=True)
+        doubled = count - 1
+    steps = np.diff(stamps).astype(np.float64)
+    steps *= S_PER_NS
     if not len(steps):
         return Sampling(None, len(stamp_ns), "have a single stamp")
     usual = float(np.median(steps))
@@ -49,7 +53,8 @@ def sampling(stamp_ns: IntArray) -> Sampling:
             return Sampling(None, len(stamp_ns), "come in bursts")
         if float(np.mean(np.abs(units - np.round(units)) > _OFF)) > _IRREGULAR:
             return Sampling(None, len(stamp_ns), "are irregular")
-    doubled = count - 1
     gaps = np.where(units > 1.5, np.round(units) - 1, 0)
-    missing = int(np.sum(np.maximum(gaps - doubled[:-1] - doubled[1:], 0)))
+    if len(doubled):
+        gaps = np.maximum(gaps - doubled[:-1] - doubled[1:], 0)
+    missing = int(np.sum(gaps))
     return Sampling(missing, missing + len(stamp_ns))

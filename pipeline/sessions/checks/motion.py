@@ -32,6 +32,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.sessions.growing import parts_of
 from pipeline.statistics.arrays import FloatArray
 
 LAG_RANGE_S = 0.6
@@ -188,20 +189,33 @@ def _averaged(grid: FloatArray, time: FloatArray, value: FloatArray) -> FloatArr
 
     Of the straight lines between readings, by differences of their running integral.
     """
-    lasting = np.diff(time)[:, None]
-    area = np.zeros(value.shape)
-    under = value[1:] + value[:-1]
-    under *= lasting
-    under /= 2
-    np.cumsum(under, axis=0, out=area[1:])
     edges = np.append(grid - _STEP_S / 2, grid[-1] + _STEP_S / 2)
+    needed = int(np.searchsorted(time, edges[-1], side="right")) + 2  # of a long session the grid covers a part
+    time, value = time[:needed], value[:needed]
+    area = _area(time, value)
     at = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, len(time) - 2)
-    since = np.clip((edges - time[at])[:, None], 0.0, lasting[at])
-    slope = (value[at + 1] - value[at]) / lasting[at]
+    lasting = (time[at + 1] - time[at])[:, None]
+    since = np.clip((edges - time[at])[:, None], 0.0, lasting)
+    slope = (value[at + 1] - value[at]) / lasting
     inside = area[at] + since * (value[at] + slope * since / 2)
     width = np.diff(np.clip(edges, time[0], time[-1]))[:, None]
     found: FloatArray = np.diff(inside, axis=0) / np.maximum(width, _STEP_S / 4)
     return found
+
+
+def _area(time: FloatArray, value: FloatArray) -> FloatArray:
+    """The integral (n, d) up to each reading, some readings at a time."""
+    area = np.zeros(value.shape)
+    for part in parts_of(len(time) - 1):
+        end = slice(part.start + 1, part.stop + 1)
+        own = area[end]
+        np.add(value[end], value[part][: len(own)], out=own)
+        own *= (time[end] - time[part][: len(own)])[:, None]
+        own /= 2
+        if part.start:
+            own[0] += area[part.start]
+        np.cumsum(own, axis=0, out=own)
+    return area
 
 
 def _filtered(value: FloatArray, order: int) -> FloatArray:

@@ -22,6 +22,8 @@ from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.force import LARGE_M_S2
 from pipeline.sessions.checks.motion import rising
 from pipeline.sessions.checks.recorded import Recorded, Times
+from pipeline.sessions.growing import parts_of
+from pipeline.sessions.logs.log import BoolArray
 from pipeline.statistics.arrays import FloatArray
 
 TRACKER_NOISE, IMU_NOISE = "tracker noise", "accelerometer noise"
@@ -78,7 +80,7 @@ def accelerometer_noise(recorded: Recorded) -> Iterator[Finding]:
     for imu in recorded.imus:
         if imu.noise_sd_mm_s2 is None:
             continue
-        measured = noise_sd(imu.times, imu.force_m_s2 * 1e3)
+        measured = noise_sd(imu.times, imu.force_m_s2, 1e3)
         if measured is None:
             continue
         ratio = measured / imu.noise_sd_mm_s2
@@ -101,19 +103,21 @@ def _other_unit(recorded: Recorded) -> bool:
     return any(one is not None and one.scale.low > _UNIT for one in compared)
 
 
-def noise_sd(times: Times, value: FloatArray) -> float | None:
+def noise_sd(times: Times, value: FloatArray, scale: float = 1.0) -> float | None:
     """SD of the white noise per axis, from the quietest quarter of the readings (n, d); None with fewer than 100.
 
-    Repeated and unevenly spaced readings are left out.
+    Repeated and unevenly spaced readings are left out. A figure is so many times its value.
     """
-    found = _quiet(times, value, _LIKE_NOISE)
+    found = _quiet(times, value, _LIKE_NOISE, scale)
     return None if found is None else found[0]
 
 
-def _quiet(times: Times, value: FloatArray, like_noise: float) -> tuple[float, int] | None:
+def _quiet(times: Times, value: FloatArray, like_noise: float, scale: float = 1.0) -> tuple[float, int] | None:
     """The same SD, and how many windows are enough like noise; the quietest quarter is taken of these."""
     stamp_s, value = rising(times.stamp_s, value)
-    fresh = np.concatenate([[True], np.any(np.diff(value, axis=0) != 0, axis=1)])
+    fresh = np.ones(len(value), bool)
+    for part in parts_of(len(value) - 1):
+        fresh[1:][part] = np.any(_differences(value, part, 1, scale) != 0, axis=1)
     if not fresh.all():
         stamp_s, value = stamp_s[fresh], value[fresh]
     if len(stamp_s) < 100:
@@ -122,24 +126,42 @@ def _quiet(times: Times, value: FloatArray, like_noise: float) -> tuple[float, i
     usual = float(np.median(steps))
     even = np.abs(steps - usual) < _EVEN * usual
     sound = even[:-2] & even[1:-1] & even[2:]
-    moved = np.diff(value, axis=0)
-    left = np.diff(moved, 2, axis=0)[sound]
+    del stamp_s, steps
+    left = _of_sound(value, sound, 3, scale)
     left /= _SCALE
-    moved = moved[1:-1][sound]
     alive = np.any(left != 0, axis=0)  # an axis that is constant has no noise to be judged
     count = len(left) // _WINDOW
     if count < 3 or not alive.any():
         return None
     variance = _by_window(left if alive.all() else left[:, alive], count)
-    moved = _by_window(moved if alive.all() else moved[:, alive], count)
-    variance = variance[variance > like_noise**2 * moved]
+    del left
+    moved = _of_sound(value, sound, 1, scale)
+    variance = variance[variance > like_noise**2 * _by_window(moved if alive.all() else moved[:, alive], count)]
     if len(variance) < 3:
         return None
     quiet = np.sort(variance)[: max(2, round(_QUIET * len(variance)))]
     return float(np.sqrt(np.mean(quiet))) / _QUIETEST[int(alive.sum()) - 1], len(variance)
 
 
+def _of_sound(value: FloatArray, sound: BoolArray, order: int, scale: float) -> FloatArray:
+    """The third differences of four readings each, or the middle one of their steps, where those are `sound`."""
+    found, end = np.empty((int(sound.sum()), value.shape[1])), 0
+    for part in parts_of(len(sound)):
+        middle = slice(part.start + (3 - order) // 2, part.stop + (3 - order) // 2)
+        own = _differences(value, middle, order, scale)[: len(sound) - part.start][sound[part]]
+        found[end : end + len(own)] = own
+        end += len(own)
+    return found
+
+
+def _differences(value: FloatArray, rows: slice, order: int, scale: float) -> FloatArray:
+    """Those differences of the figures that begin at some rows."""
+    return np.diff(value[rows.start : rows.stop + order] * scale, order, axis=0)
+
+
 def _by_window(values: FloatArray, count: int) -> FloatArray:
     """The mean square (count,) of values (n, d) over each so many readings."""
-    found: FloatArray = np.mean(values[: count * _WINDOW].reshape(count, -1) ** 2, axis=1)
+    windows, found = values[: count * _WINDOW].reshape(count, -1), np.empty(count)
+    for part in parts_of(count):
+        found[part] = np.mean(windows[part] ** 2, axis=1)
     return found

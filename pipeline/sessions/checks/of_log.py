@@ -8,8 +8,9 @@ import numpy as np
 
 from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
 from pipeline.sessions.checks.turns import turned
+from pipeline.sessions.growing import in_memory
 from pipeline.sessions.logs.log import BoolArray, Log, Readings
-from pipeline.sessions.usable import usable, within_a_day
+from pipeline.sessions.usable import finite, usable, within_a_day
 from pipeline.sessions.wanted import of_events, of_stream
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study.settings import Study
@@ -108,7 +109,7 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
     return Imu(
         name,
         times(kept, origin_ns, stream, readings.read - kept.read),
-        kept.values[:, :3] if stream is None else turned(_unit(stream.mounting_xyzw), kept.values[:, :3]),
+        _in_body(kept.values[:, :3], stream),
         kept.values[:, 3:6],
         kept.values[:, 6:10],
         of(claims.orientation_length, np.nan),
@@ -121,6 +122,12 @@ def imu(name: str, readings: Readings, origin_ns: int, stream: AccelerationStrea
     )
 
 
+def _in_body(force_m_s2: FloatArray, stream: AccelerationStream | None) -> FloatArray:
+    """The specific force (n, 3) in the frame of the body, as far as study.yaml states the mounting."""
+    force_m_s2 = in_memory(force_m_s2)
+    return force_m_s2 if stream is None else turned(_unit(stream.mounting_xyzw), force_m_s2)
+
+
 def _unit(quaternion_xyzw: tuple[float, float, float, float]) -> FloatArray:
     """A rotation of study.yaml as a unit quaternion (1, 4); there it may have any length."""
     found: FloatArray = np.array([quaternion_xyzw]) / np.linalg.norm(quaternion_xyzw)
@@ -129,7 +136,7 @@ def _unit(quaternion_xyzw: tuple[float, float, float, float]) -> FloatArray:
 
 def _sound(readings: Readings, figures: int) -> BoolArray:
     """Which readings (n,) are usable: their first `figures` values are finite, and their times within a day of most."""
-    found: BoolArray = np.all(np.isfinite(readings.values[:, :figures]), axis=1)
+    found = finite(readings.values, figures)
     for one in (readings.stamp_ns, readings.arrival_ns):
         found &= within_a_day(one)
     return found

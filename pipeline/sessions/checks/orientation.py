@@ -143,9 +143,12 @@ def _turning(imu: Imu) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatA
 
     And the orientations (k, 4) at both ends of each span, with its length (k,) in s.
     """
-    rows = np.flatnonzero(imu.oriented)
-    order = rows[np.argsort(imu.times.stamp_s[rows], kind="stable")]
-    time = imu.times.stamp_s[order]
+    time, gyroscope = imu.times.stamp_s, imu.gyroscope_rad_s
+    order = None
+    if not imu.oriented.all() or (time[1:] < time[:-1]).any():
+        rows = np.flatnonzero(imu.oriented)
+        order = rows[np.argsort(time[rows], kind="stable")]
+        time, gyroscope = time[order], gyroscope[order]
     if time[-1] - time[0] < 2.0:
         return None
     starts = np.searchsorted(time, np.arange(time[0], time[-1], _SPAN_S))
@@ -153,11 +156,15 @@ def _turning(imu: Imu) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatA
     first, last = starts[:-1], starts[1:]
     span = time[last] - time[first]
     whole = (span > _SPAN_S / 2) & (span < 2 * _SPAN_S)
-    before, after = (imu.orientation_xyzw[order[at[whole]]] for at in (first, last))
-    total = np.vstack([np.zeros(3), np.cumsum(imu.gyroscope_rad_s[order], axis=0)])
+    total = np.zeros((len(time) + 1, 3))
+    np.cumsum(gyroscope, axis=0, out=total[1:])
+    del gyroscope
     measured = (total[last] - total[first])[whole] / (last - first)[whole, None]
+    del total
     if whole.sum() < 10:
         return None
+    turned = imu.orientation_xyzw
+    before, after = (turned[at[whole] if order is None else order[at[whole]]] for at in (first, last))
     spans = before, after, span[whole]
     return rotation_vector(before, after) / span[whole, None], measured, spans
 

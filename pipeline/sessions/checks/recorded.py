@@ -12,8 +12,10 @@ import numpy as np
 from pipeline.sessions.checks.motion import Compared, compare, compare_positions, distant_lag_s
 from pipeline.sessions.checks.tilt import upright, with_z_up
 from pipeline.sessions.checks.turns import turned
+from pipeline.sessions.growing import in_memory, let_go, parts_of
 from pipeline.sessions.logs.log import BoolArray, IntArray
-from pipeline.statistics.arrays import FloatArray
+from pipeline.sessions.usable import finite
+from pipeline.statistics.arrays import FloatArray, run_of
 from pipeline.tables.columns import S_PER_NS
 
 _MOSTLY = 0.5  # of the readings: with fewer the log's orientations are left aside
@@ -33,23 +35,28 @@ class Times:
     late_s: float = 0.0
     left_out: int = 0
 
-    @cached_property
+    @property
     def stamp_s(self) -> FloatArray:
         """The stamps in s since the session's origin."""
-        found: FloatArray = (self.stamp_ns - self.origin_ns).astype(np.float64) * S_PER_NS
-        return found
+        return _seconds(self.stamp_ns - self.origin_ns)
 
-    @cached_property
+    @property
     def arrival_s(self) -> FloatArray:
         """The arrivals in s since the session's origin."""
-        found: FloatArray = (self.arrival_ns - self.origin_ns).astype(np.float64) * S_PER_NS
-        return found
+        return _seconds(self.arrival_ns - self.origin_ns)
 
-    @cached_property
+    @property
     def steps_s(self) -> FloatArray:
         """The steps between sorted stamps, those of length zero too."""
-        found: FloatArray = np.diff(np.sort(self.stamp_ns)).astype(np.float64) * S_PER_NS
-        return found
+        stamp_ns = self.stamp_ns
+        return _seconds(np.diff(stamp_ns if (stamp_ns[1:] >= stamp_ns[:-1]).all() else np.sort(stamp_ns)))
+
+
+def _seconds(ns: IntArray) -> FloatArray:
+    """Not kept by those who ask: of a long session each of them takes as much memory as the stamps."""
+    found = ns.astype(np.float64)
+    found *= S_PER_NS
+    return found
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,8 @@ class Positions:
 class Imu:
     """Specific force (n, 3) in m/s², angular velocity (n, 3) in rad/s, orientation (n, 4) or NaN where unknown.
 
+    The last two may be mapped from a file; `gyroscope_rad_s` and `orientation_xyzw` are in memory while they are used.
+
     `orientation_length` (n,) is the quaternion's own, NaN where the log says it is unknown; `force_disclaimed` and
     `gyroscope_disclaimed` (n,) say where a covariance of −1 tells the reader to disregard the values.
     `calibrated_later`: how it is mounted is learned from the session itself.
@@ -84,8 +93,8 @@ class Imu:
     name: str
     times: Times
     force_m_s2: FloatArray
-    gyroscope_rad_s: FloatArray
-    orientation_xyzw: FloatArray
+    gyroscope: FloatArray
+    orientation: FloatArray
     orientation_length: FloatArray
     force_disclaimed: BoolArray
     gyroscope_disclaimed: BoolArray
@@ -94,18 +103,31 @@ class Imu:
     calibrated_later: bool = False
     frames: Frames = Frames()
 
+    @property
+    def gyroscope_rad_s(self) -> FloatArray:
+        """The angular velocity (n, 3)."""
+        return in_memory(self.gyroscope)
+
+    @property
+    def orientation_xyzw(self) -> FloatArray:
+        """The orientation (n, 4)."""
+        return in_memory(self.orientation)
+
     @cached_property
     def oriented(self) -> BoolArray:
         """Where the orientation is known (n,)."""
-        found: BoolArray = np.all(np.isfinite(self.orientation_xyzw), axis=1)
-        return found
+        return finite(self.orientation, 4)
 
-    @cached_property
+    @property
     def upright_m_s2(self) -> FloatArray:
         """The specific force where the orientation is known (k, 3), turned by it into the tracker's frame."""
-        if self.oriented.all():
-            return turned(self.orientation_xyzw, self.force_m_s2)
-        return turned(self.orientation_xyzw[self.oriented], self.force_m_s2[self.oriented])
+        if not self.oriented.all():
+            return turned(self.orientation_xyzw[self.oriented], self.force_m_s2[self.oriented])
+        found = np.empty(self.force_m_s2.shape)
+        for part in parts_of(len(found)):
+            found[part] = turned(self.orientation[part], self.force_m_s2[part])
+            let_go(self.orientation)
+        return found
 
 
 @dataclass(frozen=True)
@@ -180,6 +202,8 @@ class Recorded:
     def _of_both(tracker: Positions, imu: Imu) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Stamps and positions of the tracker, stamps and accelerations in mm/s² of the phone, in one frame."""
         if imu.oriented.mean() >= _MOSTLY:
-            return tracker.times.stamp_s, tracker.value_mm, imu.times.stamp_s[imu.oriented], imu.upright_m_s2 * 1e3
+            force, time_s = imu.upright_m_s2, imu.times.stamp_s[run_of(imu.oriented)]
+            force *= 1e3
+            return tracker.times.stamp_s, tracker.value_mm, time_s, force
         time_s, force = upright(imu.times.stamp_s, imu.force_m_s2, imu.gyroscope_rad_s)
         return tracker.times.stamp_s, with_z_up(tracker.value_mm, imu.gravity_mm_s2), time_s, force * 1e3

@@ -111,9 +111,11 @@ def frozen(recorded: Recorded) -> Iterator[Finding]:
     for imu in recorded.imus:
         if len(imu.force_m_s2) < 20 or not np.any(imu.force_m_s2):
             continue
-        order = np.argsort(imu.times.stamp_ns, kind="stable")
-        time, force = imu.times.stamp_s[order], imu.force_m_s2[order]
-        same = np.all(np.diff(force, axis=0) == 0.0, axis=1) & (np.diff(time) > 0)
+        time, force = imu.times.stamp_s, imu.force_m_s2
+        if (time[1:] < time[:-1]).any():
+            order = np.argsort(imu.times.stamp_ns, kind="stable")
+            time, force = time[order], force[order]
+        same = np.all(force[1:] == force[:-1], axis=1) & (time[1:] > time[:-1])
         longest_s, share = _longest(time, same), float(same.mean())
         found, expected = f"{share:.1%}, at most {longest_s:.2g} s", f"at most {_FROZEN_S:g} s"
         if longest_s <= _FROZEN_S and share < 0.5:

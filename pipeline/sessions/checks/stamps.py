@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Recorded, Times
+from pipeline.sessions.growing import parts_of
 from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.sampling import BUNCHED
 from pipeline.statistics.arrays import FloatArray
@@ -189,14 +190,18 @@ def _parted(times: Times) -> tuple[float, float] | None:
     A busy network delays some messages, but a clock that was set shifts all of them, so the delay's range is compared.
     """
     order = np.argsort(times.arrival_ns, kind="stable")
-    delay = (times.arrival_s - times.stamp_s)[order]
+    delay = times.arrival_s
+    delay -= times.stamp_s
+    delay = delay[order]
     if len(delay) < 4 * _AROUND:
         return None
-    low, high = _extremes(delay)
-    before_low, before_high, after_low, after_high = low[:-_AROUND], high[:-_AROUND], low[_AROUND:], high[_AROUND:]
-    gap = np.maximum(after_low - before_high, before_low - after_high)
-    at = int(np.argmax(gap))
-    if gap[at] < _STEP_S:
+    at, gap_s = 0, -np.inf
+    for part in parts_of(len(delay) - 2 * _AROUND + 1):
+        gap = _gaps(delay[part.start : part.stop + 2 * _AROUND - 1])
+        largest = int(np.argmax(gap))
+        if gap[largest] > gap_s:
+            at, gap_s = part.start + largest, gap[largest]
+    if gap_s < _STEP_S:
         return None
     split = at + _AROUND
     before, after = np.median(delay[:split]), np.median(delay[split:])
@@ -204,6 +209,14 @@ def _parted(times: Times) -> tuple[float, float] | None:
     if abs(by_s) < _STEP_S:
         return None
     return float(times.arrival_s[order][split] - times.arrival_s.min()), by_s
+
+
+def _gaps(delay: FloatArray) -> FloatArray:
+    """By how much 15 values and the 15 that follow them are apart; below 0 where they overlap."""
+    low, high = _extremes(delay)
+    before_low, before_high, after_low, after_high = low[:-_AROUND], high[:-_AROUND], low[_AROUND:], high[_AROUND:]
+    found: FloatArray = np.maximum(after_low - before_high, before_low - after_high)
+    return found
 
 
 def _extremes(delay: FloatArray) -> tuple[FloatArray, FloatArray]:

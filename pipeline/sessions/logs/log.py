@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -40,10 +41,14 @@ class Source:
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a log may hold: bytes that it unpacks to, and messages. A log far larger in itself may hold more."""
+    """How much a log may hold: bytes that it unpacks to, and messages. A log far larger in itself may hold more.
+
+    What a phone measured in a long one is kept in `folder`, under no name, while it is read; in memory without one.
+    """
 
     unpacked_bytes: int = 64 * 2**20
     messages: int = 500_000
+    folder: Path | None = None
 
 
 DEFAULT_LIMITS = Limits()

@@ -17,7 +17,7 @@ def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) 
     """The wanted topics of a bag, decoded. SessionError for a file that is none, or that holds too much."""
     with needs("ros", "bags of ROS 1"):
         from rosbags.rosbag1 import Reader, ReaderError
-    takers = takers_of(wanted)
+    takers = takers_of(wanted, limits)
     if not path.stat().st_size:
         raise SessionError("the file is empty")
     reader = Reader(path)

@@ -23,7 +23,7 @@ _MARK = b"SQLite format 3\0"
 
 def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) -> Log:
     """The wanted topics of a bag, decoded. SessionError for a file that is none, or that holds too much."""
-    takers = takers_of(wanted)
+    takers = takers_of(wanted, limits)
     with _sqlite_file(path, limits) as file, closing(_opened(file)) as bag:
         try:
             topics = bag.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id").fetchall()

@@ -25,7 +25,7 @@ def read(path: Path, wanted: Iterable[Wanted], limits: Limits = DEFAULT_LIMITS) 
 
     Raises SessionError for a file that is no log, is a decompression bomb, or contradicts itself.
     """
-    takers = takers_of(wanted)
+    takers = takers_of(wanted, limits)
     return log_of(walk_log(path, takers or None, limits), takers)
 
 
@@ -33,11 +33,11 @@ Takers = Mapping[str, Mapping[str, Decoding]]
 """What decodes each wanted topic, by topic and `Wanted.key`."""
 
 
-def takers_of(wanted: Iterable[Wanted]) -> Takers:
+def takers_of(wanted: Iterable[Wanted], limits: Limits) -> Takers:
     """What decodes the wanted topics while a log is read."""
     takers: dict[str, dict[str, Decoding]] = {}
     for want in wanted:
-        takers.setdefault(want.topic, {})[want.key] = Decoding(want.content, want.source)
+        takers.setdefault(want.topic, {})[want.key] = Decoding(want.content, want.source, limits.folder)
     return takers
 
 

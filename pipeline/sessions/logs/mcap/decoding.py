@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from pipeline.errors import SessionError
-from pipeline.sessions.growing import Growing
+from pipeline.sessions.growing import Growing, Spilling
 from pipeline.sessions.logs.log import USUAL, Content, IntArray, Readings, Source
 from pipeline.sessions.logs.mcap.claims import ClaimsSoFar
 from pipeline.sessions.logs.mcap.fields import Fields
@@ -32,10 +33,10 @@ _NOTES = 3  # reasons named one by one; messages with others are counted togethe
 class Decoding:
     """One stream's messages of a topic, decoded as `content`; those that cannot be are counted, with the reasons."""
 
-    def __init__(self, content: Content, source: Source = USUAL) -> None:
+    def __init__(self, content: Content, source: Source = USUAL, folder: Path | None = None) -> None:
         self._content, self._source = content, source
         self._stamp, self._arrival = Growing(np.int64), Growing(np.int64)
-        self._values = Growing(np.float64, _WIDTHS.get(content, 0))
+        self._values = Spilling(folder if content == "acceleration" else None, np.float64, _WIDTHS.get(content, 0))
         self._events: list[Mapping[str, object]] = []
         self._claims = ClaimsSoFar(content)
         self._decoders: Decoders = {}
