@@ -78,7 +78,7 @@ def streams(excerpts: pd.DataFrame) -> Figure:
     return figure
 
 
-def _estimates_words(excerpts: pd.DataFrame, contradicted: str = "") -> Words:
+def _estimates_words(excerpts: pd.DataFrame, contradicted: str = "", order: Sequence[str] = ()) -> Words:
     """Each estimator's error in this stretch, and how often it lies within the stated band.
 
     The smallest comes first, unless `contradicted` says why none is called the best.
@@ -105,20 +105,22 @@ def _estimates_words(excerpts: pd.DataFrame, contradicted: str = "") -> Words:
 
 @drawing(_estimates_words)
 @styled
-def estimates(excerpts: pd.DataFrame, contradicted: str = "") -> Figure:
+def estimates(excerpts: pd.DataFrame, contradicted: str = "", order: Sequence[str] = ()) -> Figure:
     """Each estimator's mean and two SDs (paper, Figs. 7 and 8), and beside it its error if there is a reference.
 
-    `excerpts` has the columns of that table, of one session.
+    `excerpts` has the columns of that table, of one session. `order` is that of all estimators of the study, so that
+    each has the colour that it has in the other figures.
     """
     names = list(dict.fromkeys(excerpts.loc[excerpts["kind"] == "estimate", "name"]))
     reference = _of_kind(excerpts, "reference")
     figure = Figure(figsize=(WIDTH, 0.7 + 1.4 * max(len(names), 1)))
     shared: dict[str, Any] = {"sharex": True, "sharey": "col", "squeeze": False}
     every = figure.subplots(max(len(names), 1), 1 if reference is None else 2, **shared)
-    for index, (estimator, row) in enumerate(zip(names, every, strict=False)):
-        _estimate(row[0], excerpts, estimator, COLOURS[index % _SHADES])
+    for estimator, row in zip(names, every, strict=False):
+        shade = shade_of(estimator, order or names)
+        _estimate(row[0], excerpts, estimator, shade)
         if reference is not None:
-            _error(row[1], excerpts, estimator, COLOURS[index % _SHADES])
+            _error(row[1], excerpts, estimator, shade)
     if reference is not None and names:
         every[0, 1].set_ylim(*_errors_range(excerpts, names))
     _set_range_around(every[0, 0], finite(excerpts.loc[excerpts["kind"] != "acceleration", "value"]))
@@ -126,6 +128,11 @@ def estimates(excerpts: pd.DataFrame, contradicted: str = "") -> Figure:
     for axes in every[-1]:
         axes.set_xlabel(_TIME)
     return figure
+
+
+def shade_of(estimator: str, order: Sequence[str]) -> str:
+    """The colour of an estimator by its place in `order`; never black, which is the reference's."""
+    return COLOURS[order.index(estimator) % _SHADES]
 
 
 def _span(excerpts: pd.DataFrame) -> str:

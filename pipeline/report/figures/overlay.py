@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
-from pipeline.report.figures.excerpts import errors_in
-from pipeline.report.figures.style import BLACK, COLOURS, GREY, as_label, finite, grouped, legend, panels, styled
+from pipeline.report.figures.excerpts import errors_in, shade_of
+from pipeline.report.figures.style import BLACK, GREY, as_label, finite, grouped, legend, panels, styled
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words.numbers import number
 
-_SHADES = (COLOURS[1], COLOURS[0])
 
-
-def _overlay_words(excerpts: pd.DataFrame, positions_only: str, fused: str) -> Words:
+def _overlay_words(excerpts: pd.DataFrame, positions_only: str, fused: str, order: Sequence[str] = ()) -> Words:
     """How far each of the two is off the reference, where there is one."""
     parts = []
     for name in (positions_only, fused):
@@ -27,17 +27,18 @@ def _overlay_words(excerpts: pd.DataFrame, positions_only: str, fused: str) -> W
     below = ", and below each minus the reference" if parts else ""
     return Words(
         f"{positions_only}, of positions alone, and {fused}, which fuses accelerations, on one axis ({where}){below};"
-        f" bands are two stated SDs. Where the hand sets off or turns, what lags is late.{off}",
+        f" bands are two stated SDs. Where the hand sets off or turns, a lag shows as an error.{off}",
         f"Two estimates over time with the tracker's frames{below}: {positions_only} and {fused}.{off}",
     )
 
 
 @drawing(_overlay_words)
 @styled
-def overlay(excerpts: pd.DataFrame, positions_only: str, fused: str) -> Figure:
+def overlay(excerpts: pd.DataFrame, positions_only: str, fused: str, order: Sequence[str] = ()) -> Figure:
     """Two estimators over the same seconds, with bands of two SDs, and their errors if there is a reference.
 
-    `excerpts` has the columns of that table, of one session, with estimates of both names.
+    `excerpts` has the columns of that table, of one session, with estimates of both names. `order` is that of all
+    estimators of the study, for their colours.
     """
     reference = _values(excerpts[excerpts["kind"] == "reference"])
     rows = 2 if len(reference[0]) else 1
@@ -48,7 +49,8 @@ def overlay(excerpts: pd.DataFrame, positions_only: str, fused: str) -> Figure:
         axes[0].plot(*reference, color=BLACK, linewidth=1.1, linestyle=(0, (4, 1.5)), label="reference")
         axes[1].axhline(0, color=BLACK, linewidth=0.8)
         axes[1].set_ylabel("Minus reference\n(mm)")
-    for name, shade in zip((positions_only, fused), _SHADES, strict=True):
+    for name in (positions_only, fused):
+        shade = shade_of(name, order or (fused, positions_only))
         rows_of = excerpts[(excerpts["kind"] == "estimate") & (excerpts["name"] == name)]
         (time, mean), sd = _values(rows_of), rows_of["sd"].to_numpy(np.float64)
         axes[0].fill_between(time, mean - 2 * sd, mean + 2 * sd, color=shade, alpha=0.18, linewidth=0)

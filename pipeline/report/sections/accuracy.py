@@ -76,6 +76,8 @@ def _method(material: Material) -> tuple[str | Strong, ...]:
     listed: list[str | Strong] = []
     for name, settings in material.study.estimators.items():
         alone = "" if name in with_accelerations else ", from the tracker alone"
+        ahead = settings.parameters.get("ahead_s")
+        alone += f", predicting {ahead:g} s ahead" if ahead else ""
         listed += ["; " if listed else "", Strong(name), f" ({estimator_in_words(settings.type)}{alone})"]
     return (
         (
@@ -124,7 +126,7 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         else f"Distance of each estimator from {standard}"
     )
     reading_help = (
-        "Less RMSE and jitter is better, a lag near zero, and a share near 95 % in the interval."
+        "Lower RMSE and jitter are better, a lag near zero, and a share near 95 % in the interval."
         if has_reference
         else "No column says which estimator is best."
     )
@@ -199,10 +201,11 @@ def _session_figures(material: Material) -> list[Block]:
     first = (material.used() or [0])[:1]
     excerpts, curves = (material.table_of(name, first) for name in ("excerpts", "lead_curves"))
     blocks: list[Block] = []
+    order = tuple(material.study.estimators)
     if len(excerpts):
         blocks.append(material.drawn("streams", figures.streams, excerpts))
     if (excerpts["kind"] == "estimate").any():
-        blocks.append(material.drawn("estimates", figures.estimates, excerpts, not_ranked(material)))
+        blocks.append(material.drawn("estimates", figures.estimates, excerpts, not_ranked(material), order))
         blocks += _overlaid(material, excerpts)
     if len(curves):
         drawn = material.drawn("lead", figures.lead, curves, _lags_in(material, str(curves["session"].iloc[0])))
@@ -226,4 +229,4 @@ def _overlaid(material: Material, excerpts: pd.DataFrame) -> list[Block]:
         (alone, both) for alone in positions_only for both in fused if estimators[alone].type == estimators[both].type
     ]
     pairs = alike or [(alone, both) for alone in positions_only[:1] for both in fused[-1:]]
-    return [material.drawn("overlay", figures.overlay, excerpts, *pairs[0])] if pairs else []
+    return [material.drawn("overlay", figures.overlay, excerpts, *pairs[0], tuple(estimators))] if pairs else []
