@@ -42,15 +42,18 @@ def _workload_words(wide: Mapping[str, pd.DataFrame]) -> Words:
 
 
 def _lowest_medians(wide: Mapping[str, pd.DataFrame], conditions: Sequence[str]) -> str:
-    """`The lowest median is under kinect in 1 and under fusion in 4 of 6 scales; the others tie.`"""
+    """`The lowest median is under kinect in 1 and under fusion in 4 of 6 scales; …`."""
     scales_of = dict.fromkeys(conditions, 0)
     for table in wide.values():
         medians = table.median()
         lowest = medians.index[medians == medians.min()]
         if len(lowest) == 1:
             scales_of[str(lowest[0])] += 1
-    counts = listing([f"under {name} in {count}" for name, count in scales_of.items()])
-    ties = "; the others tie" if sum(scales_of.values()) < len(wide) else ""
+    lowest_in = [f"under {name} in {count}" for name, count in scales_of.items() if count]
+    if not lowest_in:
+        return "In every scale the lowest median is that of two conditions or more."
+    counts = listing(lowest_in)
+    ties = "; in the others two or more share it" if sum(scales_of.values()) < len(wide) else ""
     return f"The lowest median is {counts} of {counted(len(wide), 'scale')}{ties}."
 
 

@@ -67,7 +67,7 @@ def _paired_words(wide: pd.DataFrame, measure: str, shares: bool = False) -> Wor
     )
     if draws_within(wide, method):
         legend_text += (
-            f" The arms within are of the {len(complete)} complete participants; they leave out how far people differ,"
+            f" The thick arms are of the {len(complete)} complete participants; they leave out how far people differ,"
             " as paired tests do."
         )
     return Words(head + legend_text, alt)
