@@ -25,7 +25,9 @@ _UNIT = re.compile(r"(?<=\d) (?=(?:%|mm|cm|px|ms|s|Hz)(?!\w))")
 _INTERVAL = re.compile(r"\[[−+]?[\d.][^][, ]*, [−+]?[\d.][^][, ]*\]")  # both bounds stay on one line
 _P_IN_WORDS = (  # not every p, which may be somebody's name of something
     r"p(?= values?\b| adjusted\b| corrected\b| made\b| \((?:Holm|[A-Z])|: (?:not )?adjusted)"
+    r"|p(?= [\w-]+-adjusted| was corrected| of W\b| of the effect|, (?:Greenhouse|Huynh)| need not agree)"
     r"|(?<=adjusted )p(?!\w)|(?<=corrected )p(?!\w)|(?<=Geisser )p(?!\w)|(?<=small )p(?!\w)|(?<=Wilk's )p(?!\w)"
+    r"|(?<=Mauchly's )p(?!\w)"
     r"|(?<=The )p(?= below)|(?<=\. )p(?= is the probability)|(?<=: )p(?= of \d)"
 )
 _SYMBOL = re.compile(

@@ -33,6 +33,11 @@ def marked(text: str) -> str:
         ("W₊ = 59, Greenhouse-Geisser ε = .662", "*W*₊~=~59, Greenhouse-Geisser ε~=~.662"),
         ("lower by 6.10 s, 26.7 %", "lower by 6.10~s, 26.7~%"),
         ("use the Greenhouse-Geisser p.", "use the Greenhouse-Geisser *p*."),
+        (
+            "zeros dropped, p Holm-adjusted. Then p was corrected",
+            "zeros dropped, *p* Holm-adjusted. Then *p* was corrected",
+        ),
+        ("Mauchly's p is small; p of W", "Mauchly's *p* is small; *p* of W"),
         ("n: participants; p: not adjusted; t tests", "*n*: participants; *p*: not adjusted; *t* tests"),
         ("p adjusted", "*p* adjusted"),
         ("p (Holm)", "*p* (Holm)"),
