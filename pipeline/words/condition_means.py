@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pipeline.study.statistical_tests import TESTS, Values
 from pipeline.words.comparison import EFFECTS_OF_CONDITION, Row
 from pipeline.words.names import measure_as_subject, unit_of
-from pipeline.words.numbers import number, percent
+from pipeline.words.numbers import digits_beside, number, percent
 
 
 @dataclass(frozen=True)
@@ -77,5 +77,6 @@ def _unit_of_exposure(row: Row) -> str:
 def _mean_and_sd(described: Row, values: Values = "measurements") -> str:
     if values == "answers":
         return f"{described['condition']}: {percent(described['mean'])}"
-    spread = "" if described["sd"] is None else f", SD = {number(described['sd'])}"
-    return f"{described['condition']}: M = {number(described['mean'])}{spread}"
+    digits = digits_beside(2, described["mean"], described["sd"] or 0)
+    spread = "" if described["sd"] is None else f", SD = {number(described['sd'], digits)}"
+    return f"{described['condition']}: M = {number(described['mean'], digits)}{spread}"

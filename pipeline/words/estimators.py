@@ -28,6 +28,7 @@ _UNITS = (
     ("_mm_per_sqrt_s", "mm/√s"),
     ("_mm2_s5", "mm²/s⁵"),
     ("_mm_s2", "mm/s²"),
+    ("_s2", "s⁻²"),
     ("_mm_s", "mm/s"),
     ("_mm2", "mm²"),
     ("_hz", "Hz"),

@@ -11,6 +11,7 @@ from pipeline.words.names import adjustment_label
 from pipeline.words.numbers import NO_VALUE, fixed_decimals, fraction, interval, number, p_phrase
 
 _LEAST_FACTOR = 0.005  # a smaller Bayes factor is no number with two decimals
+_RANK_SUMS = ("W+", "U")
 _STATISTICS = {"chi2": "χ²", "BF10": "BF₁₀", "W+": "W₊"}
 
 
@@ -58,7 +59,7 @@ def statistic_value(row: Row) -> str:
         return number(value)
     if row["statistic_name"] == "b":
         return f"{value:.0f}, c = {row['details']['c']}"
-    if row["statistic_name"] == "W+":
+    if row["statistic_name"] in _RANK_SUMS:
         return f"{value:.0f}" if float(value).is_integer() else f"{value:.1f}"
     return fixed_decimals(value, 2)
 

@@ -10,6 +10,9 @@ NO_VALUE = "–"
 """What stands for a value that is missing or undefined."""
 
 
+_WHOLE_FROM = 1000  # numbers as large are shown without decimals
+
+
 def number(value: float | None, digits: int = 2) -> str:
     """A number of any size.
 
@@ -21,7 +24,7 @@ def number(value: float | None, digits: int = 2) -> str:
     size = abs(value)
     if size >= 1e15:
         text = f"{value:.{digits}e}"  # a float this large does not hold single units any more
-    elif size >= 1000:
+    elif size >= _WHOLE_FROM:
         text = f"{value:,.0f}".replace(",", THIN_SPACE)
     elif size == 0 or size >= 0.1:
         text = f"{value:.{digits}f}"
@@ -56,9 +59,26 @@ def interval(low: float | None, high: float | None, digits: int = 2) -> str:
     """`[−0.03, 0.85]`, with as many decimals in both bounds; `NO_VALUE` where one is missing."""
     if low is None or high is None:
         return NO_VALUE
+    digits = digits_beside(digits, low, high)
     if max(abs(low), abs(high)) >= 0.1:
         return f"[{fixed_decimals(low, digits)}, {fixed_decimals(high, digits)}]"
     return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def estimate(value: float, low: float | None, high: float | None, unit: str = "", digits: int = 2) -> str:
+    """`11.80 s [4.32, 19.28]`: a value and its interval, or the value alone, with as many decimals in all three.
+
+    Where one of the three is shown as a whole number for its size, so are the others: `−682 mm² [−2 408, 1 044]`.
+    """
+    if low is None or high is None:
+        return f"{number(value, digits)} {unit}".strip()
+    digits = digits_beside(digits, value, low, high)
+    return " ".join(part for part in (number(value, digits), unit, interval(low, high, digits)) if part)
+
+
+def digits_beside(digits: int, *values: float) -> int:
+    """The decimals of numbers side by side: none where one of them is so large that `number` gives it none."""
+    return 0 if any(abs(value) >= _WHOLE_FROM for value in values) else digits
 
 
 def fraction_interval(low: float | None, high: float | None, digits: int = 2) -> str:

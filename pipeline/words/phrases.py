@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from pipeline.words.numbers import number
+
 
 def listing(words: list[str]) -> str:
     """`a, b and c`, of at least one word."""
@@ -12,13 +14,13 @@ def listing(words: list[str]) -> str:
 
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:
-    """`1 session`, `3 sessions`."""
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+    """`1 session`, `3 sessions`, `2 932 selections`."""
+    return f"{number(count, 0)} {noun if count == 1 else plural or noun + 's'}"
 
 
 def all_of(count: int, noun: str) -> str:
-    """`The 1 comparison`, `All 3 comparisons`."""
-    return f"{'The' if count == 1 else 'All'} {counted(count, noun)}"
+    """`The 1 comparison`, `Both comparisons`, `All 3 comparisons`."""
+    return {1: f"The 1 {noun}", 2: f"Both {noun}s"}.get(count, f"All {counted(count, noun)}")
 
 
 def there_were(facts: Mapping[str, Any], who: str = "") -> str:

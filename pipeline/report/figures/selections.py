@@ -51,7 +51,9 @@ def _selection_errors_words(
         lengths = () if ellipse is None else [number(length, 1) for length in ellipse.lengths]
         size = f", ellipse {' × '.join(lengths)} {unit}" if lengths else ""
         people = counted(rows["participant"].nunique(), "participant")
-        parts.append(f"{condition}: n = {len(offsets)}, {people}, mean ({number(x, 1)}, {number(y, 1)}) {unit}{size}")
+        parts.append(
+            f"{condition}: n = {number(len(offsets), 0)}, {people}, mean ({number(x, 1)}, {number(y, 1)}) {unit}{size}"
+        )
     summary = f"{listed(parts)}."
     return Words(
         "Where selections landed relative to their target, which is at zero; the cross is the mean, and the ellipse"
@@ -77,7 +79,7 @@ def selection_errors(
         rows = selections[selections["condition"] == condition]
         offsets = scale * offsets_mm(rows, plane)
         reach = max(reach, _scatter(axes, offsets, (colour(index), marker(index))))
-        axes.set_title(f"{as_label(condition, 80 // across)} (n = {len(offsets)})", fontsize=9)
+        axes.set_title(f"{as_label(condition, 80 // across)} (n = {number(len(offsets), 0)})", fontsize=9)
         axes.axhline(0, color=GREY, linewidth=0.6, zorder=0)
         axes.axvline(0, color=GREY, linewidth=0.6, zorder=0)
         square(axes, plane, unit)

@@ -9,6 +9,7 @@ from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import statistic
 from pipeline.words.names import measure_as_subject, measure_label, short_label
 from pipeline.words.numbers import (
+    estimate,
     fraction,
     fraction_interval,
     interval,
@@ -73,6 +74,7 @@ def test_what_cannot_exceed_one_has_no_leading_zero_and_p_is_never_nought_or_one
         ("F", 5.6e-32, (1.0, 11.0), "F(1, 11) = 0.00"),
         ("W+", 67.5, (None, None), "W₊ = 67.5"),
         ("W+", 60.0, (None, None), "W₊ = 60"),
+        ("U", 112.0, (None, None), "U = 112"),
         ("chi2", 5.2, (2.0, None), "χ²(2) = 5.20"),
         ("t", -0.0123, (None, 14.5), "t(14.50) = −0.01"),
         ("BF10", 0.0421, (None, None), "BF₁₀ = 0.0421"),
@@ -102,6 +104,14 @@ def test_both_bounds_of_an_interval_have_as_many_decimals() -> None:
     assert interval(-0.0287, 0.852) == "[−0.03, 0.85]"
     assert interval(-0.001, 0.85) == "[0.00, 0.85]"
     assert interval(None, 1.0) == "–"
+    assert interval(-2846.2, -373.04) == "[−2\u2009846, −373]"
+
+
+def test_a_value_and_its_interval_have_as_many_decimals() -> None:
+    """Side by side `−682.06 mm²` and `−2 408` would state one of them to a hundredth and the other to a whole."""
+    assert estimate(11.8, 4.319, 19.281, "s") == "11.80 s [4.32, 19.28]"
+    assert estimate(-682.06, -2407.9, 1043.8, "mm²") == "−682 mm² [−2\u2009408, 1\u2009044]"
+    assert estimate(2.083, None, None) == "2.08"
 
 
 def test_names_carry_their_units_and_scales_their_order() -> None:
