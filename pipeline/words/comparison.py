@@ -14,6 +14,9 @@ Row = Mapping[str, Any]
 EFFECTS_OF_CONDITION = ("condition", "treatment")
 """What tests call the effect of the conditions; `treatment` is a crossover's name for it."""
 
+CORRECTED = "with p corrected for sphericity (Greenhouse-Geisser) beside the uncorrected one"
+_CORRECTED_IN_DETAILS = ", uncorrected; sphericity corrections in details"
+
 
 def contrast(row: Row) -> str:
     """What a row compares: a pair of conditions, or an effect over all of them.
@@ -45,6 +48,17 @@ def uses_logarithms(row: Row) -> bool:
     return OF_LOGARITHMS in row["method"]
 
 
+def method_in_words(row: Row) -> str:
+    """How exactly the test was done: `method` without the test's label, which stands beside it.
+
+    Of an ANOVA of repeated measures it says whether p was corrected too, instead of where results.json has that.
+    """
+    method = str(row["method"]).replace(_CORRECTED_IN_DETAILS, "")
+    if method != row["method"] and (row["details"] or {}).get("p_gg") is not None:
+        method += f", {CORRECTED}"
+    return method.removeprefix(f"{test_label(row)}, ")
+
+
 def unadjusted_p(row: Row) -> float | None:
     """The p value before adjustment over a family, but with the Greenhouse-Geisser correction where there is one."""
     corrected_p = (row["details"] or {}).get("p_gg")
@@ -54,6 +68,25 @@ def unadjusted_p(row: Row) -> float | None:
 def decisive_p(row: Row) -> float | None:
     """The p value that decides significance: the adjusted one where the row belongs to a family."""
     return unadjusted_p(row) if row["p_adjusted"] is None else float(row["p_adjusted"])
+
+
+def tested_difference(row: Row) -> tuple[float | None, float | None, float | None]:
+    """The mean difference of a row and its interval, as of `details`; each None where it is not known.
+
+    Where groups of participants are averaged with equal weight, as a mixed ANOVA does, the interval is of that average,
+    and so is the difference here; `mean_difference` is of all participants.
+    """
+    details = row["details"] or {}
+    low, high = details.get("ci_difference") or (None, None)
+    value = row["mean_difference"] if details.get("difference") is None else details["difference"]
+    return value, low, high
+
+
+def shift(row: Row) -> tuple[float, float, float] | None:
+    """Hodges and Lehmann's shift and its interval, of a rank test of two conditions or groups that has one."""
+    details = row["details"] or {}
+    value, bounds = details.get("hodges_lehmann"), details.get("hodges_lehmann_ci")
+    return None if value is None or bounds is None else (value, bounds[0], bounds[1])
 
 
 def no_variance_between_participants(row: Row) -> bool:

@@ -20,14 +20,16 @@ from pipeline.words.comparison import (
     contrast,
     decisive_p,
     no_variance_between_participants,
+    shift,
     test_label,
+    tested_difference,
     uses_logarithms,
 )
 from pipeline.words.condition_means import StudyFacts, means_of_conditions
 from pipeline.words.effect_sizes import effect_size, ratio_to_first
-from pipeline.words.evidence import adjusted_p, evidence, statistic, statistic_value
+from pipeline.words.evidence import adjusted_p, evidence, statistic_value
 from pipeline.words.names import measure_as_subject, unit_of, was
-from pipeline.words.numbers import interval, number, p_phrase, percent
+from pipeline.words.numbers import digits_beside, interval, number, p_phrase, percent
 from pipeline.words.phrases import listing
 
 _BEFORE_INTERVAL = ", 95 % CI "
@@ -104,29 +106,34 @@ def finds_nothing_of_a_pair(row: Row, facts: StudyFacts) -> bool:
     )
 
 
-def no_difference_sentence(rows: Sequence[Row], facts: StudyFacts) -> list[str]:
-    """`Effort did not differ significantly between a and b (…)`, `, or between b and c (…)`: a part for each row.
+def no_difference_sentence(rows: Sequence[Row], facts: StudyFacts) -> tuple[list[str], str]:
+    """`Effort did not differ significantly between a and b`, `, or between a and c`: a part for each row, then its end.
 
-    `rows` are pairs of one measure and test for which `finds_nothing_of_a_pair`.
+    Where these are all pairs of the conditions there is one part, `… between any two conditions`. The end is the
+    evidence they share, ` (Holm-adjusted p ≥ .057, n = 16)`: their table has the statistics of each. `rows` are pairs
+    of one measure and test for which `finds_nothing_of_a_pair`.
     """
-    parts = []
-    for place, row in enumerate(rows):
-        pair = _pair(row, facts.conditions)
-        assert pair is not None  # noqa: S101 - see above
-        digits = _p_digits(row, facts.alpha)
-        p = p_phrase(row["p"], digits=digits) if row["p_adjusted"] is None else adjusted_p(row, digits)
-        figures = f"{statistic(row)}, {p}, n = {row['n']}"
-        head = f"{measure_as_subject(row['measure'])} did not differ significantly" if place == 0 else ", nor"
-        parts.append(f"{head} between {pair.first} and {pair.second}{pair.where} ({figures})")
-    return parts
+    pairs = [pair for row in rows if (pair := _pair(row, facts.conditions)) is not None]
+    head = f"{measure_as_subject(rows[0]['measure'])} did not differ significantly between"
+    first, *others = [f"{pair.first} and {pair.second}{pair.where}" for pair in pairs]
+    parts = [f"{head} {first}", *(f", or between {names}" for names in others)]
+    every_pair = set(combinations(facts.conditions, 2))
+    if len(pairs) == len(every_pair) and {(pair.first, pair.second) for pair in pairs} == every_pair:
+        parts = [f"{head} any two conditions"]
+    least = min(rows, key=lambda row: decisive_p(row) or 0.0)
+    digits = _p_digits({**least, "p": decisive_p(least), "details": None}, facts.alpha)
+    p = p_phrase(least["p"], digits=digits) if least["p_adjusted"] is None else adjusted_p(least, digits)
+    counts = sorted({row["n"] for row in rows})
+    n = f"n = {counts[0]}" + (f" to {counts[-1]}" if len(counts) > 1 else "")
+    return parts, f" ({p.replace(' = ', ' ≥ ')}, {n})"
 
 
 @dataclass(frozen=True)
 class _Pair:
     """The two things that a row compares.
 
-    `preposition` goes before either: with a condition, in a period, at a level. `where` is the level of another factor
-    at which they are compared, as ` at near`, or empty.
+    `preposition` goes before either: with a condition, in a period, for a group, at a level. `where` is the level of
+    another factor at which they are compared, as ` at near`, or empty.
     """
 
     first: str
@@ -178,8 +185,27 @@ def _amount(row: Row, difference: float) -> str:
     size = difference_phrase({**row, "mean_difference": value})
     if value * difference < 0:
         return f"by ranks, while its mean was {'lower' if value > 0 else 'higher'} by {size}"
+    size = _with_interval(row, size, difference)
     reduction = None if row["effect_size_name"] == "estimate" else meaningful_reduction(row)
     return f"by {size}" + ("" if reduction is None else f", {percent(abs(reduction))}")
+
+
+def _with_interval(row: Row, size: str, difference: float) -> str:
+    """`11.80 s, 95 % CI [4.32, 19.28]`: the size of a difference, with its interval where the test gives one.
+
+    Of a rank test it is the shift, unless that goes another way than the `difference` of ranks.
+    """
+    shifted = shift(row)
+    if shifted is not None and shifted[0] * difference <= 0:
+        return size
+    value, low, high = tested_difference(row) if shifted is None else shifted
+    if value is None or low is None or high is None or TESTS[row["test"]].values != "measurements":
+        return size
+    bounds = (low, high) if value > 0 else (-high, -low)
+    digits = digits_beside(2, value, *bounds)
+    amount = f"{number(abs(value), digits)} {unit_of(row['measure'])}".strip()
+    of = "" if shifted is None else ", Hodges-Lehmann shift"
+    return f"{amount}{_BEFORE_INTERVAL}{interval(*bounds, digits)}{of}"
 
 
 def _effect_sentence(row: Row, facts: StudyFacts, what: str) -> str:
@@ -286,8 +312,13 @@ def _pair(row: Row, conditions: Sequence[str]) -> _Pair | None:
         where = f" at {where}"
     if of_condition or ":" in row["effect"]:
         matching = [pair for pair in combinations(conditions, 2) if " - ".join(pair) == compared]
-        return _Pair(*matching[0], "with", where) if len(matching) == 1 else None
+        if len(matching) == 1:
+            return _Pair(*matching[0], "with", where)
+        if matching or not where:
+            return None
     names = names_in(compared)
     if names is None or row["effect"] == "carry-over":
         return None
-    return _Pair(*names, "in period" if row["effect"] == "period" else "at", where)
+    of_groups = TESTS[row["test"]].design in ("between", "mixed")
+    preposition = "in period" if row["effect"] == "period" else "for" if of_groups else "at"
+    return _Pair(*names, preposition, where)

@@ -16,14 +16,15 @@ from pipeline.statistics.pairs import names_in
 from pipeline.study.measures import headlines, measure
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words.change import direction, meaningful_reduction
-from pipeline.words.comparison import EFFECTS_OF_CONDITION, Row, decisive_p, test_label
+from pipeline.words.comparison import EFFECTS_OF_CONDITION, Row, decisive_p, shift, test_label, tested_difference
 from pipeline.words.effect_sizes import effect_size
 from pipeline.words.names import measure_label
-from pipeline.words.numbers import MINUS, NO_VALUE, interval, number, p_value, percent
+from pipeline.words.numbers import MINUS, NO_VALUE, estimate, interval, number, p_value, percent
 
 LINES_MAX = 12
 """As many lines fit on the first page, with all else that belongs there."""
 
+_SHIFT = " (shift)"
 _RATIOS = ("odds ratio", "rate ratio")
 
 HEADER = ("Measure", "Pair", "Means", "Difference [95 % interval]", "Effect size", "p")
@@ -131,11 +132,16 @@ def notes(results: Mapping[str, Any]) -> str:
     counts = sorted({row["n"] for row in rows})
     people = "" if not counts else f" n = {counts[0]}" + (f" to {counts[-1]}" if len(counts) > 1 else "") + "."
     adjusted = any(row["p_adjusted"] is not None for row in rows)
-    kind = "p: adjusted over its family where one is stated" if adjusted else "p: not adjusted"
+    kind = "p: adjusted over its family where one is stated, intervals not" if adjusted else "p: not adjusted"
     level = f"level of significance {100 * study['alpha']:g} %"
     has_ratios = any(row["effect_size_name"] in _RATIOS for row in rows)
     ratios = "; ratios: the first named over the other" if has_ratios else ""
-    return f"Differences and effect sizes: the first named minus the other{ratios}.{people} {kind}; {level}."
+    of_squares = any(measure(row["measure"]).unit.endswith("²") for row in rows)
+    roots = " (root): of the mean squared error; percentages are of that itself." if of_squares else ""
+    any_shift = any(shift(row) is not None for row in rows)
+    shifts = f"{_SHIFT}: Hodges and Lehmann's estimate, which belongs to rank tests." if any_shift else ""
+    marks = f"{ratios}.{roots}{shifts}"
+    return f"Differences and effect sizes: the first named minus the other{marks}{people} {kind}; {level}."
 
 
 def _pairs_in_question(
@@ -207,24 +213,22 @@ def _difference(row: Row, pair: tuple[str, str], significant: bool) -> str:
     details, unit = row["details"] or {}, measure(row["measure"]).unit
     if details.get("ratio_to_first") is not None:
         ratio = f"{second} = {number(details['ratio_to_first'])} × {first}"
-        return _with_bounds(ratio, details["ratio_to_first_ci"])
-    if row["mean_difference"] is None:
+        bounds = interval(*details["ratio_to_first_ci"])
+        return ratio if bounds == NO_VALUE else f"{ratio} {bounds}"
+    shifted = shift(row)
+    value, low, high = tested_difference(row) if shifted is None else shifted
+    if shifted is not None:  # ranks may go the other way than means; what is said goes with the interval beside it
+        row = {**row, "mean_difference": value, "reduction": None}
+    elif row["mean_difference"] is None:
         if row["effect_size_name"] != "estimate" or row["effect_size"] is None:
             return NO_VALUE
         row = {**row, "mean_difference": row["effect_size"], "reduction": None}
-        details = {"ci_difference": (row["ci_low"], row["ci_high"])}
-    amount = f"{number(row['mean_difference'])} {unit}".strip()
-    amount = _with_bounds(amount, details.get("ci_difference") or (None, None))
+        value, low, high = row["effect_size"], row["ci_low"], row["ci_high"]
+    amount = NO_VALUE if value is None else estimate(value, low, high, unit)
+    amount += _SHIFT if shifted is not None else ""
     if row["mean_difference"] == 0:
         return amount
     reduction = meaningful_reduction(row)
     share = "" if reduction is None else f"{percent(abs(reduction))} "
     side = direction(row) if significant else direction(row).partition(" ")[0]
     return f"{amount}; {second} {share}{side}"
-
-
-def _with_bounds(text: str, bounds: Sequence[float | None]) -> str:
-    """The text with its interval, where it has one."""
-    low, high = bounds
-    shown = interval(low, high)
-    return text if shown == NO_VALUE else f"{text} {shown}"

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 _WORDS: Sequence[tuple[str, str, str]] = (
-    ("n", r"\bn = \d|^n$", "The number of participants that a figure rests on."),
+    ("n", r"\bn = \d|^n$", "The number of participants that a figure rests on, or of what is named beside it."),
     ("M", r"\bM = ", "Mean: the sum of the values over their number."),
     ("SD", r"\bSDs?\b", "Standard deviation: how far values typically lie from their mean."),
     ("Median", r"\b[Mm]edian\b", "The value that half of the values lie below."),
@@ -172,7 +172,7 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         r"[Gg]eometric mean",
         "The mean of the logarithms, taken back: for values that spread the more the larger they are, as times do.",
     ),
-    ("Mean difference", r"^Mean difference\b", "The mean under the first condition minus that under the second."),
+    ("Difference", r"^Difference \[", "The mean under the first condition minus that under the second."),
     ("Reduction", r"^Reduction$", "By how much the mean is lower under the second condition, as a share of the first."),
     (
         "Permutation p",
@@ -181,8 +181,13 @@ _WORDS: Sequence[tuple[str, str, str]] = (
     ),
     (
         "Bootstrap interval",
-        r"[Bb]ootstrap",
+        r"(?<!moving-block )[Bb]ootstrap",
         "An interval from how the mean difference varies when the participants are drawn anew with replacement.",
+    ),
+    (
+        "Moving-block bootstrap",
+        r"moving-block bootstrap",
+        "An interval from how an estimate varies when stretches of the recording are drawn anew with replacement.",
     ),
     (
         "Shapiro and Wilk's test",

@@ -17,7 +17,7 @@ from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
 from pipeline.words.estimators import estimator_in_words, setting_in_words, settings_in_words
 from pipeline.words.evidence import resampled
-from pipeline.words.names import adjustment_label, measure_as_subject, unit_of
+from pipeline.words.names import adjustment_label, measure_as_subject, unit_of, was
 from pipeline.words.numbers import number
 from pipeline.words.phrases import counted, group_sizes, listing, there_were
 
@@ -69,7 +69,7 @@ def _design(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
     else:
         how = "not compared"
     comparison = f"{counted(len(conditions), 'condition')}, {how}: {listing(conditions)}"
-    yield f"{there_are} and {comparison}; {conditions[0]} was the baseline."
+    yield f"{there_are} and {comparison}{f'; {conditions[0]} was the baseline' if designs else ''}."
     groups = [factor for factor in study.between_factors if factor != "condition"]
     if groups and designs - {"within"}:
         yield f"Participants were compared between the levels of {listing(groups)}."
@@ -96,7 +96,8 @@ def _measures(study: Study, results: Mapping[str, Any]) -> Iterator[str]:
             scales.setdefault(questionnaire, []).append(scale.replace("_", " "))
         else:
             unit = unit_of(measure)
-            others.append(f"{measure_as_subject(measure)}{f' in {unit}' if unit else ''}")
+            name = measure_as_subject(measure)
+            others.append(f"{_within_a_sentence(name) if others else name}{f' in {unit}' if unit else ''}")
     named = [f"{measure_as_subject(f'{name}/ratings')} ({', '.join(parts)})" for name, parts in scales.items()]
     if others or named:
         yield f"Measures: {'; '.join([*others, *named])}. Each participant's mean in a condition counted as one value."
@@ -144,8 +145,11 @@ def _tests(study: Study, rows: Sequence[Row]) -> Iterator[str]:
         tested = [row for row in rows if row["test"] == entry.test]
         measures_text = listing([_measures_named(pattern, tested) for pattern in entry.measures])
         measures_by_test.setdefault(test_in_words(entry, tested) + _follow_up(entry, tested), []).append(measures_text)
-    for test, measures in measures_by_test.items():
-        yield f"{listing(list(dict.fromkeys(measures)))}: {test}."
+    for test, names in measures_by_test.items():
+        measures = list(dict.fromkeys(names))
+        first, others = measures[0], [_within_a_sentence(name) for name in measures[1:]]
+        were = was(first) if not others and " and " not in first else "were"
+        yield f"{listing([first, *others])} {were} analysed by {test}."
     if any((row["details"] or {}).get("p_gg") is not None for row in rows):
         yield "With more than two conditions, p was corrected for sphericity (Greenhouse-Geisser)."
     yield f"The level of significance was {_level(study.alpha)}; intervals are 95 % intervals."
@@ -178,7 +182,13 @@ def _measures_named(pattern: str, rows: Sequence[Row]) -> str:
     tested = matching_measures(pattern, dict.fromkeys(row["measure"] for row in rows))
     if len(tested) > _NAMED_MAX:
         return f"{len(tested)} measures"
-    return listing([measure_as_subject(name) for name in tested] or [pattern])
+    first, *others = [measure_as_subject(name) for name in tested] or [pattern]
+    return listing([first, *map(_within_a_sentence, others)])
+
+
+def _within_a_sentence(measure: str) -> str:
+    """`completion time`, after other words; names such as NASA-TLX keep their capitals."""
+    return measure[:1].lower() + measure[1:] if measure[1:2].islower() else measure
 
 
 def _level(alpha: float) -> str:

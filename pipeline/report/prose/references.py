@@ -14,6 +14,7 @@ from pipeline.study.settings import Study
 from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS
 from pipeline.tables.table import Row
 from pipeline.words.comparison import uses_logarithms
+from pipeline.words.estimators import estimator_in_words
 from pipeline.words.evidence import resampled
 
 PAPER = "feng2017"
@@ -93,7 +94,8 @@ class Reference:
         edition = f"{field['edition']} ed." if "edition" in field else ""
         source = ", ".join(filter(None, (where, field.get("pages"), edition, field.get("publisher"))))
         head = " ".join(filter(None, (authors, f"({field['year']})." if "year" in field else "")))
-        doi = f"doi {field['doi']}" if "doi" in field else ""
+        stands_in_note = field.get("doi", "") in field.get("note", "")  # a study's own citation holds it already
+        doi = f"doi {field['doi']}" if "doi" in field and not stands_in_note else ""
         title = ", version ".join(filter(None, (field.get("title"), field.get("version"))))
         sentences = (f"{part.rstrip('.')}." for part in (title, source, field.get("note")) if part)
         return " ".join(filter(None, (head, *sentences, doi)))
@@ -179,7 +181,7 @@ def _of_measures(measures: Iterable[str]) -> Iterator[tuple[str, str]]:
 def _of_estimators(study: Study) -> Iterator[tuple[str, str]]:
     for settings in study.estimators.values():
         if settings.type in _OF_ESTIMATOR:
-            yield _OF_ESTIMATOR[settings.type], f"estimator {settings.type}"
+            yield _OF_ESTIMATOR[settings.type], estimator_in_words(settings.type)
 
 
 def _source(study: Study) -> Reference | None:

@@ -104,19 +104,21 @@ def _assumptions(material: Material) -> Iterator[Text]:
         yield (Strong("A t interval reaches beyond 0 to 1 "), f"{text} 1, with its trial, or read it as approximate.")
     violated = [row for row in rows if TESTS[row["test"]].assumes_sphericity and below(row, "mauchly_p")]
     if violated:
-        text = f"(the differences between conditions vary unequally) for {_measures_of(violated)}: use the"
-        yield (Strong("Sphericity is violated "), f"{text} Greenhouse-Geisser p.")
+        text = f"(the differences between conditions vary unequally) for {_measures_of(violated)}: what is said here"
+        yield (Strong("Sphericity is violated "), f"{text} rests on the Greenhouse-Geisser p.")
     assuming_normality = [row for row in rows if TESTS[row["test"]].assumes_normality]
     skewed = [row for row in assuming_normality if below(row, "shapiro_p", "residual_shapiro_p")]
     if skewed:
         text = f"(Shapiro-Wilk test) for {_measures_of(skewed)}: check whether a rank test gives the same result."
         yield (Strong("Differences are not normally distributed "), text)
+    groups = [row for row in assuming_normality if _below_in_a_group(row, alpha)]
+    if groups:
+        text = f"(Shapiro-Wilk test) for {_measures_of(groups)}: check whether a rank test gives the same result."
+        yield (Strong("Values within a group are not normally distributed "), text)
     shaped = [row for row in material.rows("design_check") if row["what"] == SHAPE]
     if shaped:
-        text = (
-            f"in {_measures_of(shaped)}: transform: log in study.yaml tests the logarithms and says by what factor the"
-        )
-        yield (Strong("Skewed values "), f"{text} geometric means differ; see whether it gives the same result.")
+        text = f"in {_measures_of(shaped)}: see whether a test of the logarithms (“transform: log” in study.yaml) gives"
+        yield (Strong("Skewed values "), f"{text} the same result.")
     yield from _interactions(rows, alpha)
     yield from _outliers(assuming_normality)
     yield from _aligned_ranks(rows)
@@ -130,6 +132,11 @@ def _assumptions(material: Material) -> Iterator[Text]:
     if undefined:
         yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
     yield from _narrow_intervals(material)
+
+
+def _below_in_a_group(row: Row, alpha: float) -> bool:
+    """Whether the values of a group speak against a normal distribution of them."""
+    return any(p is not None and p < alpha for p in (row["details"] or {}).get("groups_shapiro_p", ()))
 
 
 def _groups_of_one(material: Material) -> Iterator[Text]:
@@ -153,12 +160,13 @@ def _has_a_group_of_one(row: Row) -> bool:
 
 def _narrow_intervals(material: Material) -> Iterator[Text]:
     """Estimators whose stated uncertainty is too small."""
-    narrow = [
-        row["estimator"] for row in material.rows("accuracy") if row["coverage_95"] < 0.9 and row["estimator"] != "raw"
-    ]
+    stated = [row for row in material.rows("accuracy") if row["estimator"] != "raw"]
+    narrow = Counter(row["estimator"] for row in stated if row["coverage_95"] < 0.9)
     if narrow:
         standard = reference_phrase(row["reference"] for row in material.rows("accuracy"))
-        text = f"in at least one session for {listing(list(dict.fromkeys(narrow)))}: the 95 % intervals contain"
+        sessions = Counter(row["estimator"] for row in stated)
+        found = [f"{name} in {count} of {counted(sessions[name], 'session')}" for name, count in narrow.items()]
+        text = f"for {listing(found)}: the 95 % intervals contain"
         yield (Strong("Stated uncertainty too small "), f"{text} {standard} in less than 90 % of instants.")
 
 

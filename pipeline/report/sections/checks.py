@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pipeline.report.document.model import Block, Folded, Paragraph, Strong, Table, Text, columns
 from pipeline.report.sections.material import Material
 from pipeline.report.traffic_lights import LIGHTS, SYMBOLS
+from pipeline.sessions.checks.agreement import LAG_UNKNOWN
 from pipeline.sessions.fusion_checks import WORSE
 from pipeline.tables.table import Row
 from pipeline.words.numbers import NO_VALUE
@@ -50,7 +51,10 @@ def _lags(rows: Sequence[Row]) -> list[Block]:
         cells,
     )
     apart = sum(row["status"] != "green" for row in lags)
+    untold = sum(row["found"] == LAG_UNKNOWN for row in lags)
     summary = f"Lag between tracker and phone: contradicts study.yaml in {apart} of {counted(len(lags), 'session')}"
+    if untold:
+        summary += f", cannot be told in {untold}"
     return [Folded(summary, (table,))]
 
 

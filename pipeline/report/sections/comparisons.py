@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
-from pipeline.report.document.model import Block, CrossReference, Folded, Paragraph, Section, Strong, Table, columns
+from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
 from pipeline.report.prose.families import families
+from pipeline.report.sections import assumptions
 from pipeline.report.sections.material import Material
-from pipeline.statistics.diagnostics import OUTLIER_RULE
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.change import meaningful_reduction
-from pipeline.words.comparison import contrast, test_label, uses_logarithms
+from pipeline.words.comparison import (
+    CORRECTED,
+    contrast,
+    method_in_words,
+    shift,
+    test_label,
+    tested_difference,
+    uses_logarithms,
+)
 from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import one_sided_factor, resampled, statistic
 from pipeline.words.names import adjustment_label, measure_label
-from pipeline.words.numbers import NO_VALUE, fraction, interval, number, p_value, percent
+from pipeline.words.numbers import NO_VALUE, estimate, interval, p_value, percent
 from pipeline.words.phrases import all_of, capitalized, listing
 
 
@@ -44,25 +51,34 @@ def section(material: Material) -> Section | None:
     )
     text = "Every test of the study, one row each. The words and symbols are explained in the "
     introduction = Paragraph((text, CrossReference("glossary", "glossary"), "."))
-    blocks: list[Block] = [introduction, table, Paragraph((Strong("Methods: "), _methods(rows)))]
+    blocks: list[Block] = [introduction, table, Paragraph((Strong("Methods: "), methods(rows)))]
     return Section(
         "comparisons",
         "All comparisons",
-        tuple(blocks + _diagnostics(rows, material.study.conditions, material.study.alpha)),
+        (*blocks, *assumptions.checked(rows, material.study)),
     )
 
 
 def _note(rows: Sequence[Row], titles: Sequence[str]) -> str:
     """What n and the columns that the table has are of."""
     sentences = [_meaning_of_n(list(dict.fromkeys(row["test"] for row in rows)))]
-    if _MEAN_DIFFERENCE in titles:
-        sentences.append("Mean difference: first minus second condition, with the interval of a test of means.")
+    if DIFFERENCE in titles:
+        sentences.append("Difference: the first minus the second, of means with the interval of a test of means.")
+        if any(shift(row) is not None for row in rows):
+            sentences.append(SHIFT_NOTE)
     if "Reduction" in titles:
         of_logarithms = (
             "; of tests of logarithms, that of the geometric mean" if any(map(uses_logarithms, rows)) else ""
         )
         sentences.append(f"Reduction: relative to the first, for measures whose zero means none{of_logarithms}.")
     return " ".join(sentences)
+
+
+SHIFT_NOTE = (
+    "The difference beside a rank test is Hodges and Lehmann's shift: the median of all averages of two differences, or"
+    " of all differences between the members of two groups; with tied ranks its interval and p need not agree to the"
+    " last digit."
+)
 
 
 def _meaning_of_n(tests: Sequence[str]) -> str:
@@ -74,78 +90,41 @@ def _meaning_of_n(tests: Sequence[str]) -> str:
     return f"{text}; in the {listing(of_everybody)}, all participants." if of_everybody else f"{text}."
 
 
-def _methods(rows: Sequence[Row]) -> str:
+def methods(rows: Sequence[Row]) -> str:
     """Each test with the methods that computed it, and how families of p values were adjusted.
 
     A row that is undefined was not computed by its method, which is named only where no other row of the test is.
     """
-    methods_of: dict[str, list[str]] = {}
     computed = {test_label(row) for row in rows if row["status"] == "ok"}
+    of_test: dict[str, list[Row]] = {}
     for row in rows:
-        if row["status"] != "ok" and test_label(row) in computed:
-            continue
-        methods_of.setdefault(test_label(row), []).append(row["method"])
-    texts = [f"{test}: {', or '.join(dict.fromkeys(methods))}" for test, methods in methods_of.items()]
+        if row["status"] == "ok" or test_label(row) not in computed:
+            of_test.setdefault(test_label(row), []).append(row)
+    texts = [f"{test}: {_methods_of(one)}" for test, one in of_test.items()]
     return f"{'; '.join(texts)}. {capitalized(families(rows))}."
 
 
-def _diagnostics(rows: Sequence[Row], conditions: Sequence[str], alpha: float) -> list[Block]:
-    """Normality and outliers of the differences that are tested, once for each measure and pair."""
-    tested: dict[tuple[str, str], Row] = {}
-    for row in rows:
-        details = row["details"] or {}
-        if "shapiro_w" in details or "residual_shapiro_w" in details:
-            tested.setdefault((row["measure"], _differences(row, conditions)), row)
-    if not tested:
-        return []
-    cells = tuple(
-        (measure_label(measure), compared, f"{row['n']}", *_normality(row["details"]), _outliers(row["details"]))
-        for (measure, compared), row in tested.items()
-    )
-    table = Table(
-        "table-diagnostics",
-        "Are the differences normally distributed? A small p of the Shapiro-Wilk test (W) speaks against it. t tests "
-        "and ANOVA assume a normal distribution; rank tests do not.",
-        columns(("Measure", "Differences", "n", "W", "p", "Outliers"), 2),
-        cells,
-        f"Outliers: participants whose difference has a {OUTLIER_RULE}; they are kept in all tests. No spread: "
-        "more than half of the differences are equal, so the rule does not apply.",
-    )
-    ps = [row["details"].get("shapiro_p", row["details"].get("residual_shapiro_p")) for row in tested.values()]
-    doubtful = sum(p is not None and p < alpha for p in ps)
-    level = f"below the {100 * alpha:g} % level in {doubtful} of {len(tested)}"
-    summary = f"Are the differences normally distributed? Shapiro-Wilk's p is {level}"
-    return [Folded(summary, (table,))]
-
-
-def _differences(row: Row, conditions: Sequence[str]) -> str:
-    """The pair compared, or all conditions, whose residuals are checked."""
-    if row["contrast"] is None and "shapiro_w" not in row["details"]:
-        return "residuals of all conditions"
-    pair = " - ".join(conditions) if row["contrast"] is None else row["contrast"]
-    return contrast({**row, "contrast": pair, "details": None})
-
-
-def _normality(details: Mapping[str, Any]) -> tuple[str, str]:
-    prefix = "" if "shapiro_w" in details else "residual_"
-    return fraction(details[f"{prefix}shapiro_w"]), p_value(details[f"{prefix}shapiro_p"])
-
-
-def _outliers(details: Mapping[str, Any]) -> str:
-    if "outliers" not in details:
-        return NO_VALUE
-    if details["outliers"] is None:
-        return "no spread"
-    return listing(details["outliers"]) if details["outliers"] else "nobody"
+def _methods_of(rows: Sequence[Row]) -> str:
+    """The methods of one test's rows: first of those of all conditions, then of the pairs that follow them up."""
+    whole = list(dict.fromkeys(method_in_words(row) for row in rows if row["contrast"] is None))
+    pairs = list(dict.fromkeys(method_in_words(row) for row in rows if row["contrast"] is not None))
+    whole = [one for one in whole if f"{one}, {CORRECTED}" not in whole]
+    if not (whole and pairs):
+        return ", or ".join(whole or pairs)
+    return f"{', or '.join(whole)}, its pairs by {', or '.join(pairs)}"
 
 
 def _statistic(row: Row) -> str:
     return statistic(row) if row["status"] == "ok" else str(row["status"])
 
 
-def _mean_difference(row: Row) -> str:
-    bounds = interval(*((row["details"] or {}).get("ci_difference") or (None, None)))
-    return " ".join(part for part in (number(row["mean_difference"]), bounds) if part != NO_VALUE) or NO_VALUE
+def difference_cell(row: Row) -> str:
+    """The difference of the means with its interval; of a rank test its shift."""
+    shifted = shift(row)
+    if shifted is not None:
+        return estimate(*shifted)
+    value, low, high = tested_difference(row)
+    return NO_VALUE if value is None else estimate(value, low, high)
 
 
 def _columns(rows: Sequence[Row]) -> list[tuple[str, Callable[[Row], str]]]:
@@ -182,7 +161,7 @@ ESTIMATES: tuple[tuple[str, Callable[[Row], str]], ...] = (
 
 _EMPTY = (NO_VALUE, "")
 _ADJUSTED = "p adjusted"
-_MEAN_DIFFERENCE = "Mean difference [95 % interval]"
+DIFFERENCE = "Difference [95 % interval]"
 
 _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("Measure", lambda row: measure_label(row["measure"])),
@@ -194,7 +173,7 @@ _COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("p corrected", _corrected_p),
     (_ADJUSTED, _adjusted_p),
     ("Effect size [95 % interval]", effect_size),
-    (_MEAN_DIFFERENCE, _mean_difference),
+    (DIFFERENCE, difference_cell),
     *ESTIMATES,
     ("Reduction", lambda row: percent(meaningful_reduction(row))),
 )

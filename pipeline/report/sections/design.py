@@ -14,7 +14,9 @@ def section(material: Material) -> Section:
     study = material.study
     blocks: list[Block] = [Paragraph(_participants(material))]
     if len(study.conditions) > 1:
-        text = f"{conditions_text(study.conditions)}. A difference is the first minus the second in this order."
+        text = f"{listing(list(study.conditions))}."
+        if material.rows("comparisons"):
+            text = f"{conditions_text(study.conditions)}. A difference is the first minus the second in this order."
         blocks.append(Paragraph((Strong("Conditions: "), text)))
     else:
         blocks.append(Paragraph((Strong("Condition: "), f"{study.conditions[0]}.")))
@@ -72,10 +74,16 @@ def _design_check(material: Material) -> list[Block]:
         f"Effects of the period and carry-over are each tested at the {100 * material.study.alpha:g} % level; not "
         "finding one does not mean that there is none, least of all for carry-over with few people."
     )
+    within = any(row["what"].startswith(("order of", "times")) for row in rows)
+    fair = (
+        " A comparison within people is fair if each condition comes equally often early and late, and equally often"
+        " after every other condition."
+        if within
+        else ""
+    )
     table = Table(
         "table-design",
-        "Design check: who met which condition when, and whether it mattered. A comparison within people is fair "
-        "if each condition comes equally often early and late, and equally often after every other condition.",
+        f"Design check: who met which condition when, and whether it mattered.{fair}",
         columns(("What", "Of", "Found", "Expected", "Remark"), 5),
         cells,
         note if any(row["expected"] == "none" for row in rows) else "",

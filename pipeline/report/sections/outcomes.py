@@ -18,20 +18,19 @@ from pipeline.report.document.model import (
     columns,
 )
 from pipeline.report.figures.selections import offsets_mm
-from pipeline.report.prose.families import families
 from pipeline.report.sections import overview
-from pipeline.report.sections.comparisons import ESTIMATES
+from pipeline.report.sections.comparisons import DIFFERENCE, ESTIMATES, SHIFT_NOTE, difference_cell, methods
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.statistics import T
 from pipeline.study.measures import MEASURES, measure
 from pipeline.study.measures import Section as SectionName
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
-from pipeline.words.comparison import contrast
+from pipeline.words.comparison import contrast, shift
 from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import statistic
 from pipeline.words.names import measure_label, short_label
-from pipeline.words.numbers import NO_VALUE, interval, number, p_value
+from pipeline.words.numbers import NO_VALUE, digits_beside, interval, number, p_value
 from pipeline.words.phrases import capitalized, counted, group_sizes, listing
 from pipeline.words.sentences import brief_sentence, with_article
 
@@ -127,8 +126,10 @@ def _by_group(material: Material, table_id: str, names: Sequence[str]) -> Iterat
 
 
 def _described(row: Row) -> tuple[str, ...]:
-    bounds = interval(row["ci_low"], row["ci_high"])
-    return f"{row['n']}", number(row["mean"]), number(row["sd"]), number(row["median"]), bounds
+    values = (row["mean"], row["sd"], row["median"])
+    digits = digits_beside(2, *(value for value in values if value is not None))
+    bounds = interval(row["ci_low"], row["ci_high"], digits)
+    return f"{row['n']}", *(number(value, digits) for value in values), bounds
 
 
 def interval_note(rows: Sequence[Row]) -> str:
@@ -196,7 +197,8 @@ def _statements(rows: Sequence[Row]) -> Iterator[Text]:
             yield (f"{brief_sentence(row)}.",)
     if follow_ups:
         tests = listing(list(dict.fromkeys(with_article(TESTS[row["test"]].label) for row in follow_ups)))
-        text = f"{counted(len(follow_ups), 'pair')} followed up {tests}: see the "
+        were = "was" if len(follow_ups) == 1 else "were"
+        text = f"{counted(len(follow_ups), 'pair')} {were} compared after {tests}: see the "
         yield (text, CrossReference("table of all comparisons", "comparisons"), ".")
 
 
@@ -237,6 +239,9 @@ def _ratings_table(material: Material, questionnaire: str, title: str, names: li
 
 def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
     estimates = [(title, cell) for title, cell in ESTIMATES if any(cell(row) != NO_VALUE for row in rows)]
+    any_shift = any(shift(row) is not None for row in rows)
+    if any_shift:
+        estimates.insert(0, (DIFFERENCE, difference_cell))
     titles = ("Scale", "Comparison", "n", "Statistic", "p", "p adjusted", "Effect size [95 % interval]")
     cells = tuple(
         (
@@ -251,8 +256,7 @@ def _tests_table(questionnaire: str, title: str, rows: list[Row]) -> Table:
         )
         for row in rows
     )
-    methods = "; ".join(dict.fromkeys(row["method"] for row in rows))
-    note = f"Methods: {methods}. {capitalized(families(rows))}."
+    note = f"Methods: {methods(rows)}{f' {SHIFT_NOTE}' if any_shift else ''}"
     caption = f"Tests of the {title} scales."
     if any(row["p_adjusted"] is not None for row in rows):
         caption += " Use the adjusted p: with many tests, some are significant by chance."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pandas as pd
@@ -43,7 +44,7 @@ from pipeline.words.comparison import EFFECTS_OF_CONDITION, decisive_p, test_lab
 from pipeline.words.effect_sizes import ratio_to_first
 from pipeline.words.evidence import statistic
 from pipeline.words.names import adjustment_label, measure_as_subject, measure_label, short_label, unit_of, was
-from pipeline.words.numbers import NO_VALUE, interval, number, p_phrase
+from pipeline.words.numbers import estimate, number, p_phrase
 from pipeline.words.phrases import counted, listing, participants_counted
 from pipeline.words.sentences import brief_sentence, verdict
 
@@ -128,7 +129,8 @@ def _sentence(material: Material, row: Row) -> str:
     if row["mean_difference"] is not None and set(study.conditions) <= set(described):
         first, second = study.conditions
         change = f"{amount_of_change(row)} {direction(row)}" if row["mean_difference"] else "the same"
-        means = f": on average {_mean(described[second])} with {second} against {_mean(described[first])} with {first}"
+        one, other = (_mean_in_words(described[name]) for name in (second, first))
+        means = f": on average{_as_root(row)} {one} with {second} against {other} with {first}"
         if averages_unequal_groups(row) or not _of_those_tested(row, (described[first], described[second])):
             said = difference_phrase(row) == amount_of_change(row)
             means = "" if said else f": a mean difference of {difference_phrase(row)}"
@@ -145,8 +147,8 @@ def _sentence(material: Material, row: Row) -> str:
     verb = "differ" if significant else "do not differ statistically significantly"
     if len(ranked) < 2 or not _of_those_tested(row, ranked):
         return f"{label}: the conditions {verb} ({evidence})."
-    ends = f"{_mean(ranked[0])} with {ranked[0]['condition']} to {_mean(ranked[-1])} with {ranked[-1]['condition']}"
-    return f"{label}: the conditions {verb}; means run from {ends} ({evidence})."
+    low, high = (f"{_mean_in_words(one)} with {one['condition']}" for one in (ranked[0], ranked[-1]))
+    return f"{label}: the conditions {verb}; means run{_as_root(row)} from {low} to {high} ({evidence})."
 
 
 def _of_those_tested(row: Row, described: Sequence[Row]) -> bool:
@@ -157,8 +159,21 @@ def _of_those_tested(row: Row, described: Sequence[Row]) -> bool:
 
 def _mean(row: Row) -> str:
     """`12.3 s [10.1, 14.5]`: a mean and its 95 % interval."""
-    parts = (number(row["mean"]), unit_of(row["measure"]), interval(row["ci_low"], row["ci_high"]))
-    return " ".join(part for part in parts if part not in ("", NO_VALUE))
+    return estimate(row["mean"], row["ci_low"], row["ci_high"], unit_of(row["measure"]))
+
+
+def _as_root(row: Row) -> str:
+    return ", as roots," if unit_of(row["measure"]).endswith("²") else ""
+
+
+def _mean_in_words(row: Row) -> str:
+    """As `_mean`; of squared errors the root, in the unit that people feel, and the roots of its interval's bounds."""
+    unit = unit_of(row["measure"])
+    if not unit.endswith("²"):
+        return _mean(row)
+    bounds = (row["ci_low"], row["ci_high"])
+    low, high = (math.sqrt(bound) for bound in bounds) if None not in bounds and min(bounds) >= 0 else (None, None)
+    return estimate(math.sqrt(row["mean"]), low, high, unit[:-1])
 
 
 def _figure(material: Material) -> list[Figure]:
@@ -288,6 +303,9 @@ def _further_results(material: Material) -> list[Text]:
         if not TESTS[row["test"]].tests_difference and row["status"] == "ok":
             text = f"{verdict(row, material.study.alpha)} ({brief_sentence(row, with_change=False)})"
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{text}."))
+    for row in material.rows("comparisons"):
+        if row["contrast"] is None and row["effect"] not in EFFECTS_OF_CONDITION and row["status"] == OK:
+            answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{brief_sentence(row)}."))
     if _headline_rows(material):  # else they are said at the top of the page
         answers += _ratings(material)
     return [*answers, *overview_estimators.statement(material, stands_alone=not answers)]

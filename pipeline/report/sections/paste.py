@@ -19,12 +19,15 @@ from pipeline.report.document.model import (
 from pipeline.report.prose.methods import methods
 from pipeline.report.prose.references import Reference, bibliography, used
 from pipeline.report.sections import practice
+from pipeline.report.sections.cautions import contradicted
 from pipeline.report.sections.comparisons import anchor
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.provenance import statistics_libraries, used_versions
 from pipeline.statistics import WILSON
+from pipeline.words.accuracy_reference import SMOOTHED, reference_phrase
 from pipeline.words.condition_means import means_sentence, states_means, study_facts
-from pipeline.words.phrases import listing
+from pipeline.words.numbers import milliseconds, number
+from pipeline.words.phrases import counted, listing
 from pipeline.words.sentences import finds_nothing_of_a_pair, full_sentence, no_difference_sentence
 
 BIBLIOGRAPHY = "references.bib"
@@ -40,7 +43,7 @@ def section(material: Material) -> Section:
         Paragraph((introduction,)),
         ToPaste("Methods", ((Strong("Methods. "), methods_text),)),
     ]
-    results = list(_results(material))
+    results = [*_results(material), *_accuracy(material)]
     if results:
         blocks.append(ToPaste("Results", ((Strong("Results. "), *results[0]), *results[1:])))
     return Section("paste", "To paste", (*blocks, _references(material)))
@@ -90,9 +93,32 @@ def _results(material: Material) -> Iterator[Text]:
         for at, row in of_test:
             if at not in together:
                 words += [f"{full_sentence(row, facts)} ", CrossReference("[row]", anchor(at)), " "]
-        for at, part in zip(together, no_difference_sentence(list(together.values()), facts), strict=True):
-            words += [part, " ", CrossReference("[row]", anchor(at))]
-        yield (*words, ".") if together else tuple(words)
+        if together:
+            parts, evidence = no_difference_sentence(list(together.values()), facts)
+            for at, part in zip(together, parts, strict=False):  # one part may tell of all pairs
+                words += [part, " ", CrossReference("[row]", anchor(at))]
+            words += [evidence, "."]
+        yield tuple(words)
+
+
+def _accuracy(material: Material) -> Iterator[Text]:
+    """Error and lag of each estimator in a sentence, where a reference was recorded that no check contradicts."""
+    each, means = material.rows("accuracy"), material.rows("accuracy_means")
+    if not means or any(row["reference"] == SMOOTHED for row in each) or contradicted(material):
+        return
+    standard = reference_phrase(row["reference"] for row in each)
+    of_estimators = [
+        f"{number(row['rmse_mm'])} mm with {row['estimator']}"
+        + ("" if row["lag_s"] is None else f" (lag {milliseconds(row['lag_s'])} ms)")
+        for row in means
+        if row["rmse_mm"] is not None
+    ]
+    if of_estimators:
+        sessions = counted(len({row["session"] for row in each}), "session")
+        yield (
+            f"The root mean square error against {standard}, as the mean over {sessions}, was {listing(of_estimators)};"
+            " a positive lag is late.",
+        )
 
 
 def _references(material: Material) -> Table:

@@ -12,6 +12,7 @@ from pipeline.report.sections import checks, recorded_live, sensors_found, timel
 from pipeline.report.sections.material import Material
 from pipeline.report.sections.without_exclusions import without_exclusions
 from pipeline.report.traffic_lights import FACTS, LIGHTS, SYMBOLS, Judged, light_of
+from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.names import measure_label
 from pipeline.words.numbers import NO_VALUE, number
@@ -306,7 +307,7 @@ def _exclusions(material: Material) -> list[Block]:
             row["session"] or NO_VALUE,
             measure_label(row["measure"]) if row["measure"] else "all",
             row["what"],
-            row["reason"] or "",
+            _reason(row["reason"] or ""),
         )
         for row in rows[:_ROWS_MAX]
     )
@@ -319,3 +320,9 @@ def _exclusions(material: Material) -> list[Block]:
             cells,
         )
     ]
+
+
+def _reason(reason: str) -> str:
+    """The reason, with a test that begins it by its label: `paired t: no value in b`."""
+    name, colon, rest = reason.partition(": ")
+    return f"{TESTS[name].label}{colon}{rest}" if colon and name in TESTS else reason

@@ -291,7 +291,7 @@ def test_skewed_times_are_cautioned_of_and_other_scales_are_not(tmp_path: Path, 
     """A time's zero means none; a score's may not, and its ratio would mean nothing."""
     values: Values = {"time_s": TIMES["time_s"], "score": TIMES["time_s"], "calm_s": {"A": [3, 4, 5], "B": [4, 6, 5]}}
     page = read(steadyhand, study(tmp_path / "study", values, ["measure: [time_s, score, calm_s], test: t_paired"]))
-    assert "Skewed values in Time (s): transform: log in study.yaml" in page
+    assert "Skewed values in Time (s): see whether a test of the logarithms (“transform: log” in study.yaml)" in page
     shape = [row for row in steadyhand.results()["design_check"] if row["what"] == "shape of values"]
     assert [row["measure"] for row in shape] == ["time_s"]
     assert "paired t with transform: log would compare geometric means" in shape[0]["remark"]

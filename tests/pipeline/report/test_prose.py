@@ -242,7 +242,7 @@ def test_names_that_can_be_read_in_two_ways_are_not_taken_apart() -> None:
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_stay_as_they_are_in_sentences_and_do_no_harm_in_bibtex(name: str) -> None:
     rows, told = a_study([name, "b"], [(1, 2), (2, 5), (3, 4)], [{"test": "rm_anova"}])
-    assert f"with b by 1.67 s, 83.3 %; {name}: M = 2.00" in full_sentence(rows[0], told)
+    assert f"with b by 1.67 s, 95 % CI [−1.20, 4.54], 83.3 %; {name}: M = 2.00" in full_sentence(rows[0], told)
     study = Study(title=name, citation=f"{name} {{ }} % @article{{x,", conditions=("a",), measures="m.csv")
     (source, *_), text = used(study, [], [], {}), escaped(name)
     assert source.fields["title"] == text
@@ -304,7 +304,7 @@ def test_a_report_has_words_to_paste_that_lead_to_their_rows(folder: Folder, ste
         assert f'<a href="#{anchor(at)}">[row]</a>' in page
         assert f'<tr id="{anchor(at)}">' in page
     assert "There were 12 participants and 2 conditions, compared within participants: kinect and fusion" in text
-    assert "M: repeated-measures ANOVA (generalized η²)." in text
+    assert "M was analysed by repeated-measures ANOVA (generalized η²)." in text
     bibtex = (steadyhand.out / "references.bib").read_text(encoding="utf-8")
     for key in re.findall(r"^@\w+\{([^,]+),", bibtex, flags=re.MULTILINE):
         assert key.removeprefix("package_") in text

@@ -35,7 +35,8 @@ from pipeline.report.document.model import (
     Table,
 )
 from pipeline.study.statistical_tests import TESTS
-from pipeline.words.numbers import interval, number, p_phrase, percent
+from pipeline.words.comparison import method_in_words
+from pipeline.words.numbers import p_phrase, percent
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand, as_printed, exit_code
 from tests.pipeline.hostile import CONDITIONS, ESTIMATOR, HOSTILE, PEOPLE, SESSION, hostile_study
@@ -338,16 +339,18 @@ def test_the_first_page_answers_with_means_intervals_and_a_figure(report: Path) 
     text = " ".join("".join(checked(page.partition("Back to the contents")[0]).text).split())
     results = results_of(report)
     row = next(row for row in results["comparisons"] if row["measure"] == "selection_mse_px2")
-    means = {
-        one["condition"]: f"{number(one['mean'])} px² {interval(one['ci_low'], one['ci_high'])}"
+    means = {  # in the unit that people feel: roots, also of the bounds
+        one[
+            "condition"
+        ]: f"{math.sqrt(one['mean']):.2f} px [{math.sqrt(one['ci_low']):.2f}, {math.sqrt(one['ci_high']):.2f}]"
         for one in results["descriptives"]
         if one["measure"] == "selection_mse_px2"
     }
     assert row["reduction"] < 0
     expected = (
         f"Selection error, MSE was {percent(-row['reduction'])} higher (worse) with b than with a"
-        f"{'' if row['p'] < 0.05 else ', a difference that is not statistically significant'}: on average"
-        f" {means['b']} with b against {means['a']} with a ({p_phrase(row['p'])}, n = 3)."
+        f"{'' if row['p'] < 0.05 else ', a difference that is not statistically significant'}: on average, as"
+        f" roots, {means['b']} with b against {means['a']} with a ({p_phrase(row['p'])}, n = 3)."
     )
     assert " ".join(expected.split()) in text
     assert 'id="figure-answer"' in page
@@ -428,7 +431,7 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         assert TESTS[row["test"]].label in text
         ranks = row["statistic_name"] == "W+"
         assert (f"W₊ = {row['statistic']:g}" if ranks else f"{abs(row['statistic']):.2f}") in text
-        assert as_printed(row["method"]) in text
+        assert as_printed(method_in_words(row)) in text
     for row in steadyhand.results()["design_check"]:
         assert as_printed(row["found"]) in text
 
@@ -447,7 +450,7 @@ def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Fol
     study = folder(settings, **{"measures.csv": f"participant,condition,measure,value\n{rows}"})
     assert steadyhand("report", study).code == 0
     text = " ".join("".join(checked((steadyhand.out / "report.html").read_text(encoding="utf-8")).text).split())
-    assert "M: 6 pairs followed up the rm ANOVA and the mixed model: see the table of all comparisons." in text
+    assert "M: 6 pairs were compared after the rm ANOVA and the mixed model: see the table of all comparisons." in text
     assert "b − c 4 t(9) = " in text  # Satterthwaite's degrees of freedom stand with the statistic
     assert "Bonferroni-adjusted p" in text
     assert "Singular fit of the mixed model for M: it finds no variance between participants" in text

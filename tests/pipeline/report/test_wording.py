@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.words.phrases import all_of
+from pipeline.words.phrases import all_of, counted
 from tests.pipeline.helpers import Steadyhand
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
@@ -77,7 +77,8 @@ def test_a_single_score_is_answered_by_its_means_and_one_comparison_is_no_all(pa
     assert "scales by participant" not in text
     assert "The 1 comparison of the study." in text
     assert "All 1" not in text
-    assert all_of(3, "comparison") == "All 3 comparisons"
+    assert [all_of(n, "comparison") for n in (2, 3)] == ["Both comparisons", "All 3 comparisons"]
+    assert counted(2932, "selection") == "2\u2009932 selections"
 
 
 def test_a_pattern_is_named_by_its_measures_in_the_methods(page: Page) -> None:
@@ -88,7 +89,7 @@ def test_a_pattern_is_named_by_its_measures_in_the_methods(page: Page) -> None:
         measured({"time_s": pairs, "bias_mm": [(-a, -b) for a, b in pairs]}),
     )
     assert "*: paired" not in text
-    assert "Bias and Time: paired t tests" in text
+    assert "Bias and time were analysed by paired t tests" in text
     assert "Bias was" in text
     assert "Bias were" not in text
 
