@@ -25,7 +25,7 @@ from pipeline.words.phrases import listing
 _ANNEX = "annex"
 _ROWS_MAX = 250  # of a table: five pages
 _TEXTS_MAX = 60  # of words to paste
-_ANNEX_ROWS = 60  # of folded tables in all: with their captions, two pages
+_ANNEX_ROWS = 48  # of folded tables in all: with their captions, two pages
 
 
 def for_print(document: Document, names: Mapping[str, str]) -> Document:

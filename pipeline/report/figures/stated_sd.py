@@ -17,6 +17,7 @@ from pipeline.words.phrases import counted
 
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.5}
 _BAND: dict[str, Any] = {"color": GREY, "linewidth": 0, "alpha": 0.35}
+_ONE_ROW = 4  # as many panels stand in one row
 LINES_MAX = 60  # sessions with a line each; of more, a band is drawn
 
 
@@ -49,7 +50,7 @@ def calibration(table: pd.DataFrame) -> Figure:
     from scipy import stats
 
     names = list(dict.fromkeys(table["estimator"]))
-    figure, every, across = multiples(len(names), 1.75, a_row=3)
+    figure, every, across = multiples(len(names), 1.45, a_row=4 if len(names) <= _ONE_ROW else 3)
     grid = np.linspace(0, table["percent_of_sd"].max() / 100, 100)
     many = table["session"].nunique() > LINES_MAX
     for index, (axes, estimator) in enumerate(zip(every, names, strict=True)):
@@ -62,7 +63,7 @@ def calibration(table: pd.DataFrame) -> Figure:
         k, share = shares(rows)
         look: dict[str, Any] = {"color": colour(index), "marker": marker(index), "markersize": 4}
         axes.plot(k, 100 * share, **look)
-        axes.set_title(f"{as_label(estimator, 22)} (n = {counted(rows['session'].nunique(), 'session')})", fontsize=8.5)
+        axes.set_title(f"{as_label(estimator, 60 // across)} (n = {rows['session'].nunique()})", fontsize=8.5)
         if index % across == 0:
             axes.set_ylabel("Within k SD (%)")
     every[0].plot([], [], color=BLACK, linewidth=1, linestyle=(0, (4, 2)), label="normal")

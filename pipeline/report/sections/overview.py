@@ -308,7 +308,8 @@ def _further_results(material: Material) -> list[Text]:
             answers.append((Strong(f"{measure_label(row['measure'])}: "), f"{brief_sentence(row)}."))
     if _headline_rows(material):  # else they are said at the top of the page
         answers += _ratings(material)
-    return [*answers, *overview_estimators.statement(material, stands_alone=not answers)]
+    of_people = _headline_rows(material) or _only_score(material) or answers
+    return [*answers, *overview_estimators.statement(material, stands_alone=not of_people)]
 
 
 def _ratings(material: Material) -> list[Text]:

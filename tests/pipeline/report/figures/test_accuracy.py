@@ -104,7 +104,7 @@ def test_calibration_pools_instants_and_not_shares(tmp_path: Path) -> None:
     np.testing.assert_allclose(k, [1.0, 1.96])
     np.testing.assert_allclose(share, [0.09, 0.6])
     shown = texts(figures.calibration(table), tmp_path)
-    assert {"gp (n = 2 sessions)", "raw (n = 1 session)", "normal", "k (stated SDs)", "Within k SD (%)"} <= set(shown)
+    assert {"gp (n = 2)", "raw (n = 1)", "normal", "k (stated SDs)", "Within k SD (%)"} <= set(shown)
     assert "where a normal distribution has 95 %: gp 60 %, raw 60 %" in figures.calibration.words(table).caption
 
 
