@@ -152,3 +152,11 @@ def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     from pipeline.report.figures import style
 
     monkeypatch.setattr(style, "save", lambda _figure, path: path.write_text(EMPTY_FIGURE, encoding="utf-8"))
+
+
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a test that makes one report again and again: the files of figures are there, and none is even drawn."""
+    from pipeline.report import figures
+
+    monkeypatch.setattr(figures, "draw", lambda _figure, path, *_: path.write_text(EMPTY_FIGURE, encoding="utf-8"))

@@ -15,6 +15,8 @@ from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.reference import the
 from tests.pipeline.report.test_report import checked
 
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
 Folder = Callable[..., Path]
 
 SETTINGS = """

@@ -38,6 +38,7 @@ def test_more_than_forty_participants_have_a_page_each(
     assert len(found) == pages
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_participants_page_has_their_values_sessions_and_gaps(folder: Folder, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", many(folder, 41)).code == 0
     first, second, third = (

@@ -57,6 +57,7 @@ def more_sensors(seconds: float = 6.0) -> list[Message]:
     return messages
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_more_sensors_are_a_few_lines_of_the_study(folder: Folder, steadyhand: Steadyhand) -> None:
     root = folder(SETTINGS)
     write_session(root / "data" / "P1_a.mcap", more_sensors())

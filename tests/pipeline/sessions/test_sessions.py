@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -19,7 +20,8 @@ from pipeline.study.folder import load_study
 from pipeline.study.session_files import find_sessions
 from pipeline.tables.columns import S_PER_NS
 from tests.conftest import EPOCH_NS, STREAMS, session_messages, write_session
-from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.helpers import Steadyhand, exit_code
+from tests.pipeline.made_once import made_once
 
 Folder = Callable[..., Path]
 SETTINGS = (
@@ -37,16 +39,31 @@ comparisons: [{measure: selection_mse_mm2, test: wilcoxon}]
 )
 
 
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Two participants in two conditions, of which b errs 4 mm more, and the cache of their comparison."""
+
+    def make(folder: Path) -> None:
+        study = folder / "study"
+        study.mkdir()
+        (study / "study.yaml").write_text(SETTINGS, encoding="utf-8")
+        for participant in ("P1", "P2"):
+            for condition, bias_mm in (("a", 0.0), ("b", 4.0)):
+                path = study / "data" / f"{participant}_{condition}.mcap"
+                messages = session_messages(bias_mm=bias_mm)
+                write_session(path, messages, participant=participant, condition=condition)
+        with pytest.MonkeyPatch.context() as patched:
+            words = ("--out", folder / "out", "--cache", folder / "cache", "--jobs", "1")
+            assert exit_code(patched, "compare", study, *words) == 0
+
+    yield from made_once(tmp_path_factory, "sessions", make)
+
+
 @pytest.fixture
-def study(folder: Folder) -> Path:
-    """Two participants in two conditions; condition b errs 4 mm more."""
-    root = folder(SETTINGS)
-    for participant in ("P1", "P2"):
-        for condition, bias_mm in (("a", 0.0), ("b", 4.0)):
-            path = root / "data" / f"{participant}_{condition}.mcap"
-            messages = session_messages(bias_mm=bias_mm)
-            write_session(path, messages, participant=participant, condition=condition)
-    return root
+def study(compared: Path, tmp_path: Path, steadyhand: Steadyhand) -> Path:
+    """A copy of that study; sessions that a test does not change are in its cache."""
+    shutil.copytree(compared / "cache", steadyhand.cache)
+    return shutil.copytree(compared / "study", tmp_path / "study")
 
 
 def test_measures_by_their_definitions(study: Path, steadyhand: Steadyhand) -> None:
@@ -366,6 +383,7 @@ def test_an_accuracy_study_may_exclude_a_session(study: Path, steadyhand: Steady
     assert {row["session"] for row in steadyhand.results()["accuracy"]} == {"P1_b", "P2_a", "P2_b"}
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_study_of_events_alone(folder: Folder, steadyhand: Steadyhand) -> None:
     settings = "conditions: [a, b]\nsessions: '{participant}_{condition}.mcap'\nevents: {topic: /events}\n"
     root = folder(settings + "comparisons: [{measure: selection_mse_mm2, test: t_paired}]\n")
@@ -415,6 +433,7 @@ def test_a_stream_without_samples_sets_the_session_aside(study: Path, steadyhand
     assert 'session P1_a set aside: stream "tracker": topic /tracker/position holds no samples' in ran.err
 
 
+@pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize("lacking", ["imu", "orientation", "tracker"])
 def test_a_study_with_fewer_sensors(folder: Folder, steadyhand: Steadyhand, lacking: str) -> None:
     """Without an IMU, without orientation, or without a tracker: what can be said is said."""
