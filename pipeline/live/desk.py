@@ -1,4 +1,4 @@
-"""What the operator's page shows and may do, read off the state of a run. Pure."""
+"""What the operator's page shows and may do, read off the state of a run; its lights are `panel`. Pure."""
 
 from __future__ import annotations
 
@@ -15,15 +15,11 @@ from pipeline.study.recording import BUILT_IN
 if TYPE_CHECKING:
     from pipeline.live.run_state import StudyRun
 
-__all__ = ["BUILT_IN", "Refusal", "facts", "lights", "refusal", "state", "summary", "trace"]
+__all__ = ["BUILT_IN", "Refusal", "facts", "refusal", "state", "summary"]
 
 _NS_PER_MS = 1e6
 _NS_PER_S = 1e9
-_LEAST_FREE_BYTES = 200_000_000
-_LATE_WRITE_MS = 2_000.0
-_LOW_BATTERY = 0.2
-_LATELY_NS = 10_000_000_000
-_UNKNOWN = "Its orientation is not known yet: hold it still, then move it."
+LEAST_FREE_BYTES = 200_000_000
 _UNALIGNED = (
     "The phone's orientation is not known yet: hold it still for a second, then move it about in view of the tracker;"
     " or give a reason to start without it."
@@ -52,7 +48,7 @@ def red_lights(run: StudyRun, at_ns: int) -> list[str]:
         found.append(_UNALIGNED)
     if run.disk is not None and run.disk.fault is not None:
         found.append(run.disk.fault)
-    elif run.disk is not None and run.disk.free_bytes < _LEAST_FREE_BYTES:
+    elif run.disk is not None and run.disk.free_bytes < LEAST_FREE_BYTES:
         found.append("The disk is nearly full. A study needs 200 MB.")
     return [*found, *(one.text for one in run.checks if one.light == "red")]
 
@@ -135,7 +131,7 @@ def state(run: StudyRun, client: int) -> Whole:
         "next": _next(run),
         "now": None if now is None else _now(run, *now),
         "checks": [{"id": one.id, "light": one.light, "text": one.text} for one in run.checks],
-        "log": _log(run),
+        "log": open_log(run),
         "disk_free_bytes": None if run.disk is None else run.disk.free_bytes,
         "agreement": _agreement(run),
         "links": [{"role": role, "url": url, "qr": f"/qr/{role}.svg"} for role, url in run.setup.links],
@@ -202,7 +198,8 @@ def _now(run: StudyRun, person: plan.Person, index: int) -> dict[str, object]:
     }
 
 
-def _log(run: StudyRun) -> dict[str, object] | None:
+def open_log(run: StudyRun) -> dict[str, object] | None:
+    """The log that is written, None while none is."""
     disk, attempt = run.disk, run.attempt
     if attempt is None or attempt.phase == "ended" or disk is None or disk.log_bytes is None:
         return None
@@ -235,120 +232,6 @@ def _problems(run: StudyRun) -> list[str]:
                 of = f"{task.trials} of {len(run.setup.targets_mm)} targets"
                 found.append(f"{person.id}, task {index + 1} was cut after {task.cut_s:.1f} s, {of}: redo or keep it.")
     return found
-
-
-def lights(run: StudyRun, at_ns: int) -> Whole:
-    """The lights and traces."""
-    attempt = run.attempt
-    found: dict[str, object] = {}
-    for name, one in run.health.items():
-        lost = attempt.heard[name].lost if attempt is not None else 0
-        light = health.light(one, at_ns, lost)
-        problem = run.links.get(name) or (None if one.count else _not_yet(run, name))
-        if (
-            name == run.setup.turned_stream != run.setup.motion_stream
-            and is_unaligned(run)
-            and light["light"] == "green"
-        ):
-            light = {**light, "light": "amber", "text": f"{light['text']}. {_UNKNOWN}"}
-        found[name] = {**light, "light": "red", "text": problem} if problem else light
-    found |= {
-        "senders": _senders_light(run, at_ns),
-        "phone": _phone_light(run),
-        "clock": _clock_light(run),
-        "disk": _disk_light(run),
-        "log": _log_light(run),
-    }
-    mapping = run.clock.mapping
-    return Whole(
-        "lights",
-        {
-            "lights": found,
-            "drawn_hz": float(len(run.drawn)),
-            "round_trip_ms": None if mapping is None else round(2 * mapping.uncertainty_ms, 2),
-            "traces": {
-                "t_s": [round((at - at_ns) / _NS_PER_S, 2) for at, _, _ in run.traces],
-                "raw_mm": [raw for _, raw, _ in run.traces],
-                "shown_mm": [shown for _, _, shown in run.traces],
-            },
-        },
-    )
-
-
-def _not_yet(run: StudyRun, name: str) -> str | None:
-    """What is said of a sender by UDP of which nothing has come, as a firewall or a wrong address leave it."""
-    port = run.setup.recording.senders[name].port
-    return None if port is None else f"Nothing has come to UDP port {port}: see the sender's address, and the firewall."
-
-
-def _senders_light(run: StudyRun, at_ns: int) -> dict[str, object]:
-    """What was sent and not taken: amber for ten seconds after each."""
-    dropped = run.dropped
-    if dropped is None:
-        return {"light": "off", "text": "Nothing was dropped."}
-    counted = ", ".join(f"{reason} ({count})" for reason, count in sorted(dropped.counts.items()))
-    lately = at_ns - dropped.at_ns < _LATELY_NS
-    return {"light": "amber" if lately else "green", "text": f"Not taken: {counted}."}
-
-
-def _phone_light(run: StudyRun) -> dict[str, object]:
-    if run.phone is None:
-        return {"light": "red", "text": "No phone is connected. Scan the code with the phone."}
-    if run.is_away or run.is_hidden:
-        return {"light": "red", "text": "Connected, and its page is not in view or out of reach: wake the phone up."}
-    if run.battery is not None and run.battery < _LOW_BATTERY:
-        return {"light": "amber", "text": f"Connected. Its battery is at {run.battery:.0%}: plug it in."}
-    if run.hello is not None and not run.hello.wake_lock and not run.setup.mouse:
-        return {"light": "amber", "text": "Connected. Its screen may go dark: set its automatic lock to “never”."}
-    if run.setup.motion_stream is not None and is_unaligned(run):
-        return {"light": "amber", "text": f"Connected. {_UNKNOWN}"}
-    return {"light": "green", "text": "Connected."}
-
-
-def _clock_light(run: StudyRun) -> dict[str, object]:
-    """How well the phone's clock is known; amber where that of any sender was set."""
-    mapping = run.clock.mapping
-    were_set = ", ".join(name for name, one in run.one_way.items() if one.steps)
-    if were_set and not run.clock.steps:
-        return {"light": "amber", "text": f"The clock of the sender of {were_set} was set; it is known anew."}
-    if mapping is None:
-        return {"light": "off" if run.phone is None else "amber", "text": "The phone's clock is not known yet."}
-    text = f"Known to ± {mapping.uncertainty_ms:.1f} ms."
-    if run.clock.steps:
-        return {
-            "light": "amber",
-            "text": f"{text} It was set {'once' if run.clock.steps == 1 else f'{run.clock.steps} times'}.",
-        }
-    return {"light": "green" if mapping.uncertainty_ms < 10 else "amber", "text": text}
-
-
-def _disk_light(run: StudyRun) -> dict[str, object]:
-    if run.disk is None:
-        return {"light": "off", "text": ""}
-    if run.disk.fault is not None:
-        return {"light": "red", "text": run.disk.fault}
-    free = f"{run.disk.free_bytes / 1e9:.1f} GB free."
-    return {"light": "green" if run.disk.free_bytes >= _LEAST_FREE_BYTES else "red", "text": free}
-
-
-def _log_light(run: StudyRun) -> dict[str, object]:
-    known = _log(run)
-    if known is None or run.disk is None or run.disk.log_bytes is None:
-        return {"light": "off", "text": "No log is open."}
-    written = 0.0 if run.disk.written_ns is None else (run.disk.at_ns - run.disk.written_ns) / _NS_PER_MS
-    text = f"{run.disk.log_bytes / 1e6:.1f} MB, written {written / 1e3:.1f} s ago."
-    return {"light": "green" if written < _LATE_WRITE_MS else "red", "text": text}
-
-
-def trace(run: StudyRun, at_ns: int) -> tuple[int, float | None, float | None]:
-    """A point of the traces: time, and x in mm as the tracker has it and as it is shown."""
-    attempt = run.attempt
-    if attempt is None:
-        return at_ns, None, None
-    heard = attempt.heard.get(run.setup.tracker or "")
-    raw = heard.last[0] * 1e3 if heard is not None and heard.last else None
-    shown = attempt.sent[-1].mean_mm[list(attempt.attempt.axes).index("x")] if attempt.sent else None
-    return at_ns, raw, shown
 
 
 def facts(run: StudyRun, person: plan.Person, index: int, reason: str, at_ns: int) -> dict[str, str]:

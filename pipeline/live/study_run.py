@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipeline.live import checking, clocks, deeds, desk, forms, health, orientation, presence, session_state
+from pipeline.live import checking, clocks, deeds, desk, forms, health, orientation, panel, presence, session_state
 from pipeline.live.changes import changed
 from pipeline.live.events import (
     NOTHING,
@@ -123,11 +123,11 @@ def _tick(run: StudyRun, tick: Tick) -> Stepped:
     run, examine = checking.examine(run, tick.at_ns)
     actions = (*missed, *actions, *examine)
     if not run.traces or tick.at_ns - run.traces[-1][0] >= _TRACE_NS:
-        run = changed(run, traces=(*run.traces[1 - _TRACES :], desk.trace(run, tick.at_ns)))
+        run = changed(run, traces=(*run.traces[1 - _TRACES :], panel.trace(run, tick.at_ns)))
     if tick.at_ns - run.lights_ns < _LIGHTS_NS:
         return run, actions
     run = changed(run, lights_ns=tick.at_ns, drawn=tuple(at for at in run.drawn if tick.at_ns - at < 10**9))
-    lights = desk.lights(run, tick.at_ns) if run.operators else None
+    lights = panel.lights(run, tick.at_ns) if run.operators else None
     return run, (*actions, *(Tell(client, lights) for client in run.operators if lights is not None))
 
 

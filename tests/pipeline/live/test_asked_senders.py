@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from websockets.asyncio.server import ServerConnection
 
-from pipeline.live import desk
+from pipeline.live import desk, panel
 from pipeline.live.adapters import client, foxglove, lsl, rosbridge
 from pipeline.live.adapters.client import Client
 from pipeline.live.adapters.feeds import Feed
@@ -234,7 +234,7 @@ def test_a_sender_s_connection_is_a_light_a_reason_and_a_note(tmp_path: Path) ->
     lab.goes_on(1.0)
     problem = "tracker: ws://h:9090 cannot be connected to (refused); start the server. Trying again."
     lab.happens(Link("tracker", problem, lab.now))
-    lights: Any = desk.lights(lab.run, lab.now).content["lights"]
+    lights: Any = panel.lights(lab.run, lab.now).content["lights"]
     assert (lights["tracker"]["light"], lights["tracker"]["text"]) == ("red", problem)
     assert lights["imu"]["light"] == "green"
     lab.goes_on(0.5, tracker=False)

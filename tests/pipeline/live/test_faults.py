@@ -13,7 +13,7 @@ import yaml
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pipeline.errors import PipelineError
-from pipeline.live import clocks, desk, run_state, study_run
+from pipeline.live import clocks, desk, panel, run_state, study_run
 from pipeline.live.adapters import websocket
 from pipeline.live.clerk import Clerk
 from pipeline.live.events import (
@@ -40,12 +40,12 @@ from pipeline.live.events import (
 )
 from pipeline.live.journal import PART, Journal
 from pipeline.live.loop import Clock, Outbox
-from pipeline.live.messages import Battery, Do, Drawn, Exchange, Ping, Visible
+from pipeline.live.messages import Do, Drawn, Exchange, Ping
 from pipeline.live.outgoing import Refused, Say, Shown, Whole
 from pipeline.live.run_state import StudyRun
 from pipeline.live.watch import Light
 from pipeline.sessions.logs.mcap import Message
-from tests.pipeline.live.studies import study_in
+from tests.pipeline.live.studies import STUDY, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 MS = 1_000_000
@@ -55,8 +55,8 @@ OPERATOR, PHONE = 1, 2
 class Lab:
     """A study that is run by hand: what happens, and what was wanted done."""
 
-    def __init__(self, folder: Path) -> None:
-        self.study, setup = study_in(folder)
+    def __init__(self, folder: Path, text: str = STUDY) -> None:
+        self.study, setup = study_in(folder, text)
         self.run: StudyRun = run_state.begin(setup, setup.empty_plan())
         self.actions: list[Action] = []
         self.at_ms = 0.0
@@ -158,7 +158,7 @@ def test_without_accelerations_the_estimator_goes_on_with_what_there_is(lab: Lab
     shown = [one for one in lab.goes_on(0.5, imu=False) if isinstance(one, Show)]
     assert shown
     assert lab.run.phase == "session"
-    lights = desk.lights(lab.run, lab.now).content["lights"]
+    lights = panel.lights(lab.run, lab.now).content["lights"]
     assert lights["imu"]["light"] == "red"  # type: ignore[index]
     lab.does("abort", "the phone's motion is gone")
     lab.happens(Closed("data/set-aside/P01_fusion.1.mcap", lab.now))
@@ -180,7 +180,7 @@ def test_a_phone_s_clock_that_is_set_is_followed_noted_and_amber(lab: Lab) -> No
     pings(1.5, 0.0)
     assert notes(pings(1.0, 0.0)) == []
     assert notes(pings(3.0, 60_000.0)) == ["clock_step"]
-    light = desk.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
+    light = panel.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
     assert (light["light"], "was set once" in light["text"]) == ("amber", True)
     assert lab.run.phase == "session"
     theirs = lab.now / MS - 60_000.0
@@ -204,7 +204,7 @@ def test_a_sender_s_own_times_can_be_had_back_and_its_clock_that_is_set_is_noted
     started = lab.does("start")
     actions = [*started, *sends(2.0, 0.0), *sends(3.0, -3_600_000.0)]
     assert notes(actions).count("clock_step") == 1
-    light = desk.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
+    light = panel.lights(lab.run, lab.now).content["lights"]["clock"]  # type: ignore[index]
     assert (light["light"], light["text"]) == ("amber", "The clock of the sender of imu was set; it is known anew.")
     offset_ms, checked = float("nan"), 0
     for one in (action.message for action in actions if isinstance(action, Write)):
@@ -216,42 +216,13 @@ def test_a_sender_s_own_times_can_be_had_back_and_its_clock_that_is_set_is_noted
     assert checked > 100
 
 
-def test_a_phone_that_sleeps_is_away_though_its_connection_seems_to_live(lab: Lab) -> None:
-    def speaks() -> list[Action]:
-        return lab.happens(Said("phone", PHONE, Ping(lab.now / MS), lab.now))
-
-    lab.goes_on(0.5)
-    lab.does("start")
-    assert notes(lab.goes_on(1.5)) == []  # it has never asked for the time: nothing is known of its silence
-    speaks()
-    assert notes([*lab.goes_on(0.9), *speaks()]) == []
-    assert notes(lab.goes_on(1.5)) == ["phone_away"]
-    light = desk.lights(lab.run, lab.now).content["lights"]["phone"]  # type: ignore[index]
-    assert light["light"] == "red" and "wake the phone up" in light["text"]
-    assert notes([*speaks(), *lab.goes_on(0.5)]) == ["phone_back"]
-    assert lab.run.phase == "session"
-    actions = lab.goes_on(2.2)
-    assert any(isinstance(one, Close) and one.set_aside for one in actions)
-    assert lab.run.attempt is not None and lab.run.attempt.ended_by == "the phone was away for over 2 s"
-
-
-def test_a_hidden_page_is_noted_and_a_low_battery_said(lab: Lab) -> None:
-    lab.goes_on(0.5)
-    lab.does("start")
-    assert notes(lab.happens(Said("phone", PHONE, Visible(False, lab.now / MS), lab.now))) == ["phone_hidden"]
-    assert notes(lab.happens(Said("phone", PHONE, Visible(True, lab.now / MS), lab.now))) == ["phone_visible"]
-    lab.happens(Said("phone", PHONE, Battery(0.12), lab.now))
-    light = desk.lights(lab.run, lab.now).content["lights"]["phone"]  # type: ignore[index]
-    assert light == {"light": "amber", "text": "Connected. Its battery is at 12%: plug it in."}
-
-
 def test_readings_that_come_in_batches_are_amber(lab: Lab) -> None:
     for batch in range(5):
         lab.at_ms += 1000
         for number in range(30):  # a second's, all at once
             stamp = lab.now - (1000 - 33 * number) * MS
             lab.happens(Reading("tracker", stamp, lab.now + number, (0.001 * batch, 0.5, 1.0)))
-    light = desk.lights(lab.run, lab.now).content["lights"]["tracker"]  # type: ignore[index]
+    light = panel.lights(lab.run, lab.now).content["lights"]["tracker"]  # type: ignore[index]
     assert light["light"] == "amber"
     assert light["text"].endswith("too late to be shown: have each reading sent at once, not in batches.")
 
@@ -270,7 +241,7 @@ def test_after_a_lost_tracker_the_task_may_be_done_again(lab: Lab) -> None:
 
 def test_what_is_not_taken_is_said_for_ten_seconds_and_counted_for_good(lab: Lab) -> None:
     def light() -> dict[str, str]:
-        return desk.lights(lab.run, lab.now).content["lights"]["senders"]  # type: ignore[index,no-any-return]
+        return panel.lights(lab.run, lab.now).content["lights"]["senders"]  # type: ignore[index,no-any-return]
 
     assert light() == {"light": "off", "text": "Nothing was dropped."}
     lab.happens(Dropped({"wrong key": 3, "too long": 1}, lab.now))

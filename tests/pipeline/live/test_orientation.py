@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.live import desk, orientation, run_state, study_run
+from pipeline.live import desk, orientation, panel, run_state, study_run
 from pipeline.live.clerk import agreement
 from pipeline.live.events import Joined, Reading, Said, Show, Tick, Write
 from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Ping
@@ -180,7 +180,7 @@ def test_of_a_sender_that_brings_no_orientation_it_is_found_too_and_the_log_repl
         values = (*(force[row] / 1000).tolist(), *turning[row].tolist(), *[np.nan] * 4)
         happens(Reading("imu", None, ns(at + 0.005), values, row + 1, ns(at) / 1e6))
         if row == 10:
-            light = desk.lights(run, ns(at + 0.006)).content["lights"]["imu"]  # type: ignore[index]
+            light = panel.lights(run, ns(at + 0.006)).content["lights"]["imu"]  # type: ignore[index]
             assert (light["light"], "orientation is not known yet" in light["text"]) == ("amber", True)
             assert any("orientation is not known yet" in one for one in desk.red_lights(run, ns(at + 0.006)))
         if row == 400:
