@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
+import socket
+import time
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.commands import record
 from pipeline.errors import PipelineError
 from pipeline.live import senders
+from pipeline.live.access import Access
 from pipeline.live.adapters import apps
 from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.events import Offer, Reading
 from pipeline.live.messages import MessageError
 from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.test_server import Running, hears, served
 
 HERE, PHONE = "127.0.0.1", "192.168.1.7"
 G = 9.80665
@@ -144,3 +150,35 @@ def test_an_app_named_by_its_address_is_heard_from_there_alone(tmp_path: Path) -
 def test_what_an_app_and_a_port_cannot_do_is_said_at_the_start(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(PipelineError, match=message):
         senders.check(study_in(tmp_path, STUDY.replace(_DEMO, text))[1], "study.yaml")
+
+
+def test_the_start_says_where_to_send_to_and_what_is_in_the_clear(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = "senders: {tracker: {udp_json: {port: 9700}}, imu: {app: {name: zig_sim, port: 9000}}}"
+    _, setup = study_in(tmp_path, STUDY.replace(_DEMO, text))
+    record._ready(tmp_path)(setup, Access("http", "192.168.1.5", 8443), None)
+    said = capsys.readouterr().out
+    assert "tracker: by UDP to 192.168.1.5, port 9700" in said
+    assert "imu: by UDP to 192.168.1.5, port 9000" in said
+    assert "Without TLS a phone gives its pages no motion" in said
+
+
+def test_an_app_s_readings_reach_their_stream_over_a_real_socket(tmp_path: Path) -> None:
+    async def send(running: Running) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while True:
+                row = HYPERIMU.replace(b"1518819953744", str(round(time.time() * 1000)).encode())
+                sender.sendto(row, (HERE, running.udp_port))
+                await asyncio.sleep(0.01)
+
+    async def play(running: Running) -> None:
+        async with running.page("operator") as operator:
+            sending = asyncio.create_task(send(running))
+            text = ""
+            while not text.endswith("its orientation is not known yet: hold it still, then move it."):
+                text = (await hears(operator, "lights"))["lights"]["imu"]["text"]
+            sending.cancel()
+
+    text = "senders: {tracker: {demo: {}}, imu: {app: {name: hyperimu, port: PORT}}}"
+    served(tmp_path, play, STUDY.replace(_DEMO, text))
