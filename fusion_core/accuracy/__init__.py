@@ -21,6 +21,7 @@ _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correl
 _RESAMPLES = 1000
 _BLOCKS_MAX = 200_000  # to draw from: 2 kB each, and those a few ms apart are nearly the same
 _ROWS_AT_ONCE = 2**18  # of what is gone through part by part
+_TRANSFORMED = 2**22  # instants, of which the spectra of two signals take 0.5 GB
 _FLAT = 1e-6  # costs that differ by less than this share say nothing: while the reference is still, any shift fits
 
 
@@ -93,10 +94,15 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     order = np.argsort(reference.time, kind="stable")
     known, value = reference.time[order], reference.value[order]
     usable = _surrounded(known, time)
-    if not usable.any() or np.ptp(time[usable]) < 1.0:
+    if not usable.any():
         return NO_INTERVAL
-    if not usable.all():
+    first, last = int(np.argmax(usable)), len(usable) - int(np.argmax(usable[::-1]))
+    if not usable[first:last].all():
         time, estimate = time[usable], estimate[usable]
+    else:  # most often: only the ends are not, and nothing is copied
+        time, estimate = time[first:last], estimate[first:last]
+    if time[-1] - time[0] < 1.0:
+        return NO_INTERVAL
     estimate = np.ascontiguousarray(estimate, dtype=np.float64)
     block = min(max(1, round(_BLOCK_S / float(np.median(np.diff(time))))), len(time))
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
@@ -106,8 +112,11 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     whole = lag_steps.best(blocks.total, scale)
     if scale - blocks.total.min() <= _FLAT * scale or not 0 < whole < len(shifts) - 1:
         return NO_INTERVAL
-    picks = random.integers(len(blocks.still), size=(_RESAMPLES, max(1, len(time) // block)))
-    resampled = lag_steps.best_of_resamples(blocks, picks)
+    each, resampled = max(1, len(time) // block), np.empty(_RESAMPLES)
+    at_once = max(1, _ROWS_AT_ONCE // each)
+    for begin in range(0, _RESAMPLES, at_once):
+        own = resampled[begin : begin + at_once]
+        own[:] = lag_steps.best_of_resamples(blocks, random.integers(len(blocks.still), size=(len(own), each)))
     resampled = resampled[np.isfinite(resampled)]
     low, high = np.percentile(resampled, [2.5, 97.5]) if len(resampled) >= _RESAMPLES // 2 else (np.nan, np.nan)
     return Interval(*(float(shifts[0] + steps * _LAG_STEP_S) for steps in (whole, low, high)))
@@ -179,11 +188,20 @@ def cross_correlation(
 
 
 def _correlation(first: _Signal, second: _Signal, farthest: int | None) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    n, means = len(first.at), (first.means(), second.means())
+    most = n - 1 if farthest is None else min(n - 1, farthest)
+    sums = _sums_of_parts if n > _TRANSFORMED and most < _ROWS_AT_ONCE else _sums
+    shifts = np.arange(-most, most + 1)
+    return shifts, np.asarray(sums(first, second, means, shifts) / (n - np.abs(shifts)), dtype=np.float64)
+
+
+def _sums(
+    first: _Signal, second: _Signal, means: tuple[FloatArray, FloatArray], shifts: npt.NDArray[np.int64]
+) -> FloatArray:
+    """Σ first[t]·second[t + shift] less their means, by a transform of the whole signals."""
     from scipy import fft
 
-    n = len(first.at)
-    length = fft.next_fast_len(2 * n - 1, real=True)
-    means = first.means(), second.means()
+    length = fft.next_fast_len(2 * len(first.at) - 1, real=True)
     spectrum: Any = None
     for axis in range(first.value.shape[1]):  # one after the other: the spectra take six times the signals' memory
         a = first.spectrum(axis, means[0][axis], length)
@@ -191,10 +209,27 @@ def _correlation(first: _Signal, second: _Signal, farthest: int | None) -> tuple
         a *= second.spectrum(axis, means[1][axis], length)
         spectrum = a if spectrum is None else np.add(spectrum, a, out=spectrum)
         del a
-    circular = fft.irfft(spectrum, length)  # negative shifts are at its end
-    most = n - 1 if farthest is None else min(n - 1, farthest)
-    shifts = np.arange(-most, most + 1)
-    return shifts, np.asarray(circular[shifts] / (n - np.abs(shifts)), dtype=np.float64)
+    circular: FloatArray = fft.irfft(spectrum, length)  # negative shifts are at its end
+    return circular[shifts]
+
+
+def _sums_of_parts(
+    first: _Signal, second: _Signal, means: tuple[FloatArray, FloatArray], shifts: npt.NDArray[np.int64]
+) -> FloatArray:
+    """The same but for round-off, part by part, for signals whose transform would take gigabytes."""
+    from scipy.signal import correlate
+
+    n, most, total = len(first.at), int(shifts[-1]), np.zeros(len(shifts))
+    for begin in range(0, n, _ROWS_AT_ONCE):
+        end = min(begin + _ROWS_AT_ONCE, n)
+        low, high = max(begin - most, 0), min(end + most, n)
+        around = np.zeros(end - begin + 2 * most)
+        there = slice(low - begin + most, high - begin + most)
+        for axis in range(first.value.shape[1]):
+            around[there] = second.value[second.at[low:high], axis] - means[1][axis]
+            own = first.value[first.at[begin:end], axis] - means[0][axis]
+            total += correlate(around, own, "valid", "fft")
+    return total
 
 
 def lead_by_cross_correlation(time: FloatArray, estimate: FloatArray, tracker: Samples) -> float:

@@ -96,6 +96,7 @@ def accuracy_row(
         "coverage_95": float(np.mean(covered.whole())),
     }
     del squared, variance, covered
+    tables.give_back(len(time))
     random = recording.seeded(work.session.id, estimator)
     lag = accuracy.lag(time.whole(), mean.whole(), reference, random)
     return row | {

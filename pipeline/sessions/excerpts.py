@@ -73,10 +73,11 @@ def _liveliest(tracker: Samples) -> tuple[int, float]:
     most = {"turn": (-1.0, 0, float(tracker.arrival[0])), "range": (-1.0, 0, float(tracker.arrival[0]))}
     last = max(tracker.arrival[-1] - EXCERPT_S, tracker.arrival[0])
     for begin in np.arange(tracker.arrival[0], last + 1e-9, 0.5):
-        inside = (tracker.arrival >= begin) & (tracker.arrival <= begin + EXCERPT_S)
-        if inside.sum() < 2:
+        first = np.searchsorted(tracker.arrival, begin)
+        inside = tracker.value[first : np.searchsorted(tracker.arrival, begin + EXCERPT_S, side="right")]
+        if len(inside) < 2:
             continue
-        for axis, value in enumerate(tracker.value[inside].T):
+        for axis, value in enumerate(inside.T):
             for what, size in (("turn", _turn_mm(value)), ("range", float(np.ptp(value)))):
                 if size > most[what][0]:
                     most[what] = (size, axis, float(begin))
@@ -108,6 +109,7 @@ def lead_curves(study: Study, session: str, loaded: Recording, tracks: Mapping[s
             settled = run_of(time >= tracker.arrival[0] + SETTLED_S)
             times.add(time[settled])
             means.add(shown.mean[settled])
+        tables.give_back(len(times))
         curve = accuracy.lead_curve(times.whole(), means.whole(), tracker)
         if curve is None or not np.max(np.abs(curve[1])) > 0:
             continue
@@ -145,7 +147,7 @@ def _arrivals(ingested: Path) -> dict[tuple[str, str], IntArray]:
     """The sorted arrivals of each session's streams in ns, in the order of the tables."""
     found: dict[tuple[str, str], Growing] = {}
     for name in ("positions", "readings", "imu"):
-        for part in tables.read_parts(name, ingested):
+        for part in tables.read_parts(name, ingested, ("session", "stream", "arrival_ns")):
             for stream in pc.unique(part["stream"]).to_pylist():
                 own = found.setdefault((part["session"][0].as_py(), stream), Growing(np.int64))
                 own.add(tables.matching(part, "stream", stream)["arrival_ns"])

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import mmap
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -14,7 +12,6 @@ import numpy.typing as npt
 Array = np.ndarray[Any, Any]
 
 _SPILLED = 2**18  # rows that wait in memory to be written
-_AT_ONCE = 2**16
 _MORE = 16  # a full array grows by one in so many rows
 
 
@@ -49,7 +46,7 @@ class Growing:
 class Spilling(Growing):
     """The same in a file without a name in `folder`, once there are many; None: always in memory.
 
-    `whole` then is mapped from the file, and takes memory where it is looked at, until `let_go`.
+    `whole` then is mapped from the file, and takes memory where it is looked at, until `by_parts.let_go`.
     """
 
     def __init__(self, folder: Path | None, kind: npt.DTypeLike, *width: int) -> None:
@@ -81,30 +78,6 @@ class Spilling(Growing):
             shape = (count, *self._rows.shape[1:])
             self._rows = self._rows[:0]
             return np.memmap(file, self._rows.dtype, "r", shape=shape)
-
-
-def let_go(rows: Array) -> None:
-    """Rows that are mapped from a file, or a view of them, take no memory until they are looked at again."""
-    mapped = getattr(rows, "_mmap", None)
-    if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
-        mapped.madvise(mmap.MADV_DONTNEED)
-
-
-def in_memory(rows: Array) -> Array:
-    """The rows themselves, or a copy where they are mapped from a file."""
-    if getattr(rows, "_mmap", None) is None:
-        return rows
-    found = np.empty(rows.shape, rows.dtype)
-    for part in parts_of(len(rows)):
-        found[part] = rows[part]
-        let_go(rows)
-    return found
-
-
-def parts_of(count: int) -> Iterator[slice]:
-    """Slices of so many rows, some at a time."""
-    for begin in range(0, count, _AT_ONCE):
-        yield slice(begin, begin + _AT_ONCE)
 
 
 class MostlyAlike:

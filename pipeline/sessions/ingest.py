@@ -11,10 +11,10 @@ import pyarrow as pa
 
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError, SessionError, did_you_mean
+from pipeline.sessions.by_parts import let_go, parts_of
 from pipeline.sessions.checks import check_rows
 from pipeline.sessions.checks.of_log import of_log
-from pipeline.sessions.growing import let_go, parts_of
-from pipeline.sessions.logs import read_logs
+from pipeline.sessions.logs import READERS, log_suffix, read_logs
 from pipeline.sessions.logs.log import IntArray, Limits, Log, Readings
 from pipeline.sessions.stream_quality import clock_went_back, quality_row
 from pipeline.sessions.usable import finite, usable, within_a_day
@@ -31,6 +31,9 @@ from pipeline.tables.table import Row
 MM_PER_M = 1000.0
 MEMORY_PER_BYTE = 6.0
 """Bytes of memory that a session takes for each of its log, by docs/limits.md."""
+MEMORY_PER_BYTE_DECODED = 2.0
+"""The same of a log that is decoded while it is read."""
+_WHOLE = READERS.keys() - {".mcap", ".db3", ".bag"}  # formats whose file is in memory besides
 _NEEDED = ("position", "acceleration", "velocity", "linear")  # without these a session has nothing to fuse
 _SAME_CLOCK_S = 3600.0
 _TOPICS_MAX = 40  # named in a message
@@ -95,7 +98,8 @@ def run(work: Work) -> Outcome:
 def _require_memory(session: Session) -> None:
     """Raise PipelineError, and not SessionError, which would stand in the cache when there is room for the log."""
     size = sum(file.stat().st_size for file in session.files)
-    lacking = shortage(size, MEMORY_PER_BYTE, free_bytes())
+    whole = any(log_suffix(file) in _WHOLE for file in session.files)
+    lacking = shortage(size, MEMORY_PER_BYTE if whole else MEMORY_PER_BYTE_DECODED, free_bytes())
     if lacking is not None:
         raise PipelineError(f"session {session.id}: {lacking}")
 

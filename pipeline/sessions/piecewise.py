@@ -11,7 +11,7 @@ from fusion_core import Samples, Track
 from fusion_core.estimator import Resuming
 from fusion_core.sensors import position_sensor
 from pipeline.statistics.arrays import FloatArray
-from pipeline.tables.table import ROWS_AT_ONCE
+from pipeline.tables import table as tables
 
 _Stretch = tuple[dict[str, Samples], float]
 """The long stream's readings of a stretch of time, and when the next stretch begins, in s."""
@@ -38,8 +38,8 @@ def replayed(
 
 
 def _by_times(times: FloatArray) -> Iterator[_Stretch]:
-    for begin in range(0, max(len(times), 1), ROWS_AT_ONCE):
-        end = begin + ROWS_AT_ONCE
+    for begin in range(0, max(len(times), 1), tables.ROWS_AT_ONCE):
+        end = begin + tables.ROWS_AT_ONCE
         yield {}, float(times[end]) if end < len(times) else np.inf
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sessions.growing import let_go, parts_of
+from pipeline.sessions.by_parts import each_part
 from pipeline.sessions.logs.log import BoolArray, IntArray, Readings
 from pipeline.statistics.arrays import FloatArray
 
@@ -22,11 +22,8 @@ def within_a_day(times_ns: IntArray) -> BoolArray:
 
 def finite(values: FloatArray, width: int) -> BoolArray:
     """Which rows (n,) of values (n, …) have finite figures in their first columns."""
-    found = np.empty(len(values), np.bool_)
-    for part in parts_of(len(values)):
-        found[part] = np.isfinite(values[part, :width]).all(axis=1)
-        let_go(values)
-    return found
+    known = [np.isfinite(part[:, :width]).all(axis=1) for part in each_part(values)]
+    return np.concatenate([np.zeros(0, np.bool_), *known])
 
 
 def usable(readings: Readings, which: BoolArray) -> Readings:

@@ -26,13 +26,14 @@ makes its interval wide; while a hand rests nothing is known, and the interval i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.sessions.growing import parts_of
+from pipeline.sessions.by_parts import parts_of, sums_before
 from pipeline.statistics.arrays import FloatArray
 
 LAG_RANGE_S = 0.6
@@ -192,30 +193,22 @@ def _averaged(grid: FloatArray, time: FloatArray, value: FloatArray) -> FloatArr
     edges = np.append(grid - _STEP_S / 2, grid[-1] + _STEP_S / 2)
     needed = int(np.searchsorted(time, edges[-1], side="right")) + 2  # of a long session the grid covers a part
     time, value = time[:needed], value[:needed]
-    area = _area(time, value)
     at = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, len(time) - 2)
     lasting = (time[at + 1] - time[at])[:, None]
     since = np.clip((edges - time[at])[:, None], 0.0, lasting)
     slope = (value[at + 1] - value[at]) / lasting
-    inside = area[at] + since * (value[at] + slope * since / 2)
+    inside = sums_before(_areas(time, value), at) + since * (value[at] + slope * since / 2)
     width = np.diff(np.clip(edges, time[0], time[-1]))[:, None]
     found: FloatArray = np.diff(inside, axis=0) / np.maximum(width, _STEP_S / 4)
     return found
 
 
-def _area(time: FloatArray, value: FloatArray) -> FloatArray:
-    """The integral (n, d) up to each reading, some readings at a time."""
-    area = np.zeros(value.shape)
+def _areas(time: FloatArray, value: FloatArray) -> Iterator[FloatArray]:
+    """The integral from each reading to the next (n - 1, d), some readings at a time."""
     for part in parts_of(len(time) - 1):
         end = slice(part.start + 1, part.stop + 1)
-        own = area[end]
-        np.add(value[end], value[part][: len(own)], out=own)
-        own *= (time[end] - time[part][: len(own)])[:, None]
-        own /= 2
-        if part.start:
-            own[0] += area[part.start]
-        np.cumsum(own, axis=0, out=own)
-    return area
+        later, since = value[end], time[end]
+        yield (later + value[part][: len(later)]) * (since - time[part][: len(since)])[:, None] / 2
 
 
 def _filtered(value: FloatArray, order: int) -> FloatArray:

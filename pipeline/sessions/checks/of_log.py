@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.sessions.by_parts import in_memory
 from pipeline.sessions.checks.recorded import Events, Frames, Imu, Positions, Recorded, Times
 from pipeline.sessions.checks.turns import turned
-from pipeline.sessions.growing import in_memory
 from pipeline.sessions.logs.log import BoolArray, Log, Readings
 from pipeline.sessions.usable import finite, usable, within_a_day
 from pipeline.sessions.wanted import of_events, of_stream

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.sessions.by_parts import each_part, sums_before, taken
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.recorded import Imu, Recorded
 from pipeline.sessions.checks.turning_causes import turning_cause
@@ -143,12 +144,11 @@ def _turning(imu: Imu) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatA
 
     And the orientations (k, 4) at both ends of each span, with its length (k,) in s.
     """
-    time, gyroscope = imu.times.stamp_s, imu.gyroscope_rad_s
-    order = None
+    time, gyroscope, orientation = imu.times.stamp_s, imu.gyroscope, imu.orientation
     if not imu.oriented.all() or (time[1:] < time[:-1]).any():
         rows = np.flatnonzero(imu.oriented)
         order = rows[np.argsort(time[rows], kind="stable")]
-        time, gyroscope = time[order], gyroscope[order]
+        time, gyroscope, orientation = time[order], imu.gyroscope_rad_s[order], imu.orientation_xyzw[order]
     if time[-1] - time[0] < 2.0:
         return None
     starts = np.searchsorted(time, np.arange(time[0], time[-1], _SPAN_S))
@@ -156,15 +156,11 @@ def _turning(imu: Imu) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatA
     first, last = starts[:-1], starts[1:]
     span = time[last] - time[first]
     whole = (span > _SPAN_S / 2) & (span < 2 * _SPAN_S)
-    total = np.zeros((len(time) + 1, 3))
-    np.cumsum(gyroscope, axis=0, out=total[1:])
-    del gyroscope
-    measured = (total[last] - total[first])[whole] / (last - first)[whole, None]
-    del total
+    total = sums_before(each_part(gyroscope), starts)
+    measured = (total[1:] - total[:-1])[whole] / (last - first)[whole, None]
     if whole.sum() < 10:
         return None
-    turned = imu.orientation_xyzw
-    before, after = (turned[at[whole] if order is None else order[at[whole]]] for at in (first, last))
+    before, after = (taken(orientation, at[whole]) for at in (first, last))
     spans = before, after, span[whole]
     return rotation_vector(before, after) / span[whole, None], measured, spans
 

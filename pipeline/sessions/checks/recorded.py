@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.sessions.by_parts import in_memory, let_go, parts_of
 from pipeline.sessions.checks.motion import Compared, compare, compare_positions, distant_lag_s
 from pipeline.sessions.checks.tilt import upright, with_z_up
 from pipeline.sessions.checks.turns import turned
-from pipeline.sessions.growing import in_memory, let_go, parts_of
 from pipeline.sessions.logs.log import BoolArray, IntArray
 from pipeline.sessions.usable import finite
 from pipeline.statistics.arrays import FloatArray, run_of

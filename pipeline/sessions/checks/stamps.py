@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.sessions.by_parts import parts_of
 from pipeline.sessions.checks.finding import Finding, graded, of
 from pipeline.sessions.checks.recorded import Recorded, Times
-from pipeline.sessions.growing import parts_of
 from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.sampling import BUNCHED
 from pipeline.statistics.arrays import FloatArray
