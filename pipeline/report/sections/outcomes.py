@@ -30,10 +30,11 @@ from pipeline.words.comparison import contrast, shift
 from pipeline.words.effect_sizes import effect_size
 from pipeline.words.evidence import statistic
 from pipeline.words.names import measure_label, short_label
-from pipeline.words.numbers import NO_VALUE, digits_beside, interval, number, p_value
+from pipeline.words.numbers import NO_VALUE, digits_beside, fixed_decimals, interval, number, p_value
 from pipeline.words.phrases import capitalized, counted, group_sizes, listing
 from pipeline.words.sentences import brief_sentence, with_article
 
+_FIXED_FROM = 0.1  # smaller means are shown with significant digits
 _PEOPLE_MAX = 40  # a panel each; tables/trials.csv has them all
 
 
@@ -129,7 +130,13 @@ def _described(row: Row) -> tuple[str, ...]:
     values = (row["mean"], row["sd"], row["median"])
     digits = digits_beside(2, *(value for value in values if value is not None))
     bounds = interval(row["ci_low"], row["ci_high"], digits)
-    return f"{row['n']}", *(number(value, digits) for value in values), bounds
+    shown = [NO_VALUE if value is None else _beside(value, row["mean"], digits) for value in values]
+    return f"{row['n']}", *shown, bounds
+
+
+def _beside(value: float, mean: float | None, digits: int) -> str:
+    """A value with the decimals of the mean beside it: an SD of 0.0246 beside a mean of 0.93 is 0.02."""
+    return number(value, digits) if mean is None or abs(mean) < _FIXED_FROM else fixed_decimals(value, digits)
 
 
 def interval_note(rows: Sequence[Row]) -> str:

@@ -34,15 +34,19 @@ def section(material: Material) -> Section | None:
 
 def _beside_computed(figures: Sequence[Row]) -> list[Block]:
     agreeing = sum(row["verdict"] == "agrees" for row in figures)
+    others = len(figures) - agreeing
+    reproduced = {0: "None of them is", len(figures): "All of them are", 1: "1 of them is"}.get(
+        agreeing, f"{agreeing} of them are"
+    )
     text: Text = (
         f"{figures[0]['source']} prints {counted(len(figures), 'figure')} that this study has too. ",
-        Strong(f"{agreeing} of them are reproduced to the last printed digit"),
-        f", {len(figures) - agreeing} {'is' if len(figures) - agreeing == 1 else 'are'} not.",
+        Strong(f"{reproduced} reproduced to the last printed digit"),
+        f", {others} {'is' if others == 1 else 'are'} not." if others and agreeing else ".",
     )
     table = Table(
         "table-printed",
-        "Each printed figure beside the computed one with as many digits. A figure “differs” if these data do not give"
-        " it, or if no data can give it together with the others.",
+        "Each printed figure beside the computed one, with as many digits as were printed. A figure “differs” if these"
+        " data do not give it, or if no data can give it together with the others.",
         (Column("Figure", False), Column("Printed"), Column("Computed"), Column("Verdict", False)),
         tuple((row["what"], row["printed"], row["computed"], row["verdict"]) for row in figures),
     )
