@@ -78,7 +78,8 @@ async function copyFaults() {
 // Words of a page that lie over others: of each table's cells, and of headings and paragraphs beside one another.
 function overprintFaults() {
   const faults = [], blocks = [...document.querySelectorAll("main h2, main p, main figcaption, main th, main td, main dt, main dd")];
-  const boxes = blocks.filter((one) => one.textContent.trim() && one.offsetParent).map((one) => {
+  const hidden = (one) => one.closest("thead") && getComputedStyle(one.closest("thead")).clipPath !== "none"; // of cards
+  const boxes = blocks.filter((one) => one.textContent.trim() && one.offsetParent && !hidden(one)).map((one) => {
     const range = document.createRange();
     range.selectNodeContents(one);
     return [one, range.getBoundingClientRect()];

@@ -177,6 +177,11 @@ def _less(row: Row, here: Row, column: str) -> str:
 
 def _surfaces(explored: Explored, drawn: Path) -> Iterator[Block]:
     table = explored.tables["explore"]
+    text = (
+        "Each cell is a tracker, and the darker it is, the smaller the error or the time. Compare the cells of a panel"
+        " for what a better tracker does, and panels for what a better filter does."
+    )
+    yield Paragraph((text,))
     for surface, name in ((ERROR, "error"), (TIME, "time")):
         yield draw_now(drawn / f"{name}.svg", outcome, table, surface, explored.own)
     rows = explored.rows("explore")

@@ -95,7 +95,7 @@ def test_the_annex_never_outgrows_two_pages_and_says_what_it_left_out(lengths: l
     tables = [a_table(f"t{place}", rows) for place, rows in enumerate(lengths)]
     (_, annex) = printed(Folded("All", tuple(tables)))
     shown = [block for block in annex.blocks if isinstance(block, Table)]
-    assert sum(len(table.rows) for table in shown) == min(60, sum(lengths))
+    assert sum(len(table.rows) for table in shown) == min(48, sum(lengths))
     by_id = {table.id: table for table in shown}
     for table in tables:
         mine = by_id[table.id]
