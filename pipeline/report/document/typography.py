@@ -22,6 +22,7 @@ _RELATION = re.compile(
     rf"(?<![\w-])((?:{_LETTER}|[χηωε]²?[Gp]?|df|estimate|ratio|BF₁₀|[dr]_[a-z]+)₊?(?:{_FREEDOM})?) ([=<>≥≤]) (?=[−.\d])"
 )
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|mm|cm|px|ms|s|Hz)(?!\w))")
+_ALONE = re.compile(r"^([<>]) (?=\.\d)")  # `< .0001` in a cell
 _INTERVAL = re.compile(r"\[[−+]?[\d.][^][, ]*, [−+]?[\d.][^][, ]*\]")  # both bounds stay on one line
 _P_IN_WORDS = (  # not every p, which may be somebody's name of something
     r"p(?= values?\b| adjusted\b| corrected\b| made\b| \((?:Holm|[A-Z])|: (?:not )?adjusted)"
@@ -51,6 +52,7 @@ class Run:
 def typeset(text: str) -> tuple[Run, ...]:
     """A text in runs. Joined they are the text, but for the underscores of subscripts and for spaces of no break."""
     kept_together = _UNIT.sub(_NO_BREAK, _RELATION.sub(lambda said: said[0].replace(" ", _NO_BREAK), text))
+    kept_together = _ALONE.sub(rf"\1{_NO_BREAK}", kept_together)
     kept_together = _INTERVAL.sub(lambda bounds: bounds[0].replace(" ", _NO_BREAK), kept_together)
     return tuple(run for run in _runs(kept_together) if run.text)
 

@@ -40,6 +40,7 @@ def marked(text: str) -> str:
         ("Mauchly's p is small; p of W", "Mauchly's *p* is small; *p* of W"),
         ("n: participants; p: not adjusted; t tests", "*n*: participants; *p*: not adjusted; *t* tests"),
         ("p adjusted", "*p* adjusted"),
+        ("< .0001", "<~.0001"),
         ("p (Holm)", "*p* (Holm)"),
         ("W₊ is a sum; a small p speaks against it", "*W*₊ is a sum; a small *p* speaks against it"),
     ],
