@@ -22,7 +22,8 @@ from tests.pipeline.live.studies import STUDY, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 _EVERY_NS = 20_000_000
-_MOST_S = 1.5  # of the wall clock, in which about 15 s are played
+_MOST_S = 15.0  # of a study of 22 s: in it the first task ends and the second begins
+_A_MOMENT_S = 0.005  # of the wall clock, in which some tens of readings are played
 
 
 def play_and_say(folder: Path, ready: int, said: int) -> None:
@@ -57,24 +58,18 @@ def warm(tmp_path_factory: pytest.TempPathFactory) -> None:
     journal.release()
 
 
-def after(seconds: float) -> Callable[[int], bytes]:
-    """Waits so long by the wall clock, at whatever moment of the study that is."""
+def in_the_study(seconds: float, moment_s: float = 0.0) -> Callable[[int], bytes]:
+    """Waits until so much of the study is played since it was first said, however fast this machine plays it.
 
-    def wait(_: int) -> bytes:
-        time.sleep(seconds)
-        return b""
-
-    return wait
-
-
-def in_the_study(seconds: float) -> Callable[[int], bytes]:
-    """Waits until so much of the study is played since it was first said, however fast this machine plays it."""
+    After a moment more by the wall clock the player may be at any step.
+    """
 
     def wait(said_in: int) -> bytes:
         told = os.read(said_in, 8)
         began = int.from_bytes(told, "big")
-        while int.from_bytes(told[-8:], "big") - began < seconds * 1e9:
-            told += os.read(said_in, 8)
+        while int.from_bytes(told[-8:], "big") - began < seconds * 1e9 and (part := os.read(said_in, 8)):
+            told += part
+        time.sleep(moment_s)
         return told
 
     return wait
@@ -102,9 +97,9 @@ def killed(folder: Path, wait: Callable[[int], bytes]) -> int:
     return int.from_bytes(told[-8:], "big") if told else EPOCH_NS
 
 
-def survives(folder: Path, after_s: float) -> str:
+def survives(folder: Path, played_s: float, moment_s: float) -> str:
     """Kill a study, and look at what is left of it; returns the state of its first task."""
-    came_to = killed(folder, after(after_s))
+    came_to = killed(folder, in_the_study(played_s, moment_s))
     study, setup = study_in(folder)
     journal = Journal(folder, study)
     journal.hold()  # the lock of a process that is dead holds nobody
@@ -128,7 +123,8 @@ def survives(folder: Path, after_s: float) -> str:
 def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(kills: int, tmp_path: Path) -> None:
     chance, states = random.Random(kills), []  # noqa: S311
     for number in range(kills):
-        states.append(survives(tmp_path / str(number), chance.uniform(0.05, _MOST_S)))
+        played_s, moment_s = chance.uniform(0, _MOST_S), chance.uniform(0, _A_MOMENT_S)
+        states.append(survives(tmp_path / str(number), played_s, moment_s))
     assert "cut" in states
     assert set(states) <= {"todo", "cut", "done"}
 
