@@ -86,10 +86,10 @@ def partial_eta_squared_interval(
 
     def below(noncentrality: float) -> float:
         if noncentrality == 0:
-            return float(stats.f.cdf(statistic, df1, df2))
+            return float(special.fdtr(df1, df2, statistic))
         if noncentrality > _LARGEST:  # there a noncentral χ is normal around √(λ + df1 − 1), to five digits
             return noncentral_t_cdf(np.sqrt(statistic * df1), df2, np.sqrt(noncentrality + df1 - 1))
-        return float(stats.ncf.cdf(statistic, df1, df2, noncentrality))
+        return float(special.ncfdtr(df1, df2, noncentrality, statistic))  # what `stats.ncf` asks, far sooner
 
     bounds: list[float | None] = []
     for target in (1 - tail, tail):
