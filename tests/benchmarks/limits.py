@@ -20,6 +20,7 @@ import numpy as np
 
 from pipeline.sessions.logs.mcap import Message, in_order, write
 from tests.benchmarks.archive import HELD, held_mb, write_archive
+from tests.benchmarks.stage import STAGES
 from tests.conftest import CLONE, EPOCH_NS
 
 _POLL_S = 0.1
@@ -40,6 +41,9 @@ def main() -> None:
             said = STUDIES[name](study, words.part)
             took_s, cpu_s, most_gb, end = reported(study, Path(root), words.jobs)
             print(f"  {said:<52}{took_s:>8.0f}{cpu_s:>8.0f}{most_gb:>8.2f}  {end}", flush=True)
+            for stage in STAGES if name == "session" else ():
+                took_s, cpu_s, most_gb = stage_alone(study, Path(root) / "stages", stage)
+                print(f"  {f'its {stage} alone':<52}{took_s:>8.0f}{cpu_s:>8.0f}{most_gb:>8.2f}", flush=True)
 
 
 def reported(study: Path, root: Path, jobs: str) -> tuple[float, float, float, str]:
@@ -60,6 +64,14 @@ def reported(study: Path, root: Path, jobs: str) -> tuple[float, float, float, s
         most_mb / 1024,
         "" if process.returncode == 0 else f"exit {process.returncode}: {lines[-1][:200]}",
     )
+
+
+def stage_alone(study: Path, folder: Path, stage: str) -> tuple[float, float, float]:
+    """Seconds, processor seconds and GB of one stage of the study's only session."""
+    began = time.monotonic()
+    words = [sys.executable, "-m", "tests.benchmarks.stage", str(study), str(folder), stage]
+    said = subprocess.run(words, cwd=CLONE, check=True, capture_output=True, text=True).stdout.split()
+    return time.monotonic() - began, float(said[0]), float(said[1])
 
 
 def _cpu_s() -> float:

@@ -47,6 +47,7 @@ _RESAMPLES, _FEW_RESAMPLES = 200, 60  # positions tell a lag far better than acc
 _RIDGE = 1e-3  # of the accelerations' power: an axis without movement takes no part in the fit
 _SHORTEST = 10  # readings
 _LONGEST = 180_000  # grid steps: of longer sessions the first two hours
+_AT_ONCE = 256  # blocks
 _DEALT = 16  # ways of dealing blocks
 _FLAT, _FLAT_UPRIGHT = 0.05, 0.15  # of the strongest direction's movement, the weakest's
 _FITS = 0.5  # of the movement, before a distant lag is believed
@@ -280,8 +281,11 @@ class _Blocks:
         own = np.einsum("bti,btj->bij", felt[rows], felt[rows])
         starts = rows[:, 0, None] - reach + np.arange(2 * reach + 1)[::-1]  # shift s looks s rows back
         windows = np.lib.stride_tricks.sliding_window_view(felt, _BLOCK, axis=0)  # (rows, 3, block)
-        later = windows[starts].reshape(len(rows), -1, _BLOCK)
-        cross = (later @ positions).reshape(len(rows), 2 * reach + 1, 3, 3)
+        cross = np.empty((len(rows), 2 * reach + 1, 3, 3))
+        for begin in range(0, len(rows), _AT_ONCE):  # each row's windows overlap, and take 30 times its memory
+            part = slice(begin, begin + _AT_ONCE)
+            later = windows[starts[part]].reshape(len(starts[part]), -1, _BLOCK)
+            cross[part] = (later @ positions[part]).reshape(len(later), -1, 3, 3)
         power = np.einsum("bti,bti->bi", positions, positions)
         return _Blocks(cross.transpose(0, 1, 3, 2), own, power, _dealt(positions, felt[rows]))
 
