@@ -2,7 +2,7 @@
 
 An estimator works with where the accelerometer is: positions less the arm go in, the arm is added to what comes out. Of
 the readings that have arrived the newest that was measured by then says how the phone was turned, live as in a replay
-(`pipeline.sessions.recording.Arm`).
+(`pipeline.sessions.lever_arm.Arm`).
 """
 
 from __future__ import annotations

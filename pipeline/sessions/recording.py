@@ -15,10 +15,10 @@ import pyarrow.compute as pc
 
 from fusion_core import Estimator, FusionKalman, Samples, Sensor, Track, smooth
 from fusion_core.estimator import resuming
-from fusion_core.phone.calibration import Body
 from fusion_core.phone.orientation import rotate
 from pipeline.sessions import piecewise
 from pipeline.sessions.estimators import build_estimator, of_space, sensor, sensors, sensors_used
+from pipeline.sessions.lever_arm import Arm, arm_of, less
 from pipeline.sessions.long_phone import LongPhone, long_phone
 from pipeline.sessions.phone import Imu, Phone, aligned, logged_readings
 from pipeline.statistics.arrays import FloatArray, run_of
@@ -41,32 +41,6 @@ SETTLED_S = 1.0
 """Estimates in this time after the first frame's arrival are neither scored nor shown in figures."""
 
 _AXES = ("x", "y", "z")
-
-
-@dataclass(frozen=True)
-class Arm:
-    """The lever arm (n, d) in mm as the body was turned at `time` (n,), known since `arrival` (n,), both rising."""
-
-    time: FloatArray
-    arrival: FloatArray
-    arm_mm: FloatArray
-
-    def at(self, time: FloatArray, known_by: FloatArray) -> FloatArray:
-        """The newest (m, d) measured by each `time` (m,) of what had arrived by `known_by` (m,); NaN where none had.
-
-        What comes later is not used, though it may be nearer: a running study does not have it yet.
-        """
-        measured, arrived = (
-            np.searchsorted(*both, side="right") for both in ((self.time, time), (self.arrival, known_by))
-        )
-        newest = np.minimum(measured, arrived) - 1
-        found: FloatArray = self.arm_mm[np.maximum(newest, 0)]
-        found[newest < 0] = np.nan
-        return found
-
-    def along(self, index: list[int]) -> Arm:
-        """Some of the axes."""
-        return Arm(self.time, self.arrival, self.arm_mm[:, index])
 
 
 @dataclass(frozen=True)
@@ -263,27 +237,14 @@ def _mounted(
         if found.calibrated is None or found.lever_arm_mm is None:
             continue
         index = [_AXES.index(axis) for axis in study.axes]
-        arm = _arm(found.calibrated, found.lever_arm_mm) if found.lever_arm_mm.any() else None
+        arm = arm_of(found.calibrated, found.lever_arm_mm) if found.lever_arm_mm.any() else None
         corrected = dict(samples)
         corrected[name] = _of_axes(found.calibrated.acceleration(), study, name)
         for stream, sensing in study.sensor_streams.items():
             if sensing.kind == "position" and arm is not None:
-                corrected[stream] = _of_axes(_less(arm, whole[stream]), study, stream)
+                corrected[stream] = _of_axes(less(arm, whole[stream]), study, stream)
         return Mounted(found.mounted_from_s, name, corrected, None if arm is None else arm.along(index))
     return None
-
-
-def _arm(body: Body, lever_arm_mm: FloatArray) -> Arm:
-    """The lever arm as the body was turned, without what was measured before something that had arrived already."""
-    rows = body.time >= np.maximum.accumulate(body.time)
-    return Arm(body.time[rows], body.arrival[rows], (body.rotation @ lever_arm_mm)[rows])
-
-
-def _less(arm: Arm, positions: Samples) -> Samples:
-    """Positions less the lever arm, without those that arrived before any orientation."""
-    value = positions.value - arm.at(positions.time, positions.arrival)
-    known = np.isfinite(value).all(axis=1)
-    return Samples(positions.time[known], positions.arrival[known], value[known])
 
 
 def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track:
