@@ -26,19 +26,16 @@ makes its interval wide; while a hand rests nothing is known, and the interval i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.sessions.by_parts import parts_of, sums_before
+from pipeline.sessions.checks.band import STEP_S, averaged, even_length, filtered, rising
 from pipeline.statistics.arrays import FloatArray
 
 LAG_RANGE_S = 0.6
-_STEP_S = 0.04
-BAND_HZ = _LOW_HZ, _HIGH_HZ = 0.3, 4.0
 _BLOCK = 50  # grid steps: 2 s
 _MARGIN = 25  # grid steps over which the filter rings
 _BLOCKS_MIN = 4
@@ -97,7 +94,7 @@ class Compared:
     @property
     def lag_beyond(self) -> bool:
         """Whether the lag is at the end of what was searched, so that it may be any that is larger."""
-        return abs(self.lag_s.value) > LAG_RANGE_S - _STEP_S
+        return abs(self.lag_s.value) > LAG_RANGE_S - STEP_S
 
 
 def compare(
@@ -136,8 +133,8 @@ def _compared(
     rows = _blocks(grid, tracker_s, other_s) if len(grid) else np.zeros((0, _BLOCK), np.int64)
     if len(rows) < _BLOCKS_MIN:
         return None
-    seen = _filtered(_averaged(grid, tracker_s, position_mm), 0)
-    felt = _filtered(_averaged(grid, other_s, other), integrations)
+    seen = filtered(averaged(grid, tracker_s, position_mm), 0)
+    felt = filtered(averaged(grid, other_s, other), integrations)
     return _Blocks.of(seen, felt, rows).compared(heading_known, _RESAMPLES if integrations else _FEW_RESAMPLES)
 
 
@@ -146,7 +143,7 @@ def _grid(tracker_s: FloatArray, other_s: FloatArray) -> FloatArray:
     if min(len(tracker_s), len(other_s)) < _SHORTEST:
         return np.zeros(0)
     begin, end = max(tracker_s[0], other_s[0]), min(tracker_s[-1], other_s[-1])
-    grid: FloatArray = begin + _STEP_S * np.arange(max(0, min(int((end - begin) / _STEP_S), _LONGEST)))
+    grid: FloatArray = begin + STEP_S * np.arange(max(0, min(int((end - begin) / STEP_S), _LONGEST)))
     return grid
 
 
@@ -163,90 +160,24 @@ def distant_lag_s(
     grid = _grid(tracker_s, imu_s)
     if len(grid) < _BLOCKS_MIN * _BLOCK:
         return None
-    seen = _filtered(_averaged(grid, tracker_s, position_mm), 0)
-    felt = _filtered(_averaged(grid, imu_s, acceleration_mm_s2), 2)
+    seen = filtered(averaged(grid, tracker_s, position_mm), 0)
+    felt = filtered(averaged(grid, imu_s, acceleration_mm_s2), 2)
     own = felt.T @ felt
     ridge = _RIDGE * np.trace(own) * np.eye(3) + 1e-300 * np.eye(3)
     white = np.linalg.solve(np.linalg.cholesky(own + ridge), felt.T)
-    length = _even_length(2 * len(grid))
+    length = even_length(2 * len(grid))
     moved = np.fft.rfft(seen.T, length)[:, None] * np.conj(np.fft.rfft(white, length))
     explained = np.sum(np.fft.irfft(moved, length) ** 2, axis=(0, 1)) / max(float(np.sum(seen**2)), 1e-300)
     shifts = np.arange(length)
     shifts = np.where(shifts > length // 2, shifts - length, shifts)
     explained[np.abs(shifts) > len(grid) // 2] = 0.0
     at = int(np.argmax(explained))
-    return float(shifts[at] * _STEP_S) if explained[at] > _FITS else None
-
-
-def rising(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Times and values in the order of time, the first of each time; no copy where they are that already."""
-    if (time[1:] > time[:-1]).all():
-        return time, value
-    time, first = np.unique(time, return_index=True)
-    return time, value[first]
-
-
-def _averaged(grid: FloatArray, time: FloatArray, value: FloatArray) -> FloatArray:
-    """Values on the grid: the mean over a grid step, so that what is faster than the grid does not fold into the band.
-
-    Of the straight lines between readings, by differences of their running integral.
-    """
-    edges = np.append(grid - _STEP_S / 2, grid[-1] + _STEP_S / 2)
-    needed = int(np.searchsorted(time, edges[-1], side="right")) + 2  # of a long session the grid covers a part
-    time, value = time[:needed], value[:needed]
-    at = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, len(time) - 2)
-    lasting = (time[at + 1] - time[at])[:, None]
-    since = np.clip((edges - time[at])[:, None], 0.0, lasting)
-    slope = (value[at + 1] - value[at]) / lasting
-    inside = sums_before(_areas(time, value), at) + since * (value[at] + slope * since / 2)
-    width = np.diff(np.clip(edges, time[0], time[-1]))[:, None]
-    found: FloatArray = np.diff(inside, axis=0) / np.maximum(width, _STEP_S / 4)
-    return found
-
-
-def _areas(time: FloatArray, value: FloatArray) -> Iterator[FloatArray]:
-    """The integral from each reading to the next (n - 1, d), some readings at a time."""
-    for part in parts_of(len(time) - 1):
-        end = slice(part.start + 1, part.stop + 1)
-        later, since = value[end], time[end]
-        yield (later + value[part][: len(later)]) * (since - time[part][: len(since)])[:, None] / 2
-
-
-def _filtered(value: FloatArray, order: int) -> FloatArray:
-    """Values (n, d) on the grid in the band, integrated `order` times."""
-    length = _even_length(len(value) + round(4 / _LOW_HZ / _STEP_S))
-    frequency = np.fft.rfftfreq(length, _STEP_S)
-    low, high = (frequency / _LOW_HZ) ** 4, (frequency / _HIGH_HZ) ** 4
-    shape = (low / (1 + low) / (1 + high)).astype(complex)
-    shape[1:] /= (2j * np.pi * frequency[1:]) ** order
-    padded = np.zeros((value.shape[1], length))
-    padded[:, : len(value)] = (value - _without(value, order)).T
-    return np.ascontiguousarray(np.fft.irfft(np.fft.rfft(padded) * shape, length)[:, : len(value)].T)
-
-
-def _without(value: FloatArray, order: int) -> FloatArray:
-    """What is taken off first: of accelerations the mean, of positions a line, so that neither end is a jump."""
-    if order:
-        return np.asarray(value.mean(axis=0))
-    edge = min(5, len(value))
-    first, last = value[:edge].mean(axis=0), value[-edge:].mean(axis=0)
-    found: FloatArray = first + (last - first) * np.linspace(0.0, 1.0, len(value))[:, None]
-    return found
-
-
-def _even_length(least: int) -> int:
-    """The next length whose only factors are 2, 3 and 5, for which the transform is quick."""
-    best = 1 << (least - 1).bit_length()
-    for odd in (3, 5, 9, 15):
-        power = odd << max(0, (-(-least // odd) - 1).bit_length())
-        if power >= least:
-            best = min(best, power)
-    return best
+    return float(shifts[at] * STEP_S) if explained[at] > _FITS else None
 
 
 def _blocks(grid: FloatArray, tracker_s: FloatArray, imu_s: FloatArray) -> npt.NDArray[np.int64]:
     """The grid rows (blocks, 50) of each block that neither an end nor a gap comes near."""
-    reach = max(_MARGIN, round(LAG_RANGE_S / _STEP_S) + 1)
+    reach = max(_MARGIN, round(LAG_RANGE_S / STEP_S) + 1)
     count = max(0, len(grid) - 2 * reach) // _BLOCK
     if count == 0:
         return np.zeros((0, _BLOCK), np.int64)
@@ -276,7 +207,7 @@ class _Blocks:
     @staticmethod
     def of(seen: FloatArray, felt: FloatArray, rows: npt.NDArray[np.int64]) -> _Blocks:
         """For every shift within the range."""
-        reach = round(LAG_RANGE_S / _STEP_S)
+        reach = round(LAG_RANGE_S / STEP_S)
         positions = seen[rows]
         own = np.einsum("bti,btj->bij", felt[rows], felt[rows])
         starts = rows[:, 0, None] - reach + np.arange(2 * reach + 1)[::-1]  # shift s looks s rows back
@@ -292,8 +223,8 @@ class _Blocks:
     @cached_property
     def shifts_s(self) -> FloatArray:
         """The lag at each shift."""
-        reach = round(LAG_RANGE_S / _STEP_S)
-        return np.arange(-reach, reach + 1).astype(np.float64) * _STEP_S
+        reach = round(LAG_RANGE_S / STEP_S)
+        return np.arange(-reach, reach + 1).astype(np.float64) * STEP_S
 
     def compared(self, heading_known: bool, resamples: int) -> Compared:
         """Everything, with intervals by resampled blocks, the same draws each time."""
@@ -319,7 +250,7 @@ class _Blocks:
             float(explained[0].max()),
             float(np.sqrt(self.power.sum() / samples)),
             float(np.sqrt(np.trace(own[0]) / samples)),
-            samples * _STEP_S,
+            samples * STEP_S,
             _interval(lag),
             _interval(size),
             float(np.percentile(power.sum(axis=1) / np.maximum(size * np.trace(own, axis1=1, axis2=2), 1e-300), 97.5)),
@@ -353,7 +284,7 @@ def _peak(explained: FloatArray, shifts_s: FloatArray) -> FloatArray:
     before, here, after = (explained[row, inner + step] for step in (-1, 0, 1))
     bend = before - 2 * here + after
     part = np.divide(before - after, 2 * bend, out=np.zeros_like(bend), where=bend < 0)
-    found: FloatArray = shifts_s[at] + np.where(at == inner, np.clip(part, -0.5, 0.5), 0.0) * _STEP_S
+    found: FloatArray = shifts_s[at] + np.where(at == inner, np.clip(part, -0.5, 0.5), 0.0) * STEP_S
     return found
 
 

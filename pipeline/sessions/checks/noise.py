@@ -19,9 +19,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.sessions.by_parts import parts_of
+from pipeline.sessions.checks.band import rising
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.force import LARGE_M_S2
-from pipeline.sessions.checks.motion import rising
 from pipeline.sessions.checks.recorded import Recorded, Times
 from pipeline.sessions.logs.log import BoolArray
 from pipeline.statistics.arrays import FloatArray

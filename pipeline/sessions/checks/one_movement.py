@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.sessions.checks import force, orientation, repeats
+from pipeline.sessions.checks.band import BAND_HZ
 from pipeline.sessions.checks.finding import Finding
-from pipeline.sessions.checks.motion import BAND_HZ, LAG_RANGE_S, Compared
+from pipeline.sessions.checks.motion import LAG_RANGE_S, Compared
 from pipeline.sessions.checks.noise import noise_sd
 from pipeline.sessions.checks.recorded import Positions, Recorded
 
