@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.compute as pc
 
 from fusion_core import Samples, Sensor
 from fusion_core.estimator import resuming
@@ -75,7 +76,7 @@ def long_phone(study: Study, entry: Path) -> LongPhone | None:
     """The session's phone if it is long and can be read in pieces; None if there is none such."""
     phones = {name: one for name, one in study.sensor_streams.items() if isinstance(one, AccelerationStream)}
     count = tables.rows("imu", entry)
-    if len(phones) != 1 or count <= tables.ROWS_AT_ONCE or study.stream_of_kind("reference") is None:
+    if len(phones) != 1 or count <= tables.ROWS_AT_ONCE or not _has_reference(study, entry):
         return None
     ((name, stream),) = phones.items()
     moved = stream.mounting_xyzw != (0.0, 0.0, 0.0, 1.0) or stream.lever_arm_mm != (0.0, 0.0, 0.0)
@@ -84,6 +85,13 @@ def long_phone(study: Study, entry: Path) -> LongPhone | None:
     orientations = tables.read_parts("imu", entry, _ORIENTATION)
     known = all(np.isfinite(part[column].to_numpy()).all() for part in orientations for column in _ORIENTATION)
     return LongPhone(entry, name, stream, of_space(sensor(study, stream)), count) if known else None
+
+
+def _has_reference(study: Study, entry: Path) -> bool:
+    """Without one it is made of all readings smoothed, or where the hand is still is judged by the phone."""
+    name = study.stream_of_kind("reference")
+    parts = tables.read_parts("positions", entry, ("stream",))
+    return name is not None and any(pc.any(pc.equal(part["stream"], name)).as_py() for part in parts)
 
 
 def _goes_on(study: Study, estimator: str, phone: str) -> bool:

@@ -248,11 +248,14 @@ def _mounted(
 
 
 def show(study: Study, name: str, loaded: Recording, times: FloatArray) -> Track:
-    """What the study's estimator of that name would have shown at rising `times` (n,) in s."""
-    pieces = in_pieces(study, name, loaded, times)
+    """What the study's estimator of that name would have shown at `times` (n,) in s."""
+    order = np.argsort(times, kind="stable") if loaded.long_phone is not None else np.zeros(0, np.int64)
+    pieces = in_pieces(study, name, loaded, times[order])
     if pieces is not None:
         tracks = [track for track, _ in pieces]
-        return Track(times, *(np.concatenate([getattr(track, key) for track in tracks]) for key in ("mean", "sd")))
+        mean, sd = np.empty((2, len(times), tracks[0].mean.shape[1]))
+        mean[order], sd[order] = (np.concatenate([getattr(track, key) for track in tracks]) for key in ("mean", "sd"))
+        return Track(times, mean, sd)
     estimator: Estimator = build_estimator(study, name)
     track = estimator.replay(loaded.samples, times)
     known = loaded.mounted

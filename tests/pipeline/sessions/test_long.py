@@ -57,6 +57,12 @@ def test_a_long_session_has_the_tables_that_it_would_have_as_a_whole(
     long = recording.load(load_study(root), tmp_path / "parts" / "ingest", may_be_long=True)
     assert long.long_phone is not None
     assert long.long_phone.count == 12 * 90
+    at_once = recording.load(load_study(root), tmp_path / "parts" / "ingest")
+    anyhow = np.random.default_rng(1).permutation(long.times)[:300]
+    for name in ("raw", "fusion"):
+        shown, expected = (recording.show(load_study(root), name, one, anyhow) for one in (long, at_once))
+        np.testing.assert_array_equal(shown.mean, expected.mean)
+        np.testing.assert_array_equal(shown.sd, expected.sd)
     assert not [path for path in (tmp_path / "parts").rglob("*") if path.is_file() and path.suffix != ".parquet"]
     assert whole.keys() == parts.keys()
     for name, table in whole.items():
