@@ -17,16 +17,19 @@ import pyarrow.compute as pc
 from fusion_core import Samples, Sensor
 from fusion_core.estimator import resuming
 from fusion_core.phone.calibration import Body
+from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator, of_space, sensor, sensors_used
 from pipeline.sessions.growing import Growing
 from pipeline.sessions.logs.log import IntArray
 from pipeline.sessions.phone import CARRIED, IN_LOG, Phone, aligned, logged_readings
+from pipeline.study.memory import free_bytes, shortage
 from pipeline.study.settings import Study
 from pipeline.study.streams import AccelerationStream
 from pipeline.tables import table as tables
 
 AnyArray = np.ndarray[Any, Any]
 
+_LOGGED_BYTES, _WHOLE_BYTES = 80, 390  # of a message: its figures, and what fusing makes of them
 _ORIENTATION = ("qx", "qy", "qz", "qw")
 
 
@@ -85,6 +88,14 @@ def long_phone(study: Study, entry: Path) -> LongPhone | None:
     orientations = tables.read_parts("imu", entry, _ORIENTATION)
     known = all(np.isfinite(part[column].to_numpy()).all() for part in orientations for column in _ORIENTATION)
     return LongPhone(entry, name, stream, of_space(sensor(study, stream)), count) if known else None
+
+
+def require_memory(session: str, entry: Path) -> None:
+    """Raise PipelineError where a phone that has to be in memory whole takes more than there is, by docs/limits.md."""
+    logged = _LOGGED_BYTES * tables.rows("imu", entry)
+    lacking = shortage(logged, _WHOLE_BYTES / _LOGGED_BYTES, free_bytes(), "what its phone measured")
+    if lacking is not None:
+        raise PipelineError(f"session {session}: {lacking}")
 
 
 def _has_reference(study: Study, entry: Path) -> bool:

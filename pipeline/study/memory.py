@@ -28,12 +28,12 @@ def _stated(meminfo: Path, group: Path) -> Iterator[int]:
         return
 
 
-def shortage(size_bytes: int, needed_per_byte: float, free: int | None) -> str | None:
+def shortage(size_bytes: int, needed_per_byte: float, free: int | None, what: str = "it") -> str | None:
     """What is said of a file of this size that takes more memory than there is; None where it does not."""
     needed = size_bytes * needed_per_byte
     if size_bytes < _SMALL_BYTES or free is None or needed <= free:
         return None
     return (
-        f"refused: it is {size_bytes / 1e6:.0f} MB, for which a report needs about {needed / _GB:.1f} GB of memory, and"
-        f" {free / _GB:.1f} GB are free; end other programs, take parts of it, or a computer with more memory"
+        f"refused: {what} is {size_bytes / 1e6:.0f} MB, for which a report needs about {needed / _GB:.1f} GB of memory,"
+        f" and {free / _GB:.1f} GB are free; end other programs, take parts of it, or a computer with more memory"
     )

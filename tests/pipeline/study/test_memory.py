@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.sessions import ingest
+from pipeline.sessions import ingest, long_phone
 from pipeline.study import memory, table_file
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
@@ -55,4 +55,18 @@ def test_a_log_that_does_not_fit_stops_the_run_and_is_read_once_there_is_room(
         ran = steadyhand("compare", study)
         assert ran.code == 2
         assert "session P1_a: refused: it is 0 MB" in ran.err
+    assert steadyhand("compare", study).code == 0
+
+
+def test_a_phone_that_has_to_be_in_memory_whole_and_does_not_fit_stops_the_run(
+    folder: Callable[..., Path], steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = folder("conditions: [a]\nsessions: data/{participant}_{condition}.mcap\n" + STREAMS)
+    write_session(study / "data" / "P1_a.mcap", session_messages(2.5))
+    with monkeypatch.context() as patch:
+        patch.setattr(memory, "_SMALL_BYTES", 10)
+        patch.setattr(long_phone, "free_bytes", lambda: 1000)
+        ran = steadyhand("compare", study, "--jobs", "1")
+        assert ran.code == 2
+        assert "session P1_a: refused: what its phone measured is 0 MB" in ran.err
     assert steadyhand("compare", study).code == 0
