@@ -189,16 +189,19 @@ def _noise(state: State) -> float:
 
 
 @compiled
-def _of_clocks(model: Model, state: State, axis: int) -> float:
-    """The variance of not knowing when a frame was measured, nor whose clock is wrong: no frame shows it, since all are
-    off by as much.
+def _of_clocks(model: Model, state: State) -> float:
+    """The variance of not knowing when frames were measured, nor whose clock is wrong.
 
-    As likely as not it is the phone's; the hand is then where it was shown to be so much earlier or later.
+    No frame shows it, since all are off by as much. As likely as not it is the phone's; the hand is then where it was
+    shown to be so much earlier or later. That is off along the motion, and one SD is stated for every axis, however
+    the axes lie: so it is that along the motion.
     """
-    off = state.fact[CLOCK_VARIANCE]
+    off, squared = state.fact[CLOCK_VARIANCE], 0.0
     if model.trusted == NEITHER:
         off += 0.5 * state.fact[CLOCK_S] ** 2
-    return float((state.mean[VELOCITY + axis] + state.head[0, axis]) ** 2 * off)
+    for axis in range(model.dimension):
+        squared += (state.mean[VELOCITY + axis] + state.head[0, axis]) ** 2
+    return float(squared * off)
 
 
 @compiled(inner=True)
@@ -215,5 +218,6 @@ def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArr
     variance = answers[STATED]
     if state.fact[SCORED] >= _ENOUGH and state.fact[SURPRISE] > 1.0:
         variance += (state.fact[SURPRISE] - 1.0) * (variance + _noise(state))
+    variance += _of_clocks(model, state)
     for axis in range(model.dimension):
-        mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance + _of_clocks(model, state, axis))
+        mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance)
