@@ -86,7 +86,7 @@ def of_groups(rows: Sequence[Row], study: Study) -> list[Block]:
 
 def of_sphericity(rows: Sequence[Row], study: Study) -> list[Block]:
     """Whether the differences between conditions vary alike, of which an ANOVA of three conditions or more depends."""
-    tested = [row for row in rows if row["status"] == OK and (row["details"] or {}).get("epsilon_gg") is not None]
+    tested = [row for row in rows if row["status"] == OK and (row["details"] or {}).get("mauchly_w") is not None]
     if not tested:
         return []
     cells = tuple(
