@@ -13,6 +13,7 @@ from pipeline.live.clerk import agreement
 from pipeline.live.events import Joined, Reading, Said, Show, Tick, Write
 from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Ping
 from pipeline.live.orientation import Aligner, PhoneMotion
+from pipeline.live.setup import Setup
 from pipeline.sessions.logs.mcap import Message, write
 from tests.pipeline.live.studies import STUDY, study_in
 from tests.pipeline.sessions.test_phone import GRAVITY, IMU, TRACKER, swaying, turns
@@ -97,24 +98,29 @@ def test_a_reading_that_lacks_something_or_comes_late_is_none() -> None:
     )
 
 
+class _Played:
+    """A study's run whose phone draws at once what it is sent, and all that was logged."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.run, self.messages = run_state.begin(setup, setup.empty_plan()), list[Message]()
+
+    def happens(self, event: object) -> None:
+        self.run, actions = study_run.step(self.run, event)  # type: ignore[arg-type]
+        self.messages += (action.message for action in actions if isinstance(action, Write))
+        for action in actions:
+            if isinstance(action, Show):
+                at = action.made_ns
+                self.happens(Said("phone", 2, Drawn(action.message.n, at / 1e6), at))  # type: ignore[union-attr]
+
+
 def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: Path) -> None:
     text = STUDY.replace(
         "senders: {tracker: {demo: {}}, imu: {demo: {}}}", "senders: {tracker: {demo: {}}, imu: {phone: motion}}"
     )
     text = text.replace("{kinect: kinect, fusion: fusion}", "{kinect: fusion, fusion: fusion}")
     study, setup = study_in(tmp_path, text)
-    run = run_state.begin(setup, setup.empty_plan())
-    messages: list[Message] = []
-
-    def happens(event: object) -> None:
-        nonlocal run
-        run, actions = study_run.step(run, event)  # type: ignore[arg-type]
-        messages.extend(action.message for action in actions if isinstance(action, Write))
-        for action in actions:
-            if isinstance(action, Show):
-                at = action.made_ns
-                happens(Said("phone", 2, Drawn(action.message.n, at / 1e6), at))  # type: ignore[union-attr]
-
+    played = _Played(setup)
+    happens, messages = played.happens, played.messages
     happens(Joined("operator", 1, ns(-1)))
     happens(Joined("phone", 2, ns(-1)))
     behind_ms = 3_600_000.0  # the phone's clock is an hour behind
@@ -136,7 +142,7 @@ def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: P
         happens(Said("phone", 2, Motion(row, ns(at) / 1e6 - behind_ms, a, None, r, 16.0), ns(at + 0.005)))
         if row == 400:
             happens(Said("operator", 1, Do("start", "nobody presses the button", "d"), ns(at + 0.006)))
-            assert run.phase == "session"
+            assert played.run.phase == "session"
         happens(Tick(ns(at + 0.007)))
     logged = [one for one in messages if one.topic == "/phone/imu"]
     assert len(logged) > 200
@@ -159,18 +165,8 @@ def test_of_a_sender_that_brings_no_orientation_it_is_found_too_and_the_log_repl
     study, setup = study_in(
         tmp_path, text.replace("{kinect: kinect, fusion: fusion}", "{kinect: fusion, fusion: fusion}")
     )
-    run = run_state.begin(setup, setup.empty_plan())
-    messages: list[Message] = []
-
-    def happens(event: object) -> None:
-        nonlocal run
-        run, actions = study_run.step(run, event)  # type: ignore[arg-type]
-        messages.extend(action.message for action in actions if isinstance(action, Write))
-        for action in actions:
-            if isinstance(action, Show):
-                at = action.made_ns
-                happens(Said("phone", 2, Drawn(action.message.n, at / 1e6), at))  # type: ignore[union-attr]
-
+    played = _Played(setup)
+    happens, messages = played.happens, played.messages
     happens(Joined("operator", 1, ns(-1)))
     happens(Joined("phone", 2, ns(-1)))
     time, turning, force = swaying(12.0, 60.0, np.random.default_rng(3))
@@ -180,11 +176,11 @@ def test_of_a_sender_that_brings_no_orientation_it_is_found_too_and_the_log_repl
         values = (*(force[row] / 1000).tolist(), *turning[row].tolist(), *[np.nan] * 4)
         happens(Reading("imu", None, ns(at + 0.005), values, row + 1, ns(at) / 1e6))
         if row == 10:
-            light = panel.lights(run, ns(at + 0.006)).content["lights"]["imu"]  # type: ignore[index]
+            light = panel.lights(played.run, ns(at + 0.006)).content["lights"]["imu"]  # type: ignore[index]
             assert (light["light"], "orientation is not known yet" in light["text"]) == ("amber", True)
-            assert any("orientation is not known yet" in one for one in desk.red_lights(run, ns(at + 0.006)))
+            assert any("orientation is not known yet" in one for one in desk.red_lights(played.run, ns(at + 0.006)))
         if row == 400:
-            assert not any("orientation" in one for one in desk.red_lights(run, ns(at + 0.006)))
+            assert not any("orientation" in one for one in desk.red_lights(played.run, ns(at + 0.006)))
             happens(Said("operator", 1, Do("start", "nobody presses the button", "d"), ns(at + 0.006)))
         happens(Tick(ns(at + 0.007)))
     logged = [one.values for one in messages if one.topic == "/phone/imu" and one.values is not None]

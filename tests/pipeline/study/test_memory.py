@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -44,29 +45,16 @@ def test_a_table_that_does_not_fit_is_refused_with_what_it_would_take(
     assert "m.csv: refused: it is 0 MB, for which a report needs about 0.0 GB of memory, and 0.0 GB are free" in ran.err
 
 
-def test_a_log_that_does_not_fit_stops_the_run_and_is_read_once_there_is_room(
-    folder: Callable[..., Path], steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("where", "what"), [(ingest, "it"), (long_phone, "what its phone measured")])
+def test_what_does_not_fit_of_a_session_stops_the_run_and_is_computed_once_there_is_room(
+    folder: Callable[..., Path], steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch, where: ModuleType, what: str
 ) -> None:
     study = folder("conditions: [a]\nsessions: data/{participant}_{condition}.mcap\n" + STREAMS)
     write_session(study / "data" / "P1_a.mcap", session_messages(2.5))
     with monkeypatch.context() as patch:
         patch.setattr(memory, "_SMALL_BYTES", 10)
-        patch.setattr(ingest, "free_bytes", lambda: 1000)
-        ran = steadyhand("compare", study)
-        assert ran.code == 2
-        assert "session P1_a: refused: it is 0 MB" in ran.err
-    assert steadyhand("compare", study).code == 0
-
-
-def test_a_phone_that_has_to_be_in_memory_whole_and_does_not_fit_stops_the_run(
-    folder: Callable[..., Path], steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    study = folder("conditions: [a]\nsessions: data/{participant}_{condition}.mcap\n" + STREAMS)
-    write_session(study / "data" / "P1_a.mcap", session_messages(2.5))
-    with monkeypatch.context() as patch:
-        patch.setattr(memory, "_SMALL_BYTES", 10)
-        patch.setattr(long_phone, "free_bytes", lambda: 1000)
+        patch.setattr(where, "free_bytes", lambda: 1000)
         ran = steadyhand("compare", study, "--jobs", "1")
         assert ran.code == 2
-        assert "session P1_a: refused: what its phone measured is 0 MB" in ran.err
+        assert f"session P1_a: refused: {what} is 0 MB" in ran.err
     assert steadyhand("compare", study).code == 0
