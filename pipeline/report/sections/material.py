@@ -70,6 +70,10 @@ class Material:
         folders = self.entries[TABLES[name].stage]
         return tables.read(name, [folders[place] for place in places])
 
+    def thinned(self, name: str, place: int) -> pd.DataFrame:
+        """The same of one session, for what is looked at; of a long one every n-th row."""
+        return tables.read_thinned(name, self.entries[TABLES[name].stage][place])
+
     def used(self) -> list[int]:
         """The places in `sessions` of those that are not excluded as a whole."""
         return [place for place, session in enumerate(self.sessions) if not self.study.exclusion_of(session)]

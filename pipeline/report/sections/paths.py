@@ -29,7 +29,7 @@ def section(material: Material) -> Section | None:
 
 def _first_session(material: Material, used: list[int], plane: Plane) -> list[Block]:
     """The first session: the reference, what was displayed, and what the best fusion makes of it."""
-    tracks, positions, events = (material.table_of(name, used[:1]) for name in _READ)
+    tracks, positions, events = (material.thinned(name, used[0]) for name in _READ)
     lines = [material.study.stream_of_kind("reference"), displayed(material, used[0]), best_estimator(material)]
     recorded = {*positions["stream"], *tracks["estimator"]}
     shown = [line for line in dict.fromkeys(lines) if line in recorded]
@@ -51,7 +51,7 @@ def _every_participant(material: Material, used: list[int], plane: Plane) -> lis
         return []
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in _READ}
     for place in used:
-        tracks, positions, events = (material.table_of(name, [place]) for name in _READ)
+        tracks, positions, events = (material.thinned(name, place) for name in _READ)
         parts["tracks"].append(tracks[tracks["estimator"].isin(line_of.values())].iloc[::_STEP])
         parts["positions"].append(positions[positions["stream"].isin(line_of.values())].iloc[::_STEP])
         parts["events"].append(events)

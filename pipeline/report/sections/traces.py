@@ -49,7 +49,7 @@ def _of_session(material: Material, place: int, ingested: Path, fused: Path) -> 
         if len(order):
             series.append(Series(name, kind, recording.shown_axes(study, name), time_s[order], samples.value[order]))
     columns = [f"{axis}_mm" for axis in study.axes]
-    for estimator, rows in tables.read("tracks", fused).groupby("estimator", sort=False):
+    for estimator, rows in tables.read_thinned("tracks", fused).groupby("estimator", sort=False):
         time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
         series.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
     scene = _scene(material, place, ingested, origin_ns)
