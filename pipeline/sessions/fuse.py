@@ -9,7 +9,6 @@ import pyarrow as pa
 
 from pipeline.engine.stage import Outcome, Work
 from pipeline.sessions import recording
-from pipeline.sessions.long_phone import long_phone, require_memory
 from pipeline.sessions.recording import Recording
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -18,8 +17,6 @@ from pipeline.tables import table as tables
 def run(work: Work) -> Outcome:
     """One session's tracks: a row an estimator and instant, from its first estimate on."""
     study = work.study
-    if long_phone(study, work.entry("ingest")) is None:
-        require_memory(work.session.id, work.entry("ingest"))
     loaded = recording.load(study, work.entry("ingest"), may_be_long=True)
     names = study.estimators if len(loaded.times) else ()
     tables.write_parts("tracks", (part for name in names for part in _parts(study, work, name, loaded)), work.out)

@@ -76,10 +76,22 @@ class LongPhone:
 
 
 def long_phone(study: Study, entry: Path) -> LongPhone | None:
-    """The session's phone if it is long and can be read in pieces; None if there is none such."""
-    phones = {name: one for name, one in study.sensor_streams.items() if isinstance(one, AccelerationStream)}
+    """The session's phone if it is long and can be read in pieces; None if there is none such.
+
+    Raises PipelineError where a long one has to be in memory whole, and takes more than there is.
+    """
     count = tables.rows("imu", entry)
-    if len(phones) != 1 or count <= tables.ROWS_AT_ONCE or not _has_reference(study, entry):
+    if count <= tables.ROWS_AT_ONCE:
+        return None
+    found = _in_pieces(study, entry, count)
+    if found is None:
+        _require_memory(entry, count)
+    return found
+
+
+def _in_pieces(study: Study, entry: Path, count: int) -> LongPhone | None:
+    phones = {name: one for name, one in study.sensor_streams.items() if isinstance(one, AccelerationStream)}
+    if len(phones) != 1 or not _has_reference(study, entry):
         return None
     ((name, stream),) = phones.items()
     moved = stream.mounting_xyzw != (0.0, 0.0, 0.0, 1.0) or stream.lever_arm_mm != (0.0, 0.0, 0.0)
@@ -90,11 +102,10 @@ def long_phone(study: Study, entry: Path) -> LongPhone | None:
     return LongPhone(entry, name, stream, of_space(sensor(study, stream)), count) if known else None
 
 
-def require_memory(session: str, entry: Path) -> None:
-    """Raise PipelineError where a phone that has to be in memory whole takes more than there is, by docs/limits.md."""
-    logged = _LOGGED_BYTES * tables.rows("imu", entry)
-    lacking = shortage(logged, _WHOLE_BYTES / _LOGGED_BYTES, free_bytes(), "what its phone measured")
+def _require_memory(entry: Path, count: int) -> None:
+    lacking = shortage(_LOGGED_BYTES * count, _WHOLE_BYTES / _LOGGED_BYTES, free_bytes(), "what its phone measured")
     if lacking is not None:
+        session = next(tables.read_parts("imu", entry, ("session",)))["session"][0].as_py()
         raise PipelineError(f"session {session}: {lacking}")
 
 

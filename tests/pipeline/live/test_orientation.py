@@ -15,6 +15,7 @@ from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Pin
 from pipeline.live.orientation import Aligner, PhoneMotion
 from pipeline.live.setup import Setup
 from pipeline.sessions.logs.mcap import Message, write
+from pipeline.study.settings import Study
 from tests.pipeline.live.studies import STUDY, study_in
 from tests.pipeline.sessions.test_phone import GRAVITY, IMU, TRACKER, swaying, turns
 
@@ -98,6 +99,17 @@ def test_a_reading_that_lacks_something_or_comes_late_is_none() -> None:
     )
 
 
+def _require_replayed(study: Study, folder: Path, messages: list[Message]) -> None:
+    """What was logged, written as P01's log, replays to what was shown."""
+    path = folder / "data/P01_kinect.mcap"
+    path.parent.mkdir()
+    write(path, {"participant": "P01", "condition": "kinect"}, messages)
+    agreed = agreement(study, folder, path, "P01", "kinect")
+    assert agreed is not None
+    assert agreed[0] <= 1e-9
+    assert agreed[1] > 200
+
+
 class _Played:
     """A study's run whose phone draws at once what it is sent, and all that was logged."""
 
@@ -150,13 +162,7 @@ def test_a_session_by_a_phone_s_own_motion_replays_to_what_was_shown(tmp_path: P
     assert np.abs(np.interp(stamps, [ns(float(at)) for at in time], np.arange(len(time))) % 1).max() < 0.5
     late_ms = np.median([one.arrival_ns - one.stamp_ns for one in logged]) / 1e6
     assert late_ms == pytest.approx(5.0, abs=0.1)  # the clock was found from the pings
-    path = tmp_path / "data/P01_kinect.mcap"
-    path.parent.mkdir()
-    write(path, {"participant": "P01", "condition": "kinect"}, messages)
-    agreed = agreement(study, tmp_path, path, "P01", "kinect")
-    assert agreed is not None
-    assert agreed[0] <= 1e-9
-    assert agreed[1] > 200
+    _require_replayed(study, tmp_path, messages)
     assert sum(one.topic == study_run.RAW for one in messages) >= len(logged)
 
 
@@ -186,13 +192,7 @@ def test_of_a_sender_that_brings_no_orientation_it_is_found_too_and_the_log_repl
     logged = [one.values for one in messages if one.topic == "/phone/imu" and one.values is not None]
     assert len(logged) > 200
     assert all(np.isfinite(values).all() for values in logged)
-    path = tmp_path / "data/P01_kinect.mcap"
-    path.parent.mkdir()
-    write(path, {"participant": "P01", "condition": "kinect"}, messages)
-    agreed = agreement(study, tmp_path, path, "P01", "kinect")
-    assert agreed is not None
-    assert agreed[0] <= 1e-9
-    assert agreed[1] > 200
+    _require_replayed(study, tmp_path, messages)
 
 
 def test_what_a_sender_says_of_its_orientation_is_taken_as_it_is(tmp_path: Path) -> None:

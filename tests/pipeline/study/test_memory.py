@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.sessions import ingest, long_phone
 from pipeline.study import memory, table_file
+from pipeline.tables import table as tables
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
@@ -49,10 +50,12 @@ def test_a_table_that_does_not_fit_is_refused_with_what_it_would_take(
 def test_what_does_not_fit_of_a_session_stops_the_run_and_is_computed_once_there_is_room(
     folder: Callable[..., Path], steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch, where: ModuleType, what: str
 ) -> None:
-    study = folder("conditions: [a]\nsessions: data/{participant}_{condition}.mcap\n" + STREAMS)
+    whole = "estimators: {window: {type: window_gp, window: 5}}\n"  # needs all of the phone at once
+    study = folder("conditions: [a]\nsessions: data/{participant}_{condition}.mcap\n" + whole + STREAMS)
     write_session(study / "data" / "P1_a.mcap", session_messages(2.5))
     with monkeypatch.context() as patch:
         patch.setattr(memory, "_SMALL_BYTES", 10)
+        patch.setattr(tables, "ROWS_AT_ONCE", 100)
         patch.setattr(where, "free_bytes", lambda: 1000)
         ran = steadyhand("compare", study, "--jobs", "1")
         assert ran.code == 2
