@@ -42,6 +42,7 @@ _FORGET_S = 10.0
 _USUAL_S = 2.0  # of the slow averages of couplings
 _USUAL_ARM_S = 0.3  # of the lever arm's: a member's position follows slower turns, as it follows slow noise
 _CORRELATED_S = 0.5  # how long an acceleration error from a wrong mounting lasts
+_INDEPENDENT = 0.15  # of frames with correlated noise: one in seven, of 30 a second where it lasts 0.2 s
 _TAIL = 3.0  # per axis: how fast the likelihood falls where positions surprise
 _RATE_SD = 1000.0  # mm/s²: the acceleration error before any reading, of a mounting that is off by 6°
 _ACCELERATION_SD = 5000.0  # mm/s²: the acceleration itself, of members that do not use the phone
@@ -201,21 +202,23 @@ def weighed(model: Model, squared: float, variance: float) -> float:
 def judge(model: Model, state: State) -> None:
     """The scales as the members that use the phone see them, averages of logarithms by weight.
 
-    Leaves every member's share in `share`, those with the phone and those without each summing to 1.
+    Leaves every member's share in `share`, those with the phone and those without each summing to 1. How large
+    correlated noise is hangs on how long it lasts, which its frames hardly say: so its members count more alike there.
     """
     _to_shares(model, state, 0, model.first_alone)
     _to_shares(model, state, model.first_alone, MEMBERS)
-    noise, trust, drift, drift_s, drifting = 0.0, 0.0, 0.0, 0.0, 0.0
+    noise, trust, drift, drift_s, drifting, alike = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for member in range(model.first_alone):
         share = state.share[member]
         noise += share * model.log_member[TRACKER_VARIANCE, member]
         trust += share * model.log_member[ACCELERATION_PSD, member]
         if model.member[DRIFT_VARIANCE, member] > 0.0:
-            drift += share * model.member[DRIFT_VARIANCE, member]
+            drift += share**_INDEPENDENT * model.member[DRIFT_VARIANCE, member]
+            alike += share**_INDEPENDENT
             drift_s += share * model.log_member[DRIFT_S, member]
             drifting += share
     state.fact[NOISE], state.fact[TRUST] = np.exp(noise), np.exp(trust)
-    state.fact[NOISE_DRIFT] = drift
+    state.fact[NOISE_DRIFT] = drifting * drift / alike if drifting > 0.0 else 0.0
     state.fact[NOISE_DRIFT_S] = np.exp(drift_s / drifting) if drifting > 0.0 else 0.0
 
 

@@ -157,10 +157,11 @@ class Dense:
         weight /= weight.sum()
         drifting = member[:, layout.DRIFT_VARIANCE] > 0
         share = weight[drifting] / weight[drifting].sum()
+        alike = share**0.15 / np.sum(share**0.15)
         self.scale = (
             float(np.exp(weight @ np.log(member[:, layout.TRACKER_VARIANCE]))),
             float(np.exp(weight @ np.log(member[:, layout.ACCELERATION_PSD]))),
-            float(weight @ member[:, layout.DRIFT_VARIANCE]),
+            float(weight[drifting].sum() * alike @ member[drifting, layout.DRIFT_VARIANCE]),
             float(np.exp(share @ np.log(member[drifting, layout.DRIFT_S]))),
         )
 
