@@ -33,7 +33,7 @@ _PRIOR_SD = {
 _SPEED_SD = 500.0  # mm/s, as of fusion_kalman: a hand that reaches
 
 _NOISE = (0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0)  # times the tracker's stated SD
-_TRUST = (30.0, 100.0, 300.0, 1e3, 1e4, 1e5, 1e6)  # densities of acceleration errors, mm²/s³
+_TRUST = (30.0, 100.0, 300.0, 1e3, 1e4, 1e5, 3e6)  # densities of acceleration errors, mm²/s³
 _USUAL_TRUST, _TRUST_SPREAD = 200.0, 1.5  # what phones in the hand came to, and the SD of its logarithm
 _NOISE_SPREAD = 0.35  # SD of the logarithm of noise over stated noise
 # Correlated noise: its SD, times the stated one, its time in s, and the trust of accelerations with it.
