@@ -23,13 +23,14 @@ An acceleration costs one step of an integral, a frame one prediction and one co
 the frame before. All that the states do to an acceleration is linear (`rows.py`), so the integrals of the readings and
 of their derivatives are enough: nothing is gone through again when a mounting error is learned.
 
-**A frame** (`steps.py`): the state is moved to it (`moments.py`); is it a measurement at all (a held position, exact
-zeros, a jump that no hand makes)?; the bank takes it in and says what the scales are (`bank.py`); so do the offsets of
-the clock (`clock.py`, `offset.py`); the state takes it in with these.
+**A frame** (`steps.py`): the state is moved to it (`moments.py`); is it a measurement at all (`judged.py`: a held
+position, exact zeros, a jump that no hand makes), or has the fusion gone astray?; the bank takes it in and says what
+the scales are (`bank.py`); so do the offsets of the clock (`clock.py`, `offset.py`); the state takes it in with these.
 
 **What was shown is scored** (`shown.py`): what the filter had shown for the time of a frame, a latency before that
 frame came, is compared with it. That is the error that matters, so it decides between the fusion and what positions
-alone would have shown, and it widens the stated SD until it is honest.
+alone would have shown, and it widens the stated SD until it is honest. While the tracker sees nothing there is no
+such error; then the place where the hand was last seen keeps what is shown from flying away (`seen.py`).
 
 Invariants. Causal; one `arrive` serves live and replay, so both agree to the last bit; a step's cost does not grow with
 the session; the tracker's and the phone's frames may be turned at will. To change: the constants of a file are its own;

@@ -38,7 +38,10 @@ NEITHER, THE_PHONE, THE_TRACKER = 0, 1, 2
 TRACKER_VARIANCE, ACCELERATION_PSD, RATE_PSD, USES_PHONE, DRIFT_VARIANCE, DRIFT_S, MEMBER = 0, 1, 2, 3, 4, 5, 6
 
 # State.count.
-ROWS, WAITING, TAKEN, TOO_LATE, KNOWS_ARM, HAS_DIFFERED, STRANGE, COUNTS = 0, 1, 2, 3, 4, 5, 6, 7
+ROWS, WAITING, TAKEN, TOO_LATE, KNOWS_ARM, HAS_DIFFERED, STRANGE = 0, 1, 2, 3, 4, 5, 6
+ASTRAY = 7  # frames in a row that the fusion alone did not expect
+IN_A_ROW = 8  # frames that were measurements, since there was none for a while
+COUNTS = 9
 
 # State.fact.
 AT, BEGAN, STRANGE_SINCE, PHONE_AHEAD = 0, 1, 2, 3  # times in s; how far the phone's stamps are ahead of their arrival
@@ -50,13 +53,14 @@ LAST = 16  # the newest frame (3)
 LARGEST = 19  # the largest component of specific force so far
 STRANGE_MM = 20  # how far off the first strange frame was
 AT_LARGEST = 21  # how often the largest component came again
-EXPECTED = 22  # the squared error that the fusion expected of itself
+PACE = 22  # the mean squared speed of the hand, an axis
 CLOCK_STEADY_S = 23  # as CLOCK_S, were the clock a steady one
-FACTS = 24
+SEEN, SEEN_S = 24, 27  # the newest frame that was a measurement (3), and when it was measured
+FACTS = 28
 
 # A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
-# position (3) and its variance as the filters state it, and the variance of the fusion's alone.
-FUSED, AHEAD, HELD, MIXED, STATED, OWN, SHOWN = 0, 3, 6, 9, 12, 13, 14
+# position (3) and its variance as the filters state it.
+FUSED, AHEAD, HELD, MIXED, STATED, SHOWN = 0, 3, 6, 9, 12, 13
 
 MEMBERS = 81  # of the bank
 OFFSETS = 21  # of the tracker's clock, that are tried

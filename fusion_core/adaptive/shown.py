@@ -5,15 +5,16 @@ held. Whatever was shown for the time of a frame is compared with the frame once
 squared errors of the last seconds weigh the answers, and where errors are larger than stated, the stated SD grows by as
 much.
 
-The fusion gives way only as far as it errs more than it expects to. While a hand rests, the position held is a better
-answer than any filter's, by a little, and a bad one as soon as the hand moves: what did best is not enough.
+While a hand rests, the position held is a better answer than any filter's, by a little, and a bad one as soon as the
+hand moves. So the answers of positions alone are judged by frames in which it moves; of a rest only the beginning
+counts, where nothing else is known.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fusion_core.adaptive import bank
+from fusion_core.adaptive import bank, seen
 from fusion_core.adaptive.layout import (
     AHEAD,
     ARM,
@@ -24,7 +25,6 @@ from fusion_core.adaptive.layout import (
     CLOCK_VARIANCE,
     DRIFT,
     ERROR,
-    EXPECTED,
     FUSED,
     HELD,
     INPUTS,
@@ -35,7 +35,6 @@ from fusion_core.adaptive.layout import (
     NOISE,
     NOISE_DRIFT,
     ORIENTED,
-    OWN,
     POSITION,
     ROW,
     ROWS,
@@ -62,7 +61,7 @@ _SCORES = 150  # over how many frames errors are averaged
 _SURPRISES = 300  # and surprises, which are noisier
 _ENOUGH = 60  # frames scored, before which nothing is made of it
 _SHARPNESS = 20.0  # thirteen independent errors of three axes in the time that is averaged over
-_DOUBT = 5.0  # log odds against the answers of positions alone
+_DOUBT = 7.0  # log odds against the answers of positions alone
 _MOST_SURPRISE = 9.0  # of one frame, three SDs: a stray one says little about the others
 _LEAST_OF_NOISE = 0.2  # of the noise's variance, in positions alone: five frames averaged
 
@@ -112,14 +111,14 @@ def answer(model: Model, state: State, phone: Phone, time: float, answers: Float
     for axis in range(3):
         answers[FUSED + axis] = 0.0
     own, weight = fused(model, state, phone, time, answers), np.empty(_ANSWERS)
-    answers[OWN] = own
+    own = seen.draw(model, state, time, own, answers)
     bank.by_positions(model, state, max(time - state.fact[AT], 0.0), answers)
     _add_arm(state, phone, answers)
     _weights(model, state, weight)
     answers[STATED] = own * weight[0]
     for other in range(1, _ANSWERS):
-        seen = state.fact[ERROR + other] - _noise(state)
-        answers[STATED] += weight[other] * max(seen, _LEAST_OF_NOISE * _noise(state))
+        apart = state.fact[ERROR + other] - _noise(state)
+        answers[STATED] += weight[other] * max(apart, _LEAST_OF_NOISE * _noise(state))
     for axis in range(3):
         answers[MIXED + axis] = weight[0] * answers[FUSED + axis]
         answers[MIXED + axis] += weight[1] * answers[AHEAD + axis] + weight[2] * answers[HELD + axis]
@@ -142,14 +141,14 @@ def _add_arm(state: State, phone: Phone, answers: FloatArray) -> None:
 def _weights(model: Model, state: State, weight: FloatArray) -> None:
     """The answers' weights by their squared errors: as of normal errors whose variance is what was seen.
 
-    No answer counts for better than the fusion expects of itself. As many errors as were seen, in as many axes, speak.
+    As many errors as were seen, in as many axes, speak.
     """
     weight[0], weight[1], weight[2] = 1.0, 0.0, 0.0
     if state.fact[SCORED] < _ENOUGH:
         return
     total, sharpness = 1.0, _SHARPNESS * min(state.fact[SCORED] / _SCORES, 1.0) * model.dimension / 3.0
     for other in range(1, _ANSWERS):
-        worse = np.log(state.fact[ERROR] / max(state.fact[ERROR + other], state.fact[EXPECTED], 1e-12))
+        worse = np.log(state.fact[ERROR] / max(state.fact[ERROR + other], 1e-12))
         weight[other] = np.exp(min(sharpness * worse - _DOUBT, 50.0))
         total += weight[other]
     for one in range(_ANSWERS):
@@ -167,7 +166,7 @@ def score(model: Model, state: State, phone: Phone, time: float, position: Float
     share = (time - phone.time[row]) / (phone.time[row + 1] - phone.time[row])
     state.fact[SCORED] += 1.0
     newer = max(1.0 / state.fact[SCORED], 1.0 / _SCORES)
-    state.fact[EXPECTED] += newer * (shown[row, OWN] + _noise(state) - state.fact[EXPECTED])
+    of_positions = max(1.0 / state.fact[SCORED], _moving(model, state, shown, row, share) / _SCORES)
     for one in range(_ANSWERS + 1):
         squared = 0.0
         for axis in range(model.dimension):
@@ -175,11 +174,22 @@ def score(model: Model, state: State, phone: Phone, time: float, position: Float
             there = (1.0 - share) * shown[row, at] + share * shown[row + 1, at]
             squared += (position[axis] - there) ** 2 / model.dimension
         if one < _ANSWERS:
-            state.fact[ERROR + one] += newer * (squared - state.fact[ERROR + one])
+            state.fact[ERROR + one] += (newer if one == 0 else of_positions) * (squared - state.fact[ERROR + one])
         else:
             newer = max(1.0 / state.fact[SCORED], 1.0 / _SURPRISES)
             surprise = min(squared / (shown[row, STATED] + _noise(state)), _MOST_SURPRISE)
             state.fact[SURPRISE] += newer * (surprise - state.fact[SURPRISE])
+
+
+@compiled
+def _moving(model: Model, state: State, shown: FloatArray, row: int, share: float) -> float:
+    """How far the hand moved in a latency beside the noise: 0 at rest, 1 where it went many times as far."""
+    squared = 0.0
+    for axis in range(model.dimension):
+        ahead, held = AHEAD + axis, HELD + axis
+        first, second = shown[row, ahead] - shown[row, held], shown[row + 1, ahead] - shown[row + 1, held]
+        squared += ((1.0 - share) * first + share * second) ** 2 / model.dimension
+    return float(squared / (squared + _noise(state)))
 
 
 @compiled

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusion_core.adaptive import bank, clock, moments, rows, shown
+from fusion_core.adaptive import bank, clock, judged, moments, rows, seen, shown
 from fusion_core.adaptive.layout import (
-    ARM,
     ARRIVAL,
     AT,
     BEGAN,
     CLIPPED,
     CLOCK_S,
     CLOCK_VARIANCE,
-    DRIFT,
     FACTS,
-    HAS_DIFFERED,
     INPUTS,
     IS_FRAME,
     KNOWS_ARM,
@@ -29,15 +26,11 @@ from fusion_core.adaptive.layout import (
     NOISE_DRIFT,
     NOISE_DRIFT_S,
     PHONE_AHEAD,
-    POSITION,
     READ,
     ROW,
     ROWS,
     SIZE,
     STAMP,
-    STRANGE,
-    STRANGE_MM,
-    STRANGE_SINCE,
     TAKEN,
     TIME,
     TOO_LATE,
@@ -56,14 +49,9 @@ _WAIT_S = 0.05  # a frame waits so long for the phone's readings up to its time,
 _SILENT_S = 0.2  # unless the phone has been silent for longer
 _BACK_S = 0.12  # a frame may be measured so long before the state
 _KEPT_S = 0.25  # rows are kept so long before the state, for such a frame
-_JUMP_MM = 60.0  # and six SDs: no hand goes further from where it was expected
-_GATE = 6.0
-_RUNAWAY = 2.0  # times as far off as at first: another body stays where it is, a wrong speed runs away
-_BELIEVED_AFTER_S = 1.3  # a jump that stays so long is where the hand is now
 _MOST_AHEAD_S = 0.2
 _AHEAD_TAKEN, _AHEAD_KEPT = 0.2, 0.9997  # of a reading that is ahead; of what is known, from reading to reading
 _ROUND_OFF_S = 1e-6
-_NOTHING, _MEASURED, _BELIEVED_AGAIN = 0, 1, 2  # what a frame is taken for
 
 
 @compiled
@@ -185,6 +173,7 @@ def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
     clock.begin(model, state, value)
     state.fact[STAMP] = time
     state.count[TAKEN] = 1
+    seen.see(model, state, time, value)
     for axis in range(3):
         state.fact[LAST + axis] = value[axis]
 
@@ -228,50 +217,23 @@ def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: Floa
     of_positions += _of_clock(model, state)
     state.count[TAKEN] += 1
     turned, of_phone = np.zeros((3, 3)), np.empty(3)
-    verdict = _judge(model, state, phone, time, value, turned, of_phone)
-    if verdict == _BELIEVED_AGAIN:
+    verdict = judged.judge(model, state, phone, time, value, turned, of_phone)
+    if verdict == judged.BELIEVED_AGAIN:
         moments.begin_again(model, state, of_phone)
         bank.begin_again(model, state, of_phone)
         clock.begin_again(model, state, value, turned)
         state.fact[STAMP] = stamp
         return
-    news = 1 if verdict == _MEASURED and ago == 0.0 else 0
+    news = 1 if verdict == judged.MEASURED and ago == 0.0 else 0
     if news:
         shown.score(model, state, phone, time, value)
         bank.take_in(model, state, of_phone, of_positions, max(dt, 1e-3))
         bank.judge(model, state)
-    if news or verdict == _NOTHING:
+    if news or verdict == judged.NOTHING:
         clock.take_in(model, state, phone, stamp, value, turned, of_accelerations, news)
-    if verdict == _MEASURED:
+    if verdict == judged.MEASURED:
         moments.correct(model, state, ago, turned, value, state.fact[NOISE] + _of_clock(model, state))
-
-
-@compiled
-def _judge(
-    model: Model,
-    state: State,
-    phone: Phone,
-    time: float,
-    value: FloatArray,
-    turned: FloatArray,
-    of_phone: FloatArray,
-) -> int:
-    """What a frame is to be taken for; the phone's rotation and position by it are written on the way."""
-    if not _is_news(model, state, value):
-        return _NOTHING
-    for axis in range(3):
-        of_phone[axis] = value[axis]
-    if state.count[KNOWS_ARM]:
-        rows.turned_at(state, phone, time, turned)
-        for axis in range(model.dimension):
-            for part in range(3):
-                of_phone[axis] -= turned[axis, part] * state.mean[ARM + part]
-    if _is_strange(model, state, of_phone, time):
-        return _NOTHING
-    if state.count[STRANGE] > 0:
-        state.count[STRANGE] = 0
-        return _BELIEVED_AGAIN
-    return _MEASURED
+        seen.see(model, state, time, value)
 
 
 @compiled
@@ -281,45 +243,6 @@ def _of_clock(model: Model, state: State) -> float:
     for axis in range(model.dimension):
         squared += state.mean[VELOCITY + axis] ** 2 / model.dimension
     return float(squared * state.fact[CLOCK_VARIANCE])
-
-
-@compiled
-def _is_news(model: Model, state: State, value: FloatArray) -> bool:
-    """A tracker that has lost its target repeats the last position or says zero: no noise does that on all axes.
-
-    Unless it never said anything else.
-    """
-    repeated, zero = True, True
-    for axis in range(model.dimension):
-        repeated &= value[axis] == state.fact[LAST + axis]
-        zero &= value[axis] == 0.0
-        state.fact[LAST + axis] = value[axis]
-    if not (repeated or zero):
-        state.count[HAS_DIFFERED] = 1
-    return not (repeated or zero) or state.count[HAS_DIFFERED] == 0
-
-
-@compiled
-def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -> bool:
-    """Further from what was expected than a hand goes: another body's, for as long as that can be.
-
-    Leaves the count of strange frames above zero with the first that is believed again where it is.
-    """
-    squared, variance = 0.0, 0.0
-    for axis in range(model.dimension):
-        apart = of_phone[axis] - state.mean[POSITION + axis] - state.mean[DRIFT + axis]
-        squared += apart * apart
-        variance += state.covariance[POSITION + axis, POSITION + axis] / model.dimension
-    most = _JUMP_MM + _GATE * np.sqrt(variance + state.fact[NOISE] + state.fact[NOISE_DRIFT])
-    if squared <= most * most:
-        state.count[STRANGE] = 0
-        return False
-    if state.count[STRANGE] == 0:
-        state.fact[STRANGE_SINCE], state.fact[STRANGE_MM] = time, np.sqrt(squared)
-    state.count[STRANGE] += 1
-    if state.count[STRANGE] > 2 and squared > (_RUNAWAY * state.fact[STRANGE_MM]) ** 2:
-        return False
-    return bool(time - state.fact[STRANGE_SINCE] < _BELIEVED_AFTER_S)
 
 
 @compiled
