@@ -19,6 +19,7 @@ from fusion_core.samples import Samples
 from tests.fusion_core.adaptive.dense_clock import DenseClock
 
 P, V, INPUT, ARM, DRIFT = slice(0, 3), slice(3, 6), slice(6, 17), slice(17, 20), slice(20, 23)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def cross(vector: np.ndarray) -> np.ndarray:
@@ -27,13 +28,33 @@ def cross(vector: np.ndarray) -> np.ndarray:
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
+def integrands(imu: Samples) -> np.ndarray:
+    """Of each reading the acceleration and the input coupling, a flat (3, 12): (n, 36)."""
+    assert imu.rotation is not None
+    assert imu.force is not None
+    rows = []
+    up = imu.rotation[0] @ imu.force[0] - imu.value[0]
+    up = up / np.linalg.norm(up)
+    for value, rotation, force in zip(imu.value, imu.rotation, imu.force, strict=True):
+        level = value - up * (up @ value)
+        turn = np.column_stack([level, np.cross(up, level)])
+        rows.append(np.column_stack([value, rotation, rotation @ cross(force), np.eye(3), turn]).ravel())
+    return np.array(rows)
+
+
+def between(time: np.ndarray, rows: np.ndarray, at: float) -> np.ndarray:
+    """The row at a time, between two rows by a straight line; before the first and after the last, these."""
+    after = int(np.clip(np.searchsorted(time, at), 1, len(time) - 1))
+    share = np.clip((at - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+    return np.asarray((1 - share) * rows[after - 1] + share * rows[after])
+
+
 class Dense:
     """State of 23 and bank; `take` moves to a frame and takes it in."""
 
     def __init__(self, model: Records, imu: Samples, position: np.ndarray, time: float) -> None:
-        assert imu.rotation is not None
-        assert imu.force is not None
         self.model, self.imu, self.time, self.began = model[0], imu, time, time
+        self.rows = integrands(imu)
         self.mean, self.covariance = np.zeros(23), np.diag(self.model["prior"])
         self.mean[P] = position
         self.knows_arm = False
@@ -54,26 +75,16 @@ class Dense:
     def turned(self, time: float) -> np.ndarray:
         """The rotation, between readings by a straight line."""
         assert self.imu.rotation is not None
-        flat = self.imu.rotation.reshape(-1, 9)
-        return np.array([np.interp(time, self.imu.time, column) for column in flat.T]).reshape(3, 3)
+        return between(self.imu.time, self.imu.rotation.reshape(-1, 9), time).reshape(3, 3)
 
     def integrals(self, begin: float, end: float) -> tuple[np.ndarray, np.ndarray]:
         """First and second integrals of acceleration (3) and input coupling (3, 11), as (3, 12) each."""
-        assert self.imu.rotation is not None
-        assert self.imu.force is not None
-        columns = []
-        up = self.imu.rotation[0] @ self.imu.force[0] - self.imu.value[0]
-        up = up / np.linalg.norm(up)
-        for value, rotation, force in zip(self.imu.value, self.imu.rotation, self.imu.force, strict=True):
-            level = value - up * (up @ value)
-            turn = np.column_stack([level, np.cross(up, level)])
-            columns.append(np.column_stack([value, rotation, rotation @ cross(force), np.eye(3), turn]).ravel())
         knots = np.concatenate([[begin], self.imu.time[(self.imu.time > begin) & (self.imu.time < end)], [end]])
         first, second = np.zeros(36), np.zeros(36)
         for left, right in pairwise(knots):
-            half, (node, weight) = (right - left) / 2, np.polynomial.legendre.leggauss(4)
-            for at, share in zip((left + right) / 2 + half * node, half * weight, strict=True):
-                value = np.array([np.interp(at, self.imu.time, column) for column in np.array(columns).T])
+            half = (right - left) / 2
+            for at, share in zip((left + right) / 2 + half * NODES, half * WEIGHTS, strict=True):
+                value = between(self.imu.time, self.rows, at)
                 first += share * value
                 second += share * (end - at) * value
         return first.reshape(3, 12), second.reshape(3, 12)
