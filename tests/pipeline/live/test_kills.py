@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import os
 import random
+import select
+import shutil
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -15,8 +19,10 @@ from pipeline.live import plan
 from pipeline.live.bots import Players, as_simulated
 from pipeline.live.events import Event
 from pipeline.live.journal import PART, Journal
+from pipeline.live.setup import Setup
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
+from pipeline.study.settings import Study
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.live.studies import STUDY, study_in
 
@@ -58,25 +64,43 @@ def warm(tmp_path_factory: pytest.TempPathFactory) -> None:
     journal.release()
 
 
-def in_the_study(seconds: float, moment_s: float = 0.0) -> Callable[[int], bytes]:
-    """Waits until so much of the study is played since it was first said, however fast this machine plays it.
+@dataclass
+class Player:
+    """A process that plays a study; how far it has come it says in `said_in`."""
 
-    After a moment more by the wall clock the player may be at any step.
-    """
+    pid: int
+    said_in: int
+    began_ns: int
+    now_ns: int
 
-    def wait(said_in: int) -> bytes:
-        told = os.read(said_in, 8)
-        began = int.from_bytes(told, "big")
-        while int.from_bytes(told[-8:], "big") - began < seconds * 1e9 and (part := os.read(said_in, 8)):
-            told += part
+    def plays(self, seconds: float, moment_s: float) -> None:
+        """Waits until so much of the study is played since it was first said, however fast this machine plays it.
+
+        After a moment more by the wall clock the player may be at any step.
+        """
+        while self.now_ns - self.began_ns < seconds * 1e9 and self._hears():
+            pass
         time.sleep(moment_s)
-        return told
 
-    return wait
+    def stops(self, how: signal.Signals) -> None:
+        """Stop it where it is, for good or for a while, and hear all that it has said until then."""
+        os.kill(self.pid, how)
+        os.waitid(os.P_PID, self.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT)
+        while select.select([self.said_in], [], [], 0)[0] and self._hears():
+            pass
+
+    def goes_on(self) -> None:
+        os.kill(self.pid, signal.SIGCONT)
+
+    def _hears(self) -> bool:
+        told = os.read(self.said_in, 8)
+        self.now_ns = int.from_bytes(told, "big") if told else self.now_ns
+        return bool(told)
 
 
-def killed(folder: Path, wait: Callable[[int], bytes]) -> int:
-    """Play in a process that is killed after a wait; returns the time in the study that it had come to, in ns."""
+@contextmanager
+def playing(folder: Path) -> Iterator[Player]:
+    """Play in a process, which is killed at the end."""
     (ready_in, ready), (said_in, said) = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:
@@ -87,20 +111,18 @@ def killed(folder: Path, wait: Callable[[int], bytes]) -> int:
     os.close(ready)
     os.close(said)
     assert os.read(ready_in, 1) == b"1"
-    told = wait(said_in)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    while part := os.read(said_in, 65536):
-        told += part
-    os.close(ready_in)
-    os.close(said_in)
-    return int.from_bytes(told[-8:], "big") if told else EPOCH_NS
+    began_ns = int.from_bytes(os.read(said_in, 8), "big")
+    try:
+        yield Player(child, said_in, began_ns, began_ns)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        os.close(ready_in)
+        os.close(said_in)
 
 
-def survives(folder: Path, played_s: float, moment_s: float) -> str:
-    """Kill a study, and look at what is left of it; returns the state of its first task."""
-    came_to = killed(folder, in_the_study(played_s, moment_s))
-    study, setup = study_in(folder)
+def state_after(folder: Path, study: Study, setup: Setup, came_to_ns: int) -> str:
+    """What a recorder finds that begins after another was killed; returns the state of the first task."""
     journal = Journal(folder, study)
     journal.hold()  # the lock of a process that is dead holds nobody
     known = setup.empty_plan()
@@ -114,23 +136,45 @@ def survives(folder: Path, played_s: float, moment_s: float) -> str:
         ]
         log = mcap.read(path, topics)
         newest = max(int(one.arrival_ns.max()) for one in log.topics.values())
-        assert came_to - newest <= 1_000_000_000
+        assert came_to_ns - newest <= 1_000_000_000
     assert not list((folder / "data").glob("*.new"))
     return known.persons[0].tasks[0].state if known.persons else "todo"
 
 
-@pytest.mark.parametrize("kills", [pytest.param(4, id="a few"), pytest.param(196, id="many", marks=pytest.mark.slow)])
-def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(kills: int, tmp_path: Path) -> None:
-    chance, states = random.Random(kills), []  # noqa: S311
-    for number in range(kills):
-        played_s, moment_s = chance.uniform(0, _MOST_S), chance.uniform(0, _A_MOMENT_S)
-        states.append(survives(tmp_path / str(number), played_s, moment_s))
+def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(tmp_path: Path) -> None:
+    chance, states = random.Random(4), []  # noqa: S311
+    for number in range(4):
+        folder = tmp_path / str(number)
+        with playing(folder) as player:
+            player.plays(chance.uniform(0, _MOST_S), chance.uniform(0, _A_MOMENT_S))
+            player.stops(signal.SIGKILL)
+        states.append(state_after(folder, *study_in(folder), player.now_ns))
+    assert "cut" in states
+    assert set(states) <= {"todo", "cut", "done"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(7))
+def test_so_it_would_be_at_every_one_of_many_moments(seed: int, tmp_path: Path) -> None:
+    """Each time the player is halted and its files are copied: a kill would have left these, for it writes no more."""
+    chance, found = random.Random(seed), []  # noqa: S311
+    folder = tmp_path / "played"
+    with playing(folder) as player:
+        for number, seconds in enumerate(sorted(chance.uniform(0, _MOST_S) for _ in range(28))):
+            player.plays(seconds, chance.uniform(0, _A_MOMENT_S))
+            player.stops(signal.SIGSTOP)
+            left = shutil.copytree(folder, tmp_path / str(number))
+            found.append((left, player.now_ns))
+            player.goes_on()
+    study, setup = study_in(folder)
+    states = [state_after(left, study, setup, came_to_ns) for left, came_to_ns in found]
     assert "cut" in states
     assert set(states) <= {"todo", "cut", "done"}
 
 
 def test_what_is_left_of_a_cut_session_is_read_by_the_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
-    killed(tmp_path, in_the_study(3.0))
+    with playing(tmp_path) as player:
+        player.plays(3.0, 0.0)
     study, _ = study_in(tmp_path, STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", ""))
     journal = Journal(tmp_path, study)
     journal.hold()
