@@ -6,6 +6,7 @@ marked as slow.
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import shutil
@@ -27,6 +28,7 @@ _WITH_LOGS = ("replay", "fit", "simulate")
 _WITH_JOBS = ("report", "compare", "check", "replay", "fit", "simulate", "explore")
 _PLAYED = "record studies/peephole --demo --bots --participants 1 --out demo"
 """In the place of every `record`, which serves pages until somebody ends it."""
+_HANDED_ON_BY_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES", "MAKELEVEL", "ARGS", "STUDY")
 _MINUTES = re.compile(r"studies/peephole")
 # A contradiction among printed figures, and a difference between two results, are answers too.
 _CODES = {"audit": (0, 3), "diff": (0, 3)}
@@ -40,12 +42,16 @@ def shown_in(page: Path) -> Iterator[str]:
 
 
 def shown_by_make() -> Iterator[str]:
-    """What `make TARGET` runs, with the options that `make help` gives as an example for it."""
+    """What `make TARGET` runs, with the options that `make help` gives as an example for it.
+
+    What a `make` of these tests was given is for their own run: it hands it on in the environment.
+    """
+    own = {name: value for name, value in os.environ.items() if name not in _HANDED_ON_BY_MAKE}
     help_of = re.compile(r"^([a-z-]+):.*?## (.*)$", re.MULTILINE)
     for target, text in help_of.findall((CLONE / "Makefile").read_text(encoding="utf-8")):
         example = re.search(r'ARGS="([^"]*)"', text)
         words = ["make", "-n", "--no-print-directory", target, *([f"ARGS={example[1]}"] if example else [])]
-        printed = subprocess.run(words, cwd=CLONE, capture_output=True, text=True, check=True).stdout
+        printed = subprocess.run(words, cwd=CLONE, env=own, capture_output=True, text=True, check=True).stdout
         yield from (command.strip() for command in _COMMAND.findall(printed))
 
 
@@ -66,11 +72,22 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(CLONE / "studies" / name, root / "studies" / name)
     (root / "studies" / "peephole").mkdir()
     settings = (CLONE / "studies" / "peephole" / "study.yaml").read_text(encoding="utf-8")
-    fewer = settings.replace("  participants: 12\n", "  participants: 3\n").replace("  repeats: 20\n", "  repeats: 1\n")
-    assert fewer != settings
-    (root / "studies" / "peephole" / "study.yaml").write_text(fewer, encoding="utf-8")
+    (root / "studies" / "peephole" / "study.yaml").write_text(briefer(settings), encoding="utf-8")
     (root / "reports").mkdir()
     return root
+
+
+def briefer(settings: str) -> str:
+    """The simulated study with three participants in the place of twelve, and with the first third of their task."""
+    for words, instead in (
+        (r"  participants: 12\n", "  participants: 3\n"),
+        (r"  repeats: 20\n", "  repeats: 1\n"),
+        (r"(  path_mm:.*\n(?:    - .*\n){4})(?:    - .*\n)+", r"\1"),
+        (r"  targets_mm: \[((?:\[[^]]*\], ){2}).*\]\n", r"  targets_mm: [\1]\n"),
+    ):
+        settings, times = re.subn(words, instead, settings)
+        assert times == 1, words
+    return settings
 
 
 def in_place_of_names(command: str, place: Path) -> list[str]:
