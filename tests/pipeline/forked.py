@@ -13,6 +13,7 @@ FORKED.set_forkserver_preload(
         "pipeline.sessions.assess",
         "pipeline.analysis.measure",
         "pipeline.analysis.compare",
+        "pipeline.report.write",
         "distributed.dashboard.worker",  # where Dask is installed
         "tests.pipeline.dying",
         "tests.pipeline.engine.test_cache",

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.engine import threads
+from pipeline.engine import processes, threads
 from pipeline.engine.cache import Cache
 from pipeline.engine.executors import executor_of
 from pipeline.engine.processes import Processes
@@ -119,8 +119,11 @@ def test_of_a_group_only_the_piece_that_kills_its_process_is_set_aside(study: Pa
     assert (first, result.computed["replay"] - first) == (12, 1)
 
 
-def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(many: Path, tmp_path: Path) -> None:
+def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(
+    many: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """To the same bytes, report and all, its figures drawn by others; if that process dies, the user is told."""
+    monkeypatch.setattr(processes, "SPAWN", FORKED)
     with executor_of(1, "inline") as executor:
         here = bring_up_to_date(many, STAGES, Resources(Cache(tmp_path / "here"), executor, PlainLines()))
     with Processes(2, FORKED) as executor:

@@ -34,8 +34,8 @@ def fail(folder: Path) -> None:
     raise ValueError(f"nothing goes into {folder.name}")
 
 
-def note_late(folder: Path, number: int) -> None:
-    time.sleep(0.2)
+def note_late(folder: Path, number: int, wait_s: float = 0.2) -> None:
+    time.sleep(wait_s)
     note(folder, number)
 
 
@@ -91,12 +91,13 @@ def test_what_a_dying_process_leaves_is_done_here(tmp_path: Path, processes: Pro
 def test_an_error_of_a_job_is_raised_once_no_other_is_at_work(tmp_path: Path, executor: Executor | None) -> None:
     """What they write into may be gone a moment later."""
     (tmp_path / "gone").mkdir()
+    wait_s = 0.2 if isinstance(executor, Processes) else 0.01  # in this process each job waits for the one before
     with pytest.raises(ValueError, match="nothing goes into"), Jobs(executor) as jobs:
         jobs.add(fail, tmp_path)
         for number in range(20):
-            jobs.add(note_late, tmp_path / "gone", number)
+            jobs.add(note_late, tmp_path / "gone", number, wait_s)
     written = read(tmp_path / "gone")
-    time.sleep(0.5)
+    time.sleep(2.5 * wait_s)
     assert read(tmp_path / "gone") == written
 
 
