@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -97,10 +98,16 @@ def _texts(name: str, content: bytes) -> Iterator[tuple[str, str]]:
             for inside in archive.namelist():
                 yield from _texts(inside, archive.read(inside))
     if name.endswith(".pdf"):
-        reader = PdfReader(io.BytesIO(content))
-        yield name, " ".join([str(reader.metadata), *(page.extract_text() for page in reader.pages)])
+        yield name, _printed(content)
     if name.endswith(".parquet"):
         yield name, str(pq.read_table(io.BytesIO(content)).to_pylist())
+
+
+@cache
+def _printed(pdf: bytes) -> str:
+    """A document's facts and text; the one in a ZIP is the one beside it."""
+    reader = PdfReader(io.BytesIO(pdf))
+    return " ".join([str(reader.metadata), *(page.extract_text() for page in reader.pages)])
 
 
 def _numbers(value: Any) -> Any:
