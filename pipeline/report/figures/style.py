@@ -68,12 +68,17 @@ def styled(function: Callable[Drawn, Figure]) -> Callable[Drawn, Figure]:
     def drawn(*arguments: Drawn.args, **named: Drawn.kwargs) -> Figure:
         with mpl.rc_context(_STYLE):
             figure = function(*arguments, **named)
-            for axes in figure.axes:  # matplotlib makes tick labels when they are first asked for, in the style of then
-                axes.get_xticklabels()
-                axes.get_yticklabels()
+            label_ticks(figure)
         return figure
 
     return drawn
+
+
+def label_ticks(figure: Figure) -> None:
+    """Have matplotlib make the labels of ticks, which it else does when they are asked for, in the style of then."""
+    for axes in figure.axes:
+        axes.get_xticklabels()
+        axes.get_yticklabels()
 
 
 def save(figure: Figure, path: Path) -> None:
