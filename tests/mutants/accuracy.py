@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from tests.fusion_core.accuracy import test_accuracy
 from tests.mutants.mutant import Mutant
-from tests.pipeline.sessions import test_movements
+from tests.pipeline.sessions import test_hand_paths, test_movements
 
 _ACCURACY = (test_accuracy,)
-_MOVEMENTS = (test_movements,)
+_MOVEMENTS = (test_hand_paths, test_movements)
 
 MUTANTS = (
     # The reference between its readings.
