@@ -13,12 +13,12 @@ from tests.pipeline.analysis.audit import (
 )
 from tests.pipeline.sessions import test_movements, test_replay, test_sessions
 from tests.pipeline.simulation import test_simulation
-from tests.pipeline.statistics import test_models, test_statistics
+from tests.pipeline.statistics import test_against_r, test_models, test_statistics
 from tests.pipeline.study import test_tables_in
 
 _MEASURE = (test_measure, test_tables_in)
 _SESSIONS = (test_measure, test_tables_in, test_sessions)
-_COMPARED = (test_measure, test_statistics, test_models)
+_COMPARED = (test_measure, test_against_r, test_statistics, test_models)
 _CASES = (test_cases, test_measure, test_models)
 _DESIGN = (test_design_check,)
 _AUDIT = (test_audit, test_no_false_accusation)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.mutants.mutant import Mutant
 from tests.pipeline.statistics import (
+    test_against_r,
     test_counterbalancing,
     test_friedman,
     test_groups,
@@ -18,11 +19,11 @@ from tests.pipeline.statistics import (
     test_statistics,
 )
 
-_TESTS = (test_statistics,)
+_TESTS = (test_against_r, test_statistics)
 _MODELS = (test_models,)
 _POWER = (test_power,)
 _ORDERS = (test_counterbalancing,)
-_FRIEDMAN = (test_friedman, test_statistics)
+_FRIEDMAN = (test_friedman, test_against_r, test_statistics)
 _GROUPS = (test_groups,)
 _MIXED_ANOVA = (test_mixed_anova,)
 _INTERCEPTS = (test_mixed_models,)
