@@ -17,7 +17,7 @@ from pipeline.errors import SessionError
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log, Wanted
 from pipeline.sessions.logs.mcap import MAGIC
-from tests.pipeline.sessions.logs.test_damaged_logs import channel_record, chunk, message_record, text
+from tests.pipeline.sessions.logs.records_by_hand import channel_record, chunk, message_record, text
 
 EVENT = b'{"type": "selection", "x": 0.5}'
 COUNT = 200
