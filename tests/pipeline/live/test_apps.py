@@ -21,8 +21,8 @@ from pipeline.live.adapters import apps
 from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.events import Offer, Reading
 from pipeline.live.messages import MessageError
+from tests.pipeline.live.running import Running, hears, served
 from tests.pipeline.live.studies import STUDY, study_in
-from tests.pipeline.live.test_server import Running, hears, served
 
 HERE, PHONE = "127.0.0.1", "192.168.1.7"
 G = 9.80665

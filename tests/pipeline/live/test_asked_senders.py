@@ -4,75 +4,28 @@ from __future__ import annotations
 
 import asyncio
 import json
-import platform
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from websockets.asyncio.server import ServerConnection
 
 from pipeline.live import desk, panel
-from pipeline.live.adapters import client, foxglove, lsl, rosbridge
+from pipeline.live.adapters import client
 from pipeline.live.adapters.client import Client
-from pipeline.live.adapters.feeds import Feed
-from pipeline.live.adapters.talk import Talk
-from pipeline.live.events import ClockOffset, Link, Reading
-from pipeline.live.units import units
+from pipeline.live.events import ClockOffset, Link
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
-from pipeline.study.recording import Foxglove, Lsl, Rosbridge, Sender
-from tests.pipeline.helpers import exit_code
 from tests.pipeline.live import servers
+from tests.pipeline.live.asked import SUBPROTOCOLS, heard, outlet, problems, readings, talk
+from tests.pipeline.live.lab import Lab, notes
+from tests.pipeline.live.running import Running, agreed, free_port, hears, press_through, says, served
 from tests.pipeline.live.servers import IMU, POSITION, point_stamped, published, serving
-from tests.pipeline.live.studies import STUDY, study_in
-from tests.pipeline.live.test_faults import Lab, notes
-from tests.pipeline.live.test_server import Running, agreed, free_port, hears, press_through, says, served
-
-SUBPROTOCOLS = ("foxglove.sdk.v1",)
-
-
-def talk(port: int, kind: str = "rosbridge") -> Talk:
-    feed = Feed("tracker", "position", units(Sender(lsl=Lsl(name="Hand"), unit="m")))
-    url = f"ws://127.0.0.1:{port}"
-    if kind == "foxglove":
-        return foxglove.Talk(feed, Foxglove(url=url, topic=POSITION))
-    return rosbridge.Talk(feed, Rosbridge(url=url, topic=POSITION, type="geometry_msgs/PointStamped"))
-
-
-def heard(of: Talk, until: Callable[[list[Any]], bool], beside: Any = None) -> tuple[list[Any], Counter[str]]:
-    """What a client says until something is so, while `beside` runs."""
-    found: list[Any] = []
-
-    async def listen() -> Counter[str]:
-        asked = Client(of, found.append, time.time_ns)
-        tasks = [asyncio.create_task(asked.run()), *([] if beside is None else [asyncio.create_task(beside())])]
-        try:
-            async with asyncio.timeout(20):
-                while not until(found):
-                    await asyncio.sleep(0.005)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-        return asked.refused
-
-    refused = asyncio.run(listen())
-    return found, refused
-
-
-def problems(found: Sequence[Any]) -> list[str]:
-    return [one.problem for one in found if isinstance(one, Link)]
-
-
-def readings(found: Sequence[Any]) -> list[Reading]:
-    return [one for one in found if isinstance(one, Reading)]
+from tests.pipeline.live.studies import STUDY
 
 
 def test_a_connection_that_is_lost_is_said_and_there_again_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -248,93 +201,6 @@ def test_a_sender_s_connection_is_a_light_a_reason_and_a_note(tmp_path: Path) ->
     assert notes(lab.happens(Link("tracker", "", lab.now))) == ["sender"]
     (logged,) = lab.happens(ClockOffset("tracker", 5.0, lab.now))
     assert logged.message.event == {"sender": "tracker", "offset_ms": 5.0}  # type: ignore[union-attr]
-
-
-# --- Lab Streaming Layer
-
-
-@contextmanager
-def outlet(name: str, channels: int, values: Sequence[float], rate_hz: float) -> Iterator[None]:
-    """An outlet that sends the same steadily. Skipped where the library cannot be loaded (it needs glibc 2.35)."""
-    try:
-        import pylsl
-    except (ImportError, OSError, RuntimeError) as error:
-        pytest.skip(f"LSL cannot be loaded here ({platform.libc_ver()}): {error}")
-    made = pylsl.StreamOutlet(pylsl.StreamInfo(name, "Test", channels, rate_hz, "double64", f"{name}-{time.time_ns()}"))
-    if not any(one.name() == name for one in pylsl.resolve_byprop("name", name, 1, timeout=3.0)):
-        pytest.skip("no LSL stream of this computer's own can be found here: its network passes no multicast")
-    stop = threading.Event()
-
-    def push() -> None:
-        while not stop.wait(1 / rate_hz):
-            made.push_sample(list(values))
-
-    sending = threading.Thread(target=push)
-    sending.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        sending.join()
-
-
-@given(st.lists(st.integers(1, 5), min_size=1, max_size=6))
-@settings(max_examples=25)
-def test_how_lsl_hands_samples_over_makes_no_difference(cuts: list[int]) -> None:
-    samples = [([0.0, number, 0.25, 3.0], number * 1000) for number in range(sum(cuts))]
-    taken: list[Any] = []
-
-    feed = Feed("tracker", "position", units(Sender(lsl=Lsl(name="Hand"), unit="m")))
-    of = lsl.Outlet(feed, Lsl(name="Hand", channels=(1, 2, 3)), taken.append, lambda: 10**9)
-    begin = 0
-    for cut in cuts:
-        of.take(samples[begin : begin + cut])
-        begin += cut
-    of.take([([0.0, float("nan"), 0.25, 3.0], 5), ([1.0], 6)])
-    assert of.refused == {"tracker: not of the stream's kind": 2}
-    assert taken == [Reading("tracker", at, 10**9, (float(v[1]), 0.25, 3.0)) for v, at in samples]
-
-
-def test_an_outlet_that_is_not_there_comes_and_goes_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lsl, "_LOOK_S", 0.3)
-    found: list[Any] = []
-
-    async def listen() -> None:
-        feed = Feed("tracker", "position", units(Sender(lsl=Lsl(name="SteadyhandGone"))))
-        of = lsl.Outlet(feed, Lsl(name="SteadyhandGone"), found.append, time.time_ns)
-        of.listen()
-        try:
-            async with asyncio.timeout(20):
-                while not problems(found):
-                    await asyncio.sleep(0.01)
-                with outlet("SteadyhandGone", 3, (1.0, 2.0, 3.0), 50):
-                    while len(readings(found)) < 5:
-                        await asyncio.sleep(0.01)
-                while len(problems(found)) < 3:
-                    await asyncio.sleep(0.01)
-        finally:
-            of.close()
-
-    asyncio.run(listen())
-    said = problems(found)
-    assert said[0].startswith('tracker: no LSL stream is named "SteadyhandGone"; ')
-    assert said[1] == ""
-    assert said[2].startswith('tracker: the LSL stream "SteadyhandGone" is gone (')
-    first = readings(found)[0]
-    assert first.values == (0.001, 0.002, 0.003)
-    assert first.stamp_ns is not None and abs(first.stamp_ns - first.arrival_ns) < 10**9
-    (measured, *_) = [one for one in found if isinstance(one, ClockOffset)]
-    assert measured.sender == "tracker"
-
-
-def test_without_pylsl_it_is_said_how_to_install_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    study_in(tmp_path, STUDY.replace("senders: {tracker: {demo: {}}", "senders: {tracker: {lsl: {name: Hand}}"))
-    monkeypatch.setitem(__import__("sys").modules, "pylsl", None)
-    assert exit_code(monkeypatch, "record", tmp_path) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert 'recording: senders.tracker: lsl: needs a further package: pip install "steadyhand[lsl]"' in said
 
 
 # --- whole tasks

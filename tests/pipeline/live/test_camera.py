@@ -23,8 +23,8 @@ from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import exit_code
 from tests.pipeline.live.frames import FACING, frame
+from tests.pipeline.live.running import Running, agreed, free_port, hears, press_through, says, served
 from tests.pipeline.live.studies import STUDY, study_in
-from tests.pipeline.live.test_server import Running, agreed, free_port, hears, press_through, says, served
 
 SIZE = (640, 360)
 CAMERA = "camera: {size: [640, 360], field_of_view_deg: 60, late_ms: 20}"

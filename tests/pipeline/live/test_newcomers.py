@@ -17,9 +17,9 @@ from pipeline.live.adapters import osc, udp
 from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.events import Accept, Closed, Joined, Offer, Offered, Open, Reading, Said, Save
 from pipeline.live.messages import Do
+from tests.pipeline.live.lab import OPERATOR, Lab, lab, notes, refusals
+from tests.pipeline.live.running import Running, hears, says, served
 from tests.pipeline.live.studies import STUDY, study_in
-from tests.pipeline.live.test_faults import OPERATOR, Lab, lab, notes, refusals
-from tests.pipeline.live.test_server import Running, hears, says, served
 
 __all__ = ["lab"]  # a fixture
 

@@ -19,8 +19,8 @@ from pipeline.live.outgoing import AnswerSaved, Form, Refused
 from pipeline.live.plan import Plan, rating_rows
 from pipeline.live.setup import warm_up
 from tests.pipeline.helpers import Steadyhand, exit_code
+from tests.pipeline.live.running import Running, hears, says, served
 from tests.pipeline.live.studies import STUDY, study_in
-from tests.pipeline.live.test_server import Running, hears, says, served
 
 AT_NS = 1_764_350_000_000_000_000
 WEIGHTED = STUDY.replace("questionnaires: [nasa_tlx]", "questionnaires: [weighted_tlx]").replace(

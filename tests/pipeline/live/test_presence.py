@@ -7,8 +7,8 @@ from pathlib import Path
 from pipeline.live import panel
 from pipeline.live.events import Action, Close, Said
 from pipeline.live.messages import Battery, Hello, Ping, Visible
+from tests.pipeline.live.lab import MS, PHONE, Lab, lab, notes
 from tests.pipeline.live.studies import STUDY
-from tests.pipeline.live.test_faults import MS, PHONE, Lab, lab, notes
 
 __all__ = ["lab"]  # a fixture
 

@@ -23,7 +23,7 @@ from pipeline.live import certificates, record
 from pipeline.live.access import ROLES, Access
 from pipeline.live.certificates import Certificates, for_address, given
 from pipeline.live.record import Serving, secured
-from tests.pipeline.live.test_server import Running, free_port, served
+from tests.pipeline.live.running import Running, free_port, served
 
 NOW = datetime.now(UTC)
 _LAN = "127.0.0.2"  # of this computer, and yet not where an operator's page is let in
