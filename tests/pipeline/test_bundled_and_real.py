@@ -20,7 +20,7 @@ from pipeline.study.session_files import find_sessions
 from pipeline.tables import table as tables
 from tests.conftest import CLONE, real
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.report.test_report import checked
+from tests.pipeline.report.pages import checked
 
 
 def test_feng2016_reproduces_what_the_paper_prints(steadyhand: Steadyhand) -> None:

@@ -13,7 +13,7 @@ import pytest
 from pipeline.statistics.fitts import effective_width
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.reference import the
-from tests.pipeline.report.test_report import checked
+from tests.pipeline.report.pages import checked
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 

@@ -26,7 +26,7 @@ from pipeline.words.sentences import full_sentence, verdict
 from tests.pipeline.helpers import Steadyhand, as_printed
 from tests.pipeline.hostile import HOSTILE
 from tests.pipeline.reference import TASKS, compared, expected, study_of, the
-from tests.pipeline.report.test_report import checked
+from tests.pipeline.report.pages import checked
 
 Folder = Callable[..., Path]
 Row = dict[str, Any]

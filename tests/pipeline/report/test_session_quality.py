@@ -14,7 +14,7 @@ from pipeline.report.traffic_lights import LIGHTS, Judged, judged, light_of, lim
 from pipeline.study.settings import QualityLimits, Study
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.report.test_report import checked
+from tests.pipeline.report.pages import checked
 
 Folder = Callable[..., Path]
 Row = dict[str, Any]
