@@ -1,57 +1,16 @@
-"""Tables as people keep them: other separators, decimals, encodings, headers and shapes; workbooks; practice trials.
-
-Where a table cannot be read as it is, the message must hold the very keys that make it readable, so the tests put them
-into study.yaml and go on. Expected values come from the files by other ways than Steadyhand's.
-"""
+"""Tables as people keep them: other separators, decimals, encodings, headers, shapes and units."""
 
 from __future__ import annotations
 
-import re
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import openpyxl  # type: ignore[import-untyped]
 import pandas as pd
 import pytest
 
 from tests.pipeline.helpers import Steadyhand
-
-CASES = Path(__file__).resolve().parents[2] / "data" / "cases_in"
-Folder = Callable[..., Path]
-
-
-def copied(case: str, tmp_path: Path, **changes: str) -> Path:
-    """A copy of a case, with lines added to its study.yaml."""
-    study = tmp_path / case
-    shutil.copytree(CASES / case, study)
-    add(study, *changes.values())
-    return study
-
-
-def add(study: Path, *lines: str) -> None:
-    """Add lines to the copy's study.yaml."""
-    path = study / "study.yaml"
-    path.write_text("\n".join([path.read_text(encoding="utf-8"), *lines, ""]), encoding="utf-8")
-
-
-def proposed(message: str) -> list[str]:
-    """The lines that a message says to write into study.yaml."""
-    (text,) = re.findall(r"write (\w+: .+?) in study\.yaml", message)
-    return re.split(r" and (?=\w+: )", text)
-
-
-def means(steadyhand: Steadyhand, measure: str) -> dict[str, float]:
-    return {r["condition"]: r["mean"] for r in steadyhand.results()["descriptives"] if r["measure"] == measure}
-
-
-def squared_errors(trials: pd.DataFrame) -> pd.Series:
-    """Mean squared error by condition over the participants' means, from trials with our column names."""
-    errors = (trials["selected_x_mm"] - trials["target_x_mm"]) ** 2
-    errors += (trials["selected_y_mm"] - trials["target_y_mm"]) ** 2
-    return errors.groupby([trials["participant"], trials["condition"]]).mean().groupby("condition").mean()
+from tests.pipeline.study.kept_tables import CASES, Folder, add, copied, means, proposed, squared_errors
 
 
 @pytest.mark.parametrize(
@@ -104,61 +63,6 @@ def test_a_spreadsheet_in_german_and_one_in_a_windows_encoding_give_the_same(
         assert means(steadyhand, "trial_time_s")["Kinect"] == pytest.approx(
             (trials["selection_s"] - trials["start_s"])[trials["condition"] == "Kinect"].mean(), rel=1e-12
         )
-
-
-def workbook(path: Path, sheets: dict[str, list[list[Any]]]) -> None:
-    book = openpyxl.Workbook()
-    book.remove(book.worksheets[0])
-    for name, rows in sheets.items():
-        sheet = book.create_sheet(name)
-        for row in rows:
-            sheet.append(row)
-    book.save(path)
-
-
-def test_a_workbook_gives_the_same_as_its_table_in_csv(tmp_path: Path, steadyhand: Steadyhand) -> None:
-    trials = pd.read_csv(CASES / "cp1252" / "trials.csv", encoding="cp1252")
-    study = copied("cp1252", tmp_path)
-    (study / "trials.csv").unlink()
-    settings = (study / "study.yaml").read_text(encoding="utf-8").replace("trials.csv", "trials.xlsx")
-    (study / "study.yaml").write_text(settings, encoding="utf-8")
-    rows = [list(trials.columns), *trials.astype(object).to_numpy().tolist()]
-    workbook(study / "trials.xlsx", {"Daten": rows, "leer": []})
-    assert steadyhand("compare", study).code == 0
-    assert means(steadyhand, "selection_mse_mm2") == pytest.approx(squared_errors(trials).to_dict(), rel=1e-12)
-
-
-def test_a_sheet_among_several_a_title_above_the_header_and_numbers_kept_as_text(
-    folder: Folder, steadyhand: Steadyhand
-) -> None:
-    settings = "conditions: [a, b]\nmeasures: data.xlsx\n"
-    rows: list[list[Any]] = [
-        ["Studie 3"],
-        [],
-        ["participant", "condition", "measure", "value"],
-        [1, "a", "m", "2,5"],
-        [1, "b", "m", 3.5],
-    ]
-    study = folder(settings)
-    workbook(study / "data.xlsx", {"Notizen": [["nichts"]], "Werte": rows})
-    refused = steadyhand("compare", study)
-    assert refused.code == 2
-    assert "has 2 sheets with something in them (Notizen, Werte)" in refused.err
-    add(study, 'format: {decimal: ",", measures: {sheet: Wrte, header_row: 3}}')
-    assert 'there is no sheet "Wrte"; did you mean "Werte"?' in steadyhand("compare", study).err
-    add(study)
-    text = (study / "study.yaml").read_text(encoding="utf-8").replace("Wrte", "Werte")
-    (study / "study.yaml").write_text(text, encoding="utf-8")
-    assert steadyhand("compare", study).code == 0
-    assert means(steadyhand, "m") == {"a": 2.5, "b": 3.5}
-
-
-def test_a_file_that_only_has_a_workbooks_name_is_said_to_be_none(folder: Folder, steadyhand: Steadyhand) -> None:
-    study = folder("conditions: [a, b]\nmeasures: data.xlsx\n", **{"data.xlsx": "PK not really"})
-    ran = steadyhand("compare", study)
-    assert ran.code == 2
-    assert "data.xlsx: is not a workbook that can be read" in ran.err
-    assert "save it as .xlsx or as CSV in UTF-8" in ran.err
 
 
 def test_a_weighted_tlx_is_computed_from_weights_in_columns(tmp_path: Path, steadyhand: Steadyhand) -> None:
@@ -265,75 +169,6 @@ def test_milliseconds_are_named_with_their_key_and_then_read_as_such(tmp_path: P
     add(study, line)
     assert "milliseconds;" not in steadyhand("compare", study).out
     assert means(steadyhand, "trial_time_s") == pytest.approx(in_seconds, rel=1e-12)
-
-
-def practice_trials() -> pd.DataFrame:
-    return pd.read_csv(CASES / "practice" / "trials.csv")
-
-
-@pytest.mark.parametrize("key", ["practice: {column: practice}", "practice: {trials: 2}"])
-def test_practice_trials_count_nowhere_and_are_listed(tmp_path: Path, steadyhand: Steadyhand, key: str) -> None:
-    study = copied("practice", tmp_path, key=key)
-    assert steadyhand("compare", study).code == 0
-    kept = practice_trials().query("practice == 0")
-    assert means(steadyhand, "selection_mse_mm2") == pytest.approx(squared_errors(kept).to_dict(), rel=1e-12)
-    rows = steadyhand.results()["exclusions"]
-    assert {(r["participant"], r["condition"], r["reason"]) for r in rows if r["what"] == "practice trials"} == {
-        (person, condition, "left out, as study.yaml says under practice: 1, 2")
-        for person in practice_trials()["participant"].unique()
-        for condition in ("kinect", "fusion")
-    }
-
-
-def test_a_column_that_marks_practice_is_pointed_out(tmp_path: Path, steadyhand: Steadyhand) -> None:
-    ran = steadyhand("compare", copied("practice", tmp_path))
-    assert ran.code == 0
-    assert proposed(ran.out) == ["practice: {column: practice}"]
-
-
-def test_a_trial_is_left_out_and_listed_with_its_number(tmp_path: Path, steadyhand: Steadyhand) -> None:
-    """The case excludes trial 1 of P01, which is in both conditions and both sessions."""
-    assert steadyhand("compare", copied("practice", tmp_path)).code == 0
-    trials = practice_trials()
-    kept = trials[~((trials["participant"] == "P01") & (trials["trial"] == 1))]
-    assert means(steadyhand, "selection_mse_mm2") == pytest.approx(squared_errors(kept).to_dict(), rel=1e-12)
-    (row,) = (r for r in steadyhand.results()["exclusions"] if r["what"] == "excluded in study.yaml")
-    assert (row["participant"], row["reason"]) == ("P01", "trial 1: practice")
-
-
-def test_a_trial_of_everybody_can_be_left_out_and_one_that_is_not_there_is_an_error(
-    tmp_path: Path, steadyhand: Steadyhand
-) -> None:
-    study = copied("practice", tmp_path)
-    path = study / "study.yaml"
-    settings = path.read_text(encoding="utf-8")
-    path.write_text(settings.replace("participant: P01, ", ""), encoding="utf-8")
-    assert steadyhand("compare", study).code == 0
-    kept = practice_trials().query("trial != 1")
-    assert means(steadyhand, "selection_mse_mm2") == pytest.approx(squared_errors(kept).to_dict(), rel=1e-12)
-    path.write_text(settings.replace("trial: 1", "trial: 99"), encoding="utf-8")
-    ran = steadyhand("compare", study)
-    assert ran.code == 2
-    assert 'study.yaml: exclusions: there is no trial "99" in the data' in ran.err
-
-
-def test_practice_that_nothing_marks_is_an_error(tmp_path: Path, steadyhand: Steadyhand) -> None:
-    study = copied("practice", tmp_path, key="practice: {column: warmup}")
-    ran = steadyhand("compare", study)
-    assert ran.code == 2
-    assert 'neither the trials nor the measures have a column "warmup"' in ran.err
-
-
-def test_practice_trials_of_the_measures_are_left_out_too(folder: Folder, steadyhand: Steadyhand) -> None:
-    rows = "participant,condition,trial,measure,value\n" + "".join(
-        f"{person},{condition},{trial},m,{100 if trial == 1 else 1}\n"
-        for person in (1, 2)
-        for condition in "ab"
-        for trial in (1, 2, 3)
-    )
-    settings = "conditions: [a, b]\nmeasures: measures.csv\npractice: {trials: 1}\n"
-    assert steadyhand("compare", folder(settings, **{"measures.csv": rows})).code == 0
-    assert means(steadyhand, "m") == {"a": 1.0, "b": 1.0}
 
 
 def test_people_who_met_one_condition_each_are_compared_as_groups(tmp_path: Path, steadyhand: Steadyhand) -> None:
