@@ -9,19 +9,27 @@ from tests.pipeline.analysis.audit import (
     test_granularity,
     test_no_false_accusation,
     test_p_values,
+    test_printed_files,
     test_signed_rank,
 )
-from tests.pipeline.sessions import test_movements, test_replay, test_sessions
+from tests.pipeline.sessions import test_movements, test_replay, test_sessions, test_set_aside
 from tests.pipeline.simulation import test_simulation
-from tests.pipeline.statistics import test_against_r, test_models, test_statistics
+from tests.pipeline.statistics import (
+    test_against_r,
+    test_equivalence_and_bayes,
+    test_follow_ups,
+    test_models,
+    test_statistics,
+)
 from tests.pipeline.study import test_tables_in
 
 _MEASURE = (test_measure, test_tables_in)
-_SESSIONS = (test_measure, test_tables_in, test_sessions)
-_COMPARED = (test_measure, test_against_r, test_statistics, test_models)
-_CASES = (test_cases, test_measure, test_models)
+_SESSIONS = (test_measure, test_tables_in, test_sessions, test_set_aside)
+_OF_MODELS = (test_models, test_equivalence_and_bayes, test_follow_ups)
+_COMPARED = (test_measure, test_against_r, test_statistics, *_OF_MODELS)
+_CASES = (test_cases, test_measure, *_OF_MODELS)
 _DESIGN = (test_design_check,)
-_AUDIT = (test_audit, test_no_false_accusation)
+_AUDIT = (test_audit, test_printed_files, test_no_false_accusation)
 _REPLAY = (test_replay,)
 
 MUTANTS = (

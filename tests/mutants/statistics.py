@@ -6,6 +6,8 @@ from tests.mutants.mutant import Mutant
 from tests.pipeline.statistics import (
     test_against_r,
     test_counterbalancing,
+    test_equivalence_and_bayes,
+    test_follow_ups,
     test_friedman,
     test_groups,
     test_logarithms,
@@ -20,7 +22,7 @@ from tests.pipeline.statistics import (
 )
 
 _TESTS = (test_against_r, test_statistics)
-_MODELS = (test_models,)
+_MODELS = (test_models, test_equivalence_and_bayes, test_follow_ups)
 _POWER = (test_power,)
 _ORDERS = (test_counterbalancing,)
 _FRIEDMAN = (test_friedman, test_against_r, test_statistics)

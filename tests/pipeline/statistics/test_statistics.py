@@ -18,8 +18,6 @@ from pipeline.statistics.multiplicity import adjusted
 from pipeline.statistics.paired import t_paired
 from pipeline.statistics.wilcoxon import hodges_lehmann, signed_rank_p, wilcoxon
 
-# Laws -----------------------------------------------------------------------------------------------------------
-
 values = st.lists(st.tuples(*[st.integers(-50, 50)] * 3), min_size=3, max_size=9).map(
     lambda rows: np.array(rows, dtype=float)
 )
