@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.analysis.audit.finding import AGREEMENT, CONTRADICTION, REMARK, UNCHECKED
 from pipeline.errors import PipelineError
-from tests.pipeline.analysis.audit.test_audit import audited, of_measure, of_test
+from tests.pipeline.analysis.audit.printed import audited, of_measure, of_test
 
 
 @pytest.mark.parametrize(
