@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,60 +23,17 @@ from tests.browser.live.acts import (
     value,
     wait_for,
 )
-from tests.browser.live.samples import Message, running, show, welcome
+from tests.browser.live.phone_page import has_come, opened, shown
+from tests.browser.live.samples import running, show
 from tests.browser.live.server import LiveServer, until
 
 _NO_WAKE_LOCK = "Object.defineProperty(navigator, 'wakeLock', {value: undefined})"
 _DENIED = "DeviceMotionEvent.requestPermission = async () => 'denied'"
-_DENIED_WITHOUT_TAP = """
-DeviceMotionEvent.requestPermission = async () => {
-  if (!navigator.userActivation.isActive) throw new DOMException("no tap", "NotAllowedError");
-  return "granted";
-};"""
-_COUNTS_LOCKS = """
-globalThis.locks = 0;
-const request = WakeLock.prototype.request;
-WakeLock.prototype.request = function (...words) { globalThis.locks += 1; return request.apply(this, words); };"""
-
-
-def _greets(task: Message) -> Any:
-    def answer(server: LiveServer, role: str, message: Message) -> None:
-        if message["type"] == "hello":
-            server.say(role, **task)
-            server.say(role, **running())
-
-    return answer
-
-
-def _opened(tab: Tab, server: LiveServer, *, sensors: bool = True, script: str = "", **task: Any) -> None:
-    """The page, begun by touch, in a task."""
-    server.answer = _greets(welcome(**task))
-    sized(tab, 854, 480)
-    if sensors:
-        fake_sensors(tab)
-    if script:
-        tab.call("Page.addScriptToEvaluateOnNewDocument", source=script)
-    tab.open(f"{server.address}/phone")
-    wait_for(tab, "#start")
-    touch(tab, "#start")
-    server.wait("phone", "hello")
-    until(lambda: "Target 1" in text(tab, "#badge"), "the task is known")
-
-
-def _shown(server: LiveServer, n: int, x: float = -550.0) -> Message:
-    server.say("phone", **show(n, x))
-    until(lambda: any(drawn["n"] == n for drawn in server.said("phone", "drawn")), f"{n} is drawn")
-    return server.said("phone", "drawn")[-1]
-
-
-def _has_come(server: LiveServer) -> None:
-    """What was said so far is in the page: two pings later, so is the answer to the first, which came after it."""
-    server.wait("phone", "ping", len(server.said("phone", "ping")) + 2)
 
 
 def readings_go_out_as_the_browser_gives_them(tab: Tab, server: LiveServer) -> None:
     """Motion in m/s² and °/s with its signs, orientation as a quaternion, a hello that says what this phone can."""
-    _opened(tab, server)
+    opened(tab, server)
     hello = server.wait("phone", "hello")[0]
     assert {name: hello[name] for name in ("permission", "secure", "wake_lock")} == {
         "permission": "granted",
@@ -99,13 +55,13 @@ def readings_go_out_as_the_browser_gives_them(tab: Tab, server: LiveServer) -> N
 def flipped_signs_are_passed_on(tab: Tab, server: LiveServer) -> None:
     """A browser that gives gravity with the other sign is not corrected here."""
     fake_sensors(tab, up=-9.8)
-    _opened(tab, server, sensors=False)
+    opened(tab, server, sensors=False)
     assert round(server.wait("phone", "motion")[0]["a"][1], 1) == -9.8
 
 
 def angles_serve_where_there_is_no_finer_sensor(tab: Tab, server: LiveServer) -> None:
     """`deviceorientation` becomes the quaternion that SciPy makes of its angles, which turn about z, x', y''."""
-    _opened(tab, server, script="delete globalThis.RelativeOrientationSensor")
+    opened(tab, server, script="delete globalThis.RelativeOrientationSensor")
     angles = {"alpha": 30, "beta": -40, "gamma": 50, "absolute": True}
     tab.evaluate(f"dispatchEvent(new DeviceOrientationEvent('deviceorientation', {json.dumps(angles)}))")
     until(lambda: any(said["absolute"] for said in server.said("phone", "orientation")), "the orientation comes")
@@ -116,7 +72,7 @@ def angles_serve_where_there_is_no_finer_sensor(tab: Tab, server: LiveServer) ->
 
 def a_phone_held_still_says_its_orientation(tab: Tab, server: LiveServer) -> None:
     """Browsers say an orientation only when it changes; what holds is sent again, with a number of its own."""
-    _opened(tab, server)
+    opened(tab, server)
     turned = server.wait("phone", "orientation", 8)
     assert {later["seq"] - sooner["seq"] for sooner, later in pairwise(turned)} == {1}
     assert all(later["t"] - sooner["t"] > 100 for sooner, later in pairwise(turned[-5:]))
@@ -124,7 +80,7 @@ def a_phone_held_still_says_its_orientation(tab: Tab, server: LiveServer) -> Non
 
 def pings_tell_the_clock(tab: Tab, server: LiveServer) -> None:
     """Frequent at first; each brings the four times of the answer before."""
-    _opened(tab, server)
+    opened(tab, server)
     pings = server.wait("phone", "ping", 20)
     assert "last" not in pings[0]
     lasts = [ping["last"] for ping in pings if "last" in ping]
@@ -135,24 +91,24 @@ def pings_tell_the_clock(tab: Tab, server: LiveServer) -> None:
 
 def the_newest_estimate_wins(tab: Tab, server: LiveServer) -> None:
     """Of many that come at once the last is drawn, older ones never, and each drawn one is acknowledged once."""
-    _opened(tab, server)
+    opened(tab, server)
     for n in range(1, 41):
         server.say("phone", **show(n))
     until(lambda: server.said("phone", "drawn")[-1:] != [] and server.said("phone", "drawn")[-1]["n"] == 40, "40 drawn")
     server.say("phone", **running(target=1))  # draws once more
-    _has_come(server)
+    has_come(server)
     numbers = [drawn["n"] for drawn in server.said("phone", "drawn")]
     assert numbers == sorted(set(numbers))
 
 
 def a_press_names_what_was_seen(tab: Tab, server: LiveServer) -> None:
     """By finger, mouse and key: one selection each, with the number that was drawn and the instant of touching."""
-    _opened(tab, server)
-    drawn = _shown(server, 7)
+    opened(tab, server)
+    drawn = shown(server, 7)
     point = place(tab, "#select")
     fingers(tab, "touchStart", point)
     assert value(tab, "#select", "it.classList.contains('pressed')")
-    later = _shown(server, 8)
+    later = shown(server, 8)
     time.sleep(0.08)
     key(tab, " ")
     fingers(tab, "touchEnd")
@@ -161,11 +117,11 @@ def a_press_names_what_was_seen(tab: Tab, server: LiveServer) -> None:
     assert drawn["t"] - 1 <= chosen["t"] <= later["t"]
     assert 60 <= chosen["pressed_ms"] <= 400
     sized(tab, 1440, 900)
-    _shown(server, 9)
+    shown(server, 9)
     point = place(tab, "#select")
     for kind in ("mousePressed", "mouseReleased"):
         mouse(tab, kind, point["x"], point["y"])
-    _shown(server, 10)
+    shown(server, 10)
     key(tab, " ")
     assert [select["n"] for select in server.wait("phone", "select", 3)] == [7, 9, 10]
     time.sleep(0.6)
@@ -174,18 +130,18 @@ def a_press_names_what_was_seen(tab: Tab, server: LiveServer) -> None:
 
 def a_press_names_nothing_that_was_not_drawn(tab: Tab, server: LiveServer) -> None:
     """An estimate that has come, but is not on the screen yet, was not seen."""
-    _opened(tab, server)
-    _shown(server, 7)
+    opened(tab, server)
+    shown(server, 7)
     tab.evaluate("globalThis.requestAnimationFrame = () => 1; 0")
     server.say("phone", **show(8))
-    _has_come(server)
+    has_come(server)
     touch(tab, "#select")
     assert server.wait("phone", "select")[0]["n"] == 7
 
 
 def the_checks_are_asked_for_and_a_press_is_one(tab: Tab, server: LiveServer) -> None:
     """Before anything is shown there is nothing that a press could select; it goes out all the same."""
-    _opened(tab, server)
+    opened(tab, server)
     server.say("phone", type="state", state="checks")
     until(lambda: "hold the phone still" in text(tab, "#message"), "it says what to do")
     assert not value(tab, "#select", "it.disabled")
@@ -196,32 +152,9 @@ def the_checks_are_asked_for_and_a_press_is_one(tab: Tab, server: LiveServer) ->
     until(lambda: bool(value(tab, "#select", "it.disabled")), "the button rests")
 
 
-def a_page_that_is_open_elsewhere_stops(tab: Tab, server: LiveServer) -> None:
-    """It does not connect again: the two would take each other's place without end."""
-    _opened(tab, server)
-    server.forget()
-    server.cut("phone", 4409)
-    until(lambda: "another tab" in text(tab, "#message"), "it says so")
-    time.sleep(1.0)
-    assert server.said("phone", "hello") == []
-
-
-def silence_greys_the_picture(tab: Tab, server: LiveServer) -> None:
-    """Without news for 0.3 s: wait, and no selection; with news it goes on."""
-    _opened(tab, server)
-    _shown(server, 1)
-    assert not value(tab, "#select", "it.disabled")
-    until(lambda: text(tab, "#message") == "Please wait", "it says wait")
-    assert value(tab, "#stage", "it.classList.contains('stale')")
-    assert value(tab, "#select", "it.disabled")
-    _shown(server, 2)
-    assert text(tab, "#message") == ""
-    assert not value(tab, "#stage", "it.classList.contains('stale')")
-
-
 def what_the_study_says_is_shown(tab: Tab, server: LiveServer) -> None:
     """Countdown, words from the computer (as text only), the end, and that another phone is in use."""
-    _opened(tab, server)
+    opened(tab, server)
     server.say("phone", **running("countdown") | {"seconds_left": 2.2})
     until(lambda: text(tab, "#message") == "3", "the countdown")
     server.say("phone", type="say", text="<b>Wait.</b>")
@@ -235,33 +168,33 @@ def what_the_study_says_is_shown(tab: Tab, server: LiveServer) -> None:
 
 def without_a_wake_lock_it_says_so(tab: Tab, server: LiveServer) -> None:
     """What to set, and it goes on."""
-    _opened(tab, server, script=_NO_WAKE_LOCK)
+    opened(tab, server, script=_NO_WAKE_LOCK)
     assert server.wait("phone", "hello")[0]["wake_lock"] is False
     wait_for(tab, "#problems")
     assert "automatic lock" in text(tab, "#problem-list")
     assert text(tab, "#go-on") == "Go on"
     touch(tab, "#go-on")
-    _shown(server, 1)
+    shown(server, 1)
 
 
 def without_permission_it_is_a_display(tab: Tab, server: LiveServer) -> None:
     """It says what was denied and the way out, and can go on as a display."""
-    _opened(tab, server, script=_DENIED)
+    opened(tab, server, script=_DENIED)
     assert server.wait("phone", "hello")[0]["permission"] == "denied"
     wait_for(tab, "#problems")
     assert "does not let this page use the motion sensors" in text(tab, "#problem-list")
     touch(tab, "#go-on")
-    _shown(server, 1)
+    shown(server, 1)
     tab.open(f"{server.address}/phone")  # which nobody is asked about twice
     server.wait("phone", "hello", 2)
-    _shown(server, 2)
+    shown(server, 2)
     assert not is_seen(tab, "#problems")
     assert server.said("phone", "motion") == []
 
 
 def without_sensors_it_says_so(tab: Tab, server: LiveServer) -> None:
     """A browser whose sensors say nothing."""
-    _opened(tab, server, sensors=False)
+    opened(tab, server, sensors=False)
     assert server.wait("phone", "hello")[0]["permission"] == "unavailable"
     wait_for(tab, "#problems")
     assert "no motion readings" in text(tab, "#problem-list")
@@ -270,7 +203,7 @@ def without_sensors_it_says_so(tab: Tab, server: LiveServer) -> None:
 def without_a_secure_connection_it_says_so(tab: Tab, server: LiveServer) -> None:
     """Plain http from elsewhere than this machine."""
     server.address = server.address.replace("127.0.0.1", "phone.test")
-    _opened(tab, server)
+    opened(tab, server)
     assert server.wait("phone", "hello")[0]["secure"] is False
     wait_for(tab, "#problems")
     assert "secure connection" in text(tab, "#problem-list")
@@ -279,11 +212,11 @@ def without_a_secure_connection_it_says_so(tab: Tab, server: LiveServer) -> None
 
 def in_the_demo_the_mouse_is_the_hand(tab: Tab, server: LiveServer) -> None:
     """No word of missing sensors; the pointer's place goes out, a click selects."""
-    _opened(tab, server, sensors=False, mouse=True)
+    opened(tab, server, sensors=False, mouse=True)
     wait_for(tab, "#picture")
     assert not is_seen(tab, "#problems")
     sized(tab, 1440, 900)
-    _shown(server, 1)
+    shown(server, 1)
     mouse(tab, "mouseMoved", 720, 450)
     mouse(tab, "mouseMoved", 360, 225)
 
@@ -292,95 +225,15 @@ def in_the_demo_the_mouse_is_the_hand(tab: Tab, server: LiveServer) -> None:
         return bool(said) and abs(said[0]["x"] + 500) < 3 and abs(said[0]["y"] - 750) < 3
 
     until(is_there, "the mouse's last place is known")
-    _shown(server, 2)
+    shown(server, 2)
     for kind in ("mousePressed", "mouseReleased"):
         mouse(tab, kind, 360, 225)
     assert [select["n"] for select in server.wait("phone", "select")] == [2]
 
 
-def a_reload_goes_on_without_a_tap(tab: Tab, server: LiveServer) -> None:
-    """Back by itself, with its motion, and nothing is sent twice."""
-    _opened(tab, server)
-    _shown(server, 3)
-    touch(tab, "#select")
-    server.wait("phone", "select")
-    tab.open(f"{server.address}/phone")
-    server.wait("phone", "hello", 2)
-    _shown(server, 4)
-    assert len(server.said("phone", "select")) == 1
-    assert len({hello["id"] for hello in server.said("phone", "hello")}) == 1
-    server.received["phone"] = []
-    server.wait("phone", "motion", 5)
-
-
-def a_reload_that_needs_a_tap_asks_for_it(tab: Tab, server: LiveServer) -> None:
-    """A browser that gives motion only within a tap."""
-    _opened(tab, server, script=_DENIED_WITHOUT_TAP)
-    tab.open(f"{server.address}/phone")
-    wait_for(tab, "#start")
-    touch(tab, "#start")
-    assert server.wait("phone", "hello", 2)[1]["permission"] == "granted"
-
-
-def a_break_is_mended(tab: Tab, server: LiveServer) -> None:
-    """After a lost connection the page comes back by itself, and says meanwhile what is the matter."""
-    _opened(tab, server)
-    _shown(server, 1)
-    server.cut("phone")
-    until(lambda: "was lost" in text(tab, "#message"), "it says so")
-    assert value(tab, "#select", "it.disabled")
-    server.wait("phone", "hello", 2)
-    _shown(server, 2)
-    assert text(tab, "#message") == ""
-
-
-def a_dead_connection_is_given_up(tab: Tab, server: LiveServer) -> None:
-    """A phone that slept may hold a connection that nobody answers: it connects anew."""
-    _opened(tab, server)
-    _shown(server, 1)
-    server.is_deaf = True
-    server.wait("phone", "hello", 2)
-    server.is_deaf = False
-    _shown(server, 2)
-
-
-def a_page_that_cannot_connect_says_why(tab: Tab, server: LiveServer) -> None:
-    """The page has loaded, its socket is refused: a certificate that is not trusted yet, or a firewall."""
-    server.unreachable.add("phone")
-    tab.open(f"{server.address}/phone")
-    wait_for(tab, "#start")
-    touch(tab, "#start")
-    until(lambda: "certificate" in text(tab, "#message"), "it says why")
-    server.unreachable.clear()
-    server.wait("phone", "hello")
-
-
-def a_page_that_is_not_signed_in_stops(tab: Tab, server: LiveServer) -> None:
-    """It says what to do, and does not try for ever."""
-    _opened(tab, server)
-    server.refuses.add("phone")
-    server.cut("phone")
-    until(lambda: "scan the code" in text(tab, "#message"), "it says so")
-    time.sleep(1.2)
-    assert len(server.said("phone", "hello")) == 1
-
-
-def a_phone_that_slept_says_so(tab: Tab, server: LiveServer) -> None:
-    """Hidden and seen again: both are told, and the wake lock is asked for anew."""
-    _opened(tab, server, script=_COUNTS_LOCKS)
-    before = tab.evaluate("locks")
-    for seen in ("hidden", "visible"):
-        tab.evaluate(
-            f"Object.defineProperty(document, 'visibilityState', {{value: '{seen}', configurable: true}});"
-            "document.dispatchEvent(new Event('visibilitychange'))"
-        )
-    assert [message["visible"] for message in server.wait("phone", "visible", 2)] == [False, True]
-    until(lambda: tab.evaluate("locks") == before + 1, "the lock is asked for again")
-
-
 def the_window_has_its_true_size(tab: Tab, server: LiveServer) -> None:
     """Where the study wants it, a bank card is asked for once, and the window's mm are the screen's."""
-    _opened(tab, server, window="true_size", window_mm=[60, 34])
+    opened(tab, server, window="true_size", window_mm=[60, 34])
     wait_for(tab, "#calibration")
     value(tab, "#card-size", "it.focus()")
     key(tab, "Home")
@@ -388,12 +241,12 @@ def the_window_has_its_true_size(tab: Tab, server: LiveServer) -> None:
     box = value(tab, "#card", "[it.offsetWidth, it.offsetHeight]")
     assert box == [round(85.6 * 4), round(53.98 * 4)]
     touch(tab, "#card-fits")
-    _shown(server, 1)
+    shown(server, 1)
     inside, outside = (_is_painted(tab, x) for x in (427 - 118, 427 - 122))
     assert (inside, outside) == (True, False)
     tab.open(f"{server.address}/phone")
     server.wait("phone", "hello", 2)
-    _shown(server, 2)
+    shown(server, 2)
     assert not is_seen(tab, "#calibration")
 
 
@@ -404,7 +257,7 @@ def _is_painted(tab: Tab, x: int) -> bool:
 
 def left_handers_have_the_button_left(tab: Tab, server: LiveServer) -> None:
     """And the page remembers it."""
-    _opened(tab, server)
+    opened(tab, server)
     assert place(tab, "#select")["x"] > 700
     tab.evaluate("sessionStorage.clear()")
     tab.open(f"{server.address}/phone")
@@ -425,21 +278,12 @@ CASES = (
     a_press_names_what_was_seen,
     a_press_names_nothing_that_was_not_drawn,
     the_checks_are_asked_for_and_a_press_is_one,
-    a_page_that_is_open_elsewhere_stops,
-    silence_greys_the_picture,
     what_the_study_says_is_shown,
     without_a_wake_lock_it_says_so,
     without_permission_it_is_a_display,
     without_sensors_it_says_so,
     without_a_secure_connection_it_says_so,
     in_the_demo_the_mouse_is_the_hand,
-    a_reload_goes_on_without_a_tap,
-    a_reload_that_needs_a_tap_asks_for_it,
-    a_break_is_mended,
-    a_dead_connection_is_given_up,
-    a_page_that_cannot_connect_says_why,
-    a_page_that_is_not_signed_in_stops,
-    a_phone_that_slept_says_so,
     the_window_has_its_true_size,
     left_handers_have_the_button_left,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from tests.browser.chromium import BrowserError, Tab, tab
-from tests.browser.live import by_sensors, by_tls, operator, phone, played, questionnaire, whole_study
+from tests.browser.live import by_sensors, by_tls, operator, phone, phone_breaks, played, questionnaire, whole_study
 from tests.browser.live.acts import fake_sensors
 from tests.browser.live.looks import SCENES
 from tests.browser.live.looks import faults as looks_faults
@@ -19,7 +19,7 @@ WHOLE: dict[str, Callable[[], None]] = {
 }
 _FLAGS = ("--host-resolver-rules=MAP phone.test 127.0.0.1",)
 CASES: dict[str, Sequence[Case]] = {
-    "phone": phone.CASES,
+    "phone": (*phone.CASES, *phone_breaks.CASES),
     "questionnaire": questionnaire.CASES,
     "operator": operator.CASES,
     "played": played.CASES,
