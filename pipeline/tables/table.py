@@ -172,7 +172,8 @@ def write_csv(name: str, data: pd.DataFrame, folder: Path) -> None:
     table = as_table(name, data)
     for column in table.columns[[str(kind) == "string" for kind in table.dtypes]]:
         risky = table[column].str.startswith(_FORMULA).fillna(False).astype(bool)
-        table[column] = table[column].where(~risky, "'" + table[column])
+        if risky.any():
+            table[column] = table[column].where(~risky, "'" + table[column])
     with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")  # half of the time of pandas, and the same bytes
         rows.writerow(table.columns)
