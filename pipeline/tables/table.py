@@ -127,7 +127,19 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
     elif isinstance(data, pd.DataFrame):
         data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name].schema, preserve_index=False)
     with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
-        pq.write_table(data.replace_schema_metadata(None), file, **_as_file(name, len(data) <= _SMALL))
+        if len(data):
+            pq.write_table(data.replace_schema_metadata(None), file, **_as_file(name, len(data) <= _SMALL))
+        else:
+            file.write(_empty_file(name))
+
+
+@cache
+def _empty_file(name: str) -> bytes:
+    """The file of a table without rows."""
+    with pa.BufferOutputStream() as file:
+        pq.write_table(TABLES[name].schema.empty_table(), file, **_as_file(name, small=True))
+        content: bytes = file.getvalue().to_pybytes()
+    return content
 
 
 def write_parts(name: str, parts: Iterable[pa.Table], folder: Path) -> None:
@@ -201,7 +213,10 @@ def _cells(column: pd.Series) -> list[Any]:
 def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
     """Read a table from one or many folders; a folder without it counts as empty."""
     # Straight to the types of `as_table`: by way of Python objects it takes three times as long.
-    frame: pd.DataFrame = read_arrow(name, folders).to_pandas(types_mapper=_NULLABLE.get)
+    table = read_arrow(name, folders)
+    if len(table) == 0:
+        return _empty(name).copy(deep=False)
+    frame: pd.DataFrame = table.to_pandas(types_mapper=_NULLABLE.get)
     return frame
 
 
@@ -323,6 +338,8 @@ class _Numbers(Mapping[str, "np.ndarray[Any, Any]"]):
 
 def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Rows as plain objects for JSON, None for what does not apply; `details` and `factors` stay text."""
+    if len(data) == 0:
+        return
     for row in as_table(name, data).itertuples(index=False):
         yield {key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)}
 
