@@ -110,6 +110,10 @@ def test_units_are_in_the_names_of_columns() -> None:
         "alpha",
         "slope",
         "ratio_when_trials_double",
+        "standardised",
+        "quantile",
+        "band_low",
+        "band_high",
         "r_squared",
     }
     units = ("_bits", "_s_bit", "_mm", "_mm2", "_s", "_ns", "_ms", "_hz", "_mm_s2", "_rad_s", "_95", "_deg")

@@ -18,6 +18,7 @@ from pipeline.analysis.design_check import findings
 from pipeline.analysis.fitts_law import fitts_law
 from pipeline.analysis.group_descriptives import by_group
 from pipeline.analysis.measure import ALL_DATA
+from pipeline.analysis.normality import normality_rows
 from pipeline.analysis.practice import learning_rows
 from pipeline.analysis.preregistration.hypotheses import Done
 from pipeline.analysis.preregistration.plan_and_done import plan_and_done
@@ -64,6 +65,7 @@ def run(work: Work) -> Outcome:
     frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
     requests = [request for entry in all_requests(study, values) for request in entry]
+    frames["normal_quantiles"] = tables.frame("normal_quantiles", normality_rows(requests))
     frames["descriptives_by_group"] = tables.frame("descriptives_by_group", by_group(requests))
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
     frames["design_check"] = tables.frame("design_check", design_rows)

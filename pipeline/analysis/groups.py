@@ -24,11 +24,12 @@ CONDITION = "condition"
 
 @dataclass(frozen=True)
 class GroupCases:
-    """Values of each group's participants (nᵢ, …), the groups' names, and the exclusions."""
+    """Values of each group's participants (nᵢ, …), the groups' names, who they are, and the exclusions."""
 
     factor: str
     names: list[str]
     groups: list[FloatArray]
+    members: list[list[str]]
     left_out: list[Row]
 
 
@@ -40,6 +41,7 @@ class MixedCases:
     names: list[str]
     codes: IntArray
     values: FloatArray
+    participants: list[str]
     levels: list[list[str]]
     left_out: list[Row]
 
@@ -71,8 +73,9 @@ def by_group(request: Request) -> GroupCases:
     known = {person: float(value) for person, value in means.items() if person in members}
     exclusions += _without_group(request, factor, [str(person) for person in means.index if person not in members])
     names = group_names(request, factor, members, known)
-    groups = [np.array([value for person, value in known.items() if members[person] == name]) for name in names]
-    return GroupCases(factor, names, groups, exclusions)
+    people = [[person for person in known if members[person] == name] for name in names]
+    groups = [np.array([known[person] for person in of_group]) for of_group in people]
+    return GroupCases(factor, names, groups, people, exclusions)
 
 
 def mixed(request: Request) -> MixedCases:
@@ -92,7 +95,7 @@ def mixed(request: Request) -> MixedCases:
     codes = np.array([names.index(members[person]) for person in people], dtype=np.int64)
     missing = [person for person in cases.participants if person not in members]
     exclusions = [*cases.left_out, *_without_group(request, factor, missing)]
-    return MixedCases(factor, names, codes, cases.values[kept], cases.levels, exclusions)
+    return MixedCases(factor, names, codes, cases.values[kept], people, cases.levels, exclusions)
 
 
 def between_factor(request: Request) -> str:

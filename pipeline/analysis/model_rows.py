@@ -173,6 +173,7 @@ class CrossoverRows:
     """Values (n, 2) of participants in two conditions, and who met the first one first."""
 
     values: FloatArray
+    participants: list[str]
     conditions: tuple[str, str]
     first_came_first: list[bool]
     sequences: tuple[str, str] | None
@@ -206,7 +207,7 @@ def of_crossover(request: Request) -> CrossoverRows:
     labels = dict(zip(rows["participant"], rows["sequence"], strict=True))
     sequences = _labels([labels.get(person) for person in people], first_came_first)
     return CrossoverRows(
-        complete.values[keep], (first, second), first_came_first, sequences, [*complete.left_out, *left_out]
+        complete.values[keep], people, (first, second), first_came_first, sequences, [*complete.left_out, *left_out]
     )
 
 

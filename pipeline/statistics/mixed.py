@@ -24,7 +24,7 @@ from pipeline.statistics import (
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.effect_size import partial_eta_squared_interval
 from pipeline.statistics.random_intercept import PARTICIPANT, Rows
-from pipeline.statistics.random_intercepts import fitted, method_text
+from pipeline.statistics.random_intercepts import Fitted, fitted, method_text
 from pipeline.statistics.result import IntArray, Result, negligible
 from pipeline.statistics.satterthwaite import Fit, degrees_of_freedom, f_test
 
@@ -76,21 +76,43 @@ def mixed_model(
     it the rows of a cell count as if each had met the condition anew. Intercepts without variance, or that the data
     cannot tell apart, are left out, and the method says so.
     """
+    model = model_of(values, participants, columns, terms, random)
+    fitted_model, exponent = model.fitted, model.exponent
+    blank = Result("", "t", method_text(model.groupings), "estimate", len(set(participants)))
+    if isinstance(fitted_model, str):
+        return [replace(blank, effect=term, contrast=_contrast(columns, term), status=fitted_model) for term in terms]
+    details = _shared_details(fitted_model.fit, len(values), exponent, model.rows.free)
+    blank = replace(blank, method=method_text(model.groupings, fitted_model), details=details)
+    results = [
+        result for term in terms for result in _tested(fitted_model.fit, columns, terms, replace(blank, effect=term))
+    ]
+    return [_unscaled(result, exponent) for result in results]
+
+
+@dataclass(frozen=True)
+class Model:
+    """Rows at unit scale (values · 2⁻ᵉ), the groups of each random intercept (N,), and the fit or why there is none."""
+
+    rows: Rows
+    exponent: int
+    groupings: Mapping[str, IntArray]
+    fitted: Fitted | str
+
+
+def model_of(
+    values: FloatArray,
+    participants: Sequence[str],
+    columns: Mapping[str, Column],
+    terms: Sequence[str],
+    random: Mapping[str, IntArray] | None = None,
+) -> Model:
+    """The fitted model of `mixed_model`."""
     people = {name: index for index, name in enumerate(dict.fromkeys(participants))}
     index = np.array([people[name] for name in participants], dtype=np.int64)
     (scaled,), exponent = at_unit_scale([values])
     rows = Rows(scaled, design(columns, terms, len(values)), index)
     groupings = {PARTICIPANT: index, **(random or {})}
-    blank = Result("", "t", method_text(groupings), "estimate", len(people))
-    fitted_model = _undefined(rows, columns) or fitted(rows, groupings)
-    if isinstance(fitted_model, str):
-        return [replace(blank, effect=term, contrast=_contrast(columns, term), status=fitted_model) for term in terms]
-    details = _shared_details(fitted_model.fit, len(values), exponent, rows.free)
-    blank = replace(blank, method=method_text(groupings, fitted_model), details=details)
-    results = [
-        result for term in terms for result in _tested(fitted_model.fit, columns, terms, replace(blank, effect=term))
-    ]
-    return [_unscaled(result, exponent) for result in results]
+    return Model(rows, exponent, groupings, _undefined(rows, columns) or fitted(rows, groupings))
 
 
 def cells_of(participants: Sequence[str], condition: Factor) -> IntArray:

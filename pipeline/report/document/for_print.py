@@ -26,16 +26,27 @@ _ANNEX = "annex"
 _ROWS_MAX = 250  # of a table: five pages
 _TEXTS_MAX = 60  # of words to paste
 _ANNEX_ROWS = 48  # of folded tables in all: with their captions, two pages
+_FIGURE_ROWS = 6  # of these, what a figure takes the place of
 
 
 def for_print(document: Document, names: Mapping[str, str]) -> Document:
     """The document without `Folded` and `Pages`; `names` has the number of every table and figure."""
     sections = [replace(section, blocks=tuple(_blocks(section.blocks, names))) for section in document.sections]
     folded = [block for section in document.sections for block in section.blocks if isinstance(block, Folded)]
-    tables = [table for fold in folded if fold.in_annex for table in _tables(fold)]
-    if tables:
-        sections.append(Section(_ANNEX, "Annex: the tables folded away above", tuple(_shortened(tables))))
+    annex = tuple(_annex(folded))
+    if annex:
+        sections.append(Section(_ANNEX, "Annex: what is folded away above", annex))
     return replace(document, sections=tuple(sections))
+
+
+def _annex(folded: Sequence[Folded]) -> Iterator[Block]:
+    """What is folded and goes to the annex: tables, as many of their rows as there is room for, and figures."""
+    tables = [table for fold in folded if fold.in_annex for table in _tables(fold)]
+    rows = _ANNEX_ROWS - _FIGURE_ROWS * sum(len(_annexed(fold)) for fold in folded)
+    shortened = {table.id: table for table in _shortened(tables, rows)}
+    for fold in folded:
+        yield from (shortened[table.id] for table in _tables(fold) if fold.in_annex)
+        yield from _annexed(fold)
 
 
 def _blocks(blocks: Sequence[Block], names: Mapping[str, str]) -> Iterator[Block]:
@@ -71,20 +82,26 @@ def _without_links(text: Text) -> Text:
 def _folded(block: Folded, names: Mapping[str, str]) -> str:
     """What is folded and where it is to be found: `Each session's lights (Table 1 in the annex).`"""
     tables = [names[table.id] for table in _tables(block)]
-    figures = [f"figures/{one.file}" for one in block.blocks if isinstance(one, Figure)]
+    annexed = [names[figure.id] for figure in _annexed(block)]
+    figures = [f"figures/{one.file}" for one in block.blocks if isinstance(one, Figure) and one not in _annexed(block)]
     places = [f"{listing(tables)} in {'the annex' if block.in_annex else 'report.html'}"] if tables else []
+    places += [f"{listing(annexed)} in the annex"] if annexed else []
     places += [f"{listing(figures)} in report.html"] if figures else []
     where = f" ({'; '.join(places)})" if places else ""
     return f"{block.summary.rstrip('.')}{where}."
+
+
+def _annexed(block: Folded) -> list[Figure]:
+    return [one for one in block.blocks if isinstance(one, Figure)] if block.figures_in_annex else []
 
 
 def _tables(block: Folded) -> list[Table]:
     return [one for one in block.blocks if isinstance(one, Table) and one.rows]
 
 
-def _shortened(tables: Sequence[Table]) -> Iterator[Table]:
-    """The tables within the annex's rows: short ones whole, and the rest is shared by the long ones."""
-    room, left = {}, _ANNEX_ROWS
+def _shortened(tables: Sequence[Table], rows: int) -> Iterator[Table]:
+    """The tables within so many rows: short ones whole, and the rest is shared by the long ones."""
+    room, left = {}, rows
     for place, table in enumerate(sorted(tables, key=lambda table: len(table.rows))):
         room[table.id] = min(len(table.rows), left // (len(tables) - place))
         left -= room[table.id]

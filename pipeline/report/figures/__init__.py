@@ -17,6 +17,7 @@ from pipeline.report.figures.lead_curves import lead
 from pipeline.report.figures.overlay import overlay
 from pipeline.report.figures.power import Labels, power
 from pipeline.report.figures.practice import practice
+from pipeline.report.figures.quantile_plots import normality
 from pipeline.report.figures.rainclouds import paired, scales
 from pipeline.report.figures.selections import selection_errors
 from pipeline.report.figures.sensor_noise import noise
@@ -38,6 +39,7 @@ __all__ = [
     "lag_and_error",
     "lead",
     "noise",
+    "normality",
     "overlay",
     "paired",
     "path",

@@ -194,6 +194,11 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         r"Shapiro",
         "Asks whether values look normally distributed; a small p speaks against it.",
     ),
+    (
+        "Q-Q plot",
+        r"Q-Q plot",
+        "Each value against the one that stands in its place among as many normal ones; normal values follow a line.",
+    ),
 )
 """A word, where in a text it is used, and what it means, from the simple to the particular."""
 

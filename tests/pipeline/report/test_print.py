@@ -55,6 +55,16 @@ def test_a_fold_is_a_line_that_says_where_the_rest_is() -> None:
     assert annex.blocks == (a_table("lights", 3),)
 
 
+def test_a_figure_that_print_needs_too_stands_in_the_annex_beside_its_fold() -> None:
+    picture = Figure("figure-a", "a.svg", "A.", "A")
+    (section, annex) = printed(
+        Folded("Are they normal", (a_table("shapiro", 3), picture), figures_in_annex=True),
+        Folded("Each session's lights", (a_table("lights", 3),)),
+    )
+    assert section.blocks[0] == Paragraph(("Are they normal (Table 1 in the annex; Figure 1 in the annex).",))
+    assert annex.blocks == (a_table("shapiro", 3), picture, a_table("lights", 3))
+
+
 def test_without_folds_there_is_no_annex() -> None:
     assert len(printed(Paragraph(("All.",)))) == 1
 

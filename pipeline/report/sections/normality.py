@@ -1,0 +1,61 @@
+"""Q-Q plots of the values whose normality the study's comparisons assume."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import pandas as pd
+
+from pipeline.report import figures
+from pipeline.report.document.model import Block, Folded
+from pipeline.report.figures.quantile_plots import SAMPLE
+from pipeline.report.sections.material import Material
+from pipeline.study.statistical_tests import TESTS
+from pipeline.words.names import measure_label
+from pipeline.words.phrases import counted, listing
+
+_PANELS_MAX = 12  # tables/normal_quantiles.csv has all values
+
+
+def plots(material: Material) -> Iterator[Block]:
+    """A folded figure with a panel for each sample; of many those with the most values outside their band."""
+    table = material.table("normal_quantiles")
+    if not len(table):
+        return
+    outside = table.groupby(SAMPLE, sort=False)["outside"].agg(["sum", "mean"])
+    leaving = int((outside["sum"] > 0).sum())
+    shown = _furthest(table, outside["mean"])
+    more = " Rows: tables/normal_quantiles.csv."
+    if len(outside) > _PANELS_MAX:
+        more = (
+            f" The {_PANELS_MAX} of {len(outside)} samples with the largest share of values outside; all are in"
+            " tables/normal_quantiles.csv."
+        )
+    more += _lacking(material, table)
+    summary = (
+        "Do the values lie as normal ones would? Q-Q plots: some lie outside the 95 % band in"
+        f" {leaving} of {counted(len(outside), 'sample')}"
+    )
+    figure = material.drawn("normality", figures.normality, shown, more=more)
+    yield Folded(summary, (figure,), figures_in_annex=True)
+
+
+def _furthest(table: pd.DataFrame, shares: pd.Series) -> pd.DataFrame:
+    """The rows of as many samples as there are panels for, in the table's order."""
+    chosen = set(shares.sort_values(ascending=False, kind="stable").index[:_PANELS_MAX])
+    kept = [sample in chosen for sample in zip(*(table[name] for name in SAMPLE), strict=True)]
+    return table[kept]
+
+
+def _lacking(material: Material, table: pd.DataFrame) -> str:
+    """Which measures have no panel, although a test of them assumes normality."""
+    assumed = [row["measure"] for row in material.rows("comparisons") if _assumes(row["test"])]
+    missing: Sequence[str] = [name for name in dict.fromkeys(assumed) if name not in set(table["measure"])]
+    if not missing:
+        return ""
+    names = listing([measure_label(name) for name in missing])
+    return f" Without a panel, for fewer than three values or none that vary: {names}."
+
+
+def _assumes(test: str) -> bool:
+    return TESTS[test].assumes_normality or test == "mixed_model"
