@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -44,20 +44,30 @@ def pairs_of_groups(test: Callable[[Request, FloatArray, FloatArray, str], Resul
     return answer
 
 
+PairsTest = Callable[[Sequence[FloatArray], Sequence[str], str], list[Result]]
+"""A test of every two groups, by their names."""
+
+
 def all_groups(
     test: Callable[[Sequence[FloatArray], str], Result],
-    follow_up: Callable[[Sequence[FloatArray], Sequence[str], str], list[Result]],
+    follow_up: PairsTest,
     adjusts_itself: bool,
+    others: Mapping[str, PairsTest] | None = None,
 ) -> Callable[[Request], Answer]:
-    """A test of all groups: one row, followed by the pairs where there are three groups or more."""
+    """A test of all groups: one row, followed by the pairs where there are three groups or more.
+
+    `others` are the tests of pairs that an entry may name under `follow_up` instead; they adjust themselves.
+    """
+    named = others or {}
 
     def answer(request: Request) -> Answer:
         cases = groups.by_group(request)
         rows = [row_of(request, test(cases.groups, cases.factor))]
         if len(cases.names) > 2 and request.entry.follow_up != "none":
             compared_pairs = pairs.of_groups(cases.groups, cases.names, cases.factor)
-            results = follow_up(cases.groups, cases.names, cases.factor)
-            adjust = "none" if adjusts_itself else request.entry.follow_up
+            own = request.entry.follow_up in named
+            results = named.get(request.entry.follow_up, follow_up)(cases.groups, cases.names, cases.factor)
+            adjust = "none" if adjusts_itself or own else request.entry.follow_up
             for pair, result in zip(compared_pairs, results, strict=True):
                 rows.append({**group_pair_row(request, result, pair), "adjust": adjust})
         return rows, cases.left_out

@@ -19,6 +19,7 @@ from pipeline.statistics.bayes import bayes_t
 from pipeline.statistics.equivalence import tost
 from pipeline.statistics.kruskal import kruskal_pairs, kruskal_wallis
 from pipeline.statistics.mann_whitney import mann_whitney
+from pipeline.statistics.tukey import tukey_kramer
 from pipeline.statistics.welch import anova_welch, games_howell
 from pipeline.statistics.wilcoxon import wilcoxon
 from pipeline.study.comparison import Comparison, matching_measures
@@ -26,6 +27,7 @@ from pipeline.study.csv_tables import read_participants
 from pipeline.study.measures import has_total, measure_order
 from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.settings import Study
+from pipeline.study.statistical_tests import TUKEY
 from pipeline.study.table_file import table_file
 from pipeline.tables.table import Row
 
@@ -135,7 +137,7 @@ RUN: Mapping[str, Callable[[Request], Answer]] = {
     "crossover": crossover_design,
     "t_welch": pairs_of_groups(welch_t),
     "mann_whitney": pairs_of_groups(lambda _, first, second, effect: mann_whitney(first, second, effect)),
-    "anova_welch": all_groups(anova_welch, games_howell, adjusts_itself=True),
+    "anova_welch": all_groups(anova_welch, games_howell, adjusts_itself=True, others={TUKEY: tukey_kramer}),
     "kruskal": all_groups(kruskal_wallis, kruskal_pairs, adjusts_itself=False),
     "mixed_anova": mixed_design,
 }

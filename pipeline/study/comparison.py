@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.study.fields import Finite, Frozen, Id, known
-from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS, tests_that_take
+from pipeline.study.statistical_tests import ADJUSTMENTS, TESTS, TUKEY, Design, tests_that_take
 
 
 def _known_test(name: str) -> str:
@@ -18,17 +18,40 @@ def _known_test(name: str) -> str:
 
 
 def _known_adjustment(name: str) -> str:
+    if name == TUKEY:
+        raise ValueError(
+            "tukey adjusts no p values that are there: it is a test of every two groups. Write test: anova_welch,"
+            " follow_up: tukey; within participants adjust: holm"
+        )
     known("adjustment", name, ("none", *ADJUSTMENTS))
+    return name
+
+
+def _known_follow_up(name: str) -> str:
+    known("way to follow up", name, ("none", *ADJUSTMENTS, TUKEY))
     return name
 
 
 TestName = Annotated[str, AfterValidator(_known_test)]
 AdjustmentName = Annotated[str, AfterValidator(_known_adjustment)]
+FollowUpName = Annotated[str, AfterValidator(_known_follow_up)]
 
 
 _PERIOD_AS_FACTOR = "factor(period)"
 OPTIONS = {option for test in TESTS.values() for option in test.options}
 """The keys that only some tests take."""
+
+
+_OTHER_ERRORS = (
+    "is not followed up by tukey, whose p is of groups of measurements with one SD: it is for anova_welch; take"
+    " follow_up: holm"
+)
+_NO_TUKEY: Mapping[Design, str] = {
+    "within": "is not followed up by tukey: within participants all pairs would need one standard error, which they"
+    " have with sphericity alone; take follow_up: holm, each pair with an error of its own",
+    "mixed": "is not followed up by tukey: its pairs within participants would need sphericity; take follow_up: holm,"
+    " or test: anova_welch for the groups alone",
+}
 
 
 class Comparison(Frozen):
@@ -38,7 +61,7 @@ class Comparison(Frozen):
     test: TestName
     within: tuple[Id, ...] = ("condition",)
     adjust: AdjustmentName = "none"
-    follow_up: AdjustmentName = "holm"
+    follow_up: FollowUpName = "holm"
     between: Id | None = None
     family: Id | None = None
     missing: Literal["listwise", "available"] = "listwise"
@@ -76,6 +99,12 @@ class Comparison(Frozen):
                     raise ValueError(f'fixed: "{term}" needs "{name}" as a term too')
             if len(parts) > 1 and "period" in parts and self.period_is_slope:
                 raise ValueError(f'fixed: "{term}" needs factor(period) in the place of period')
+        return self
+
+    @model_validator(mode="after")
+    def _tukey_is_of_groups(self) -> Comparison:
+        if self.follow_up == TUKEY and self.test != "anova_welch":
+            raise ValueError(f"{self.test} {_NO_TUKEY.get(TESTS[self.test].design, _OTHER_ERRORS)}")
         return self
 
     @model_validator(mode="after")

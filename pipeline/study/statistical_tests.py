@@ -214,7 +214,7 @@ TESTS: Mapping[str, StatisticalTest] = {
             options=("between", "follow_up"),
             assumes_normality=True,
             design="between",
-            cite=("welch1951", "games1976"),
+            cite=("welch1951",),
             libraries=("pingouin",),
         ),
         StatisticalTest(
@@ -268,6 +268,10 @@ ADJUSTMENTS: Mapping[str, Adjustment] = {
     )
 }
 """Every adjustment by its name in study.yaml."""
+
+
+TUKEY = "tukey"
+"""A way to follow up, not to adjust: a test of all pairs of groups together, which has p values of its own."""
 
 
 def tests_that_take(option: str) -> list[str]:

@@ -18,6 +18,7 @@ _EFFECT_SIZES = {
     "partial eta squared": "η²p",
     "Cohen's d_z": "d_z",
     "Cohen's d_av": "d_av",
+    "Cohen's d": "d",
     "matched-pairs rank-biserial": "r_rb",
     "rank-biserial": "r_rb",
     "rank epsilon squared": "ε²",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.study.measures import MEASURES, measure
-from pipeline.study.statistical_tests import ADJUSTMENTS
+from pipeline.study.statistical_tests import ADJUSTMENTS, TUKEY
 
 
 def measure_label(name: str) -> str:
@@ -39,4 +39,4 @@ def unit_of(name: str) -> str:
 
 def adjustment_label(method: str) -> str:
     """A way to adjust p values by its authors' names: `Holm`, `Benjamini-Hochberg`."""
-    return ADJUSTMENTS[method].label
+    return "Tukey-Kramer" if method == TUKEY else ADJUSTMENTS[method].label

@@ -163,6 +163,14 @@ def _games_howell(data: Groups, _entry: Comparison) -> Found:
     return {"statistic": found["T"], "df2": found["df"], "p": found["pval"], "effect_size": found["hedges"]}
 
 
+def _tukey_kramer(data: Groups, _entry: Comparison) -> Found:
+    import pingouin
+
+    table = pingouin.pairwise_tukey(data=long_tables.of_groups(data), dv="value", between=GROUP)
+    found = table[(table["A"] == data.pair[0]) & (table["B"] == data.pair[1])].iloc[0]
+    return {"statistic": found["T"], "p": found["p_tukey"]}
+
+
 def _kruskal(data: Groups, _entry: Comparison) -> Found:
     import pingouin
 
@@ -191,6 +199,7 @@ CALLS: Calls = {
     "mann_whitney": (Call("pingouin.mwu(x, y)", _mwu),),
     "anova_welch": (Call("pingouin.welch_anova(data, dv, between)", _welch_anova),),
     "games_howell": (Call("pingouin.pairwise_gameshowell(data, dv, between)", _games_howell),),
+    "tukey_kramer": (Call("pingouin.pairwise_tukey(data, dv, between)", _tukey_kramer),),
     "kruskal": (Call("pingouin.kruskal(data, dv, between)", _kruskal),),
     P_ADJUSTED: (Call("pingouin.multicomp(p, method)", _multicomp),),
 }

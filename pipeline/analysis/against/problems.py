@@ -18,6 +18,7 @@ from pipeline.statistics.mixed import Column
 from pipeline.statistics.pairs import Pair
 from pipeline.statistics.result import IntArray
 from pipeline.study.comparison import Comparison
+from pipeline.study.statistical_tests import TUKEY
 from pipeline.tables.table import Row
 
 
@@ -181,10 +182,11 @@ def _of_groups(request: Request) -> _Known:
 def _all_groups(request: Request) -> _Known:
     cases = groups.by_group(request)
     known: _Known = {(cases.factor, None): (request.entry.test, Groups(cases.groups))}
+    after_welch = "tukey_kramer" if request.entry.follow_up == TUKEY else "games_howell"
     places = [(i, j) for i in range(len(cases.names)) for j in range(i + 1, len(cases.names))]
     for pair, place in zip(pairs.of_groups(cases.groups, cases.names, cases.factor), places, strict=True):
         known[pair.effect, pair.contrast] = (
-            ("games_howell", Groups(cases.groups, place))
+            (after_welch, Groups(cases.groups, place))
             if request.entry.test == "anova_welch"
             else ("mann_whitney", Groups([pair.first, pair.second]))
         )

@@ -67,8 +67,9 @@ def _words(table: pd.DataFrame) -> Words:
     caption = (
         "Q-Q plots: values whose normality tests assume, less their mean and over their SD, against the normal"
         f" quantiles of their ranks; normal ones follow the line. {found}. Grey: pointwise 95 % band of normal values"
-        " that are standardised by their own mean and SD (beta distribution of ordered values, narrowed by what mean and SD"
-        " take up). About 1 in 20 lies outside by chance; several, or a bend, speak against a normal distribution."
+        " that are standardised by their own mean and SD (beta distribution of ordered values, narrowed by what mean"
+        " and SD take up). About 1 in 20 lies outside by chance; several, or a bend, speak against a normal"
+        " distribution."
     )
     what = listed(f"{panel.measure}, {panel.title}" for panel in every)
     return Words(caption, f"Normal Q-Q plots, one panel each: {what}. {found}.")

@@ -163,6 +163,7 @@ _WORDS: Sequence[tuple[str, str, str]] = (
         "Partial eta squared: the effect's share of the variance of effect and error together, from 0 to 1.",
     ),
     ("d_z", r"\bd_z\b", "The mean difference in units of the differences' standard deviation."),
+    ("d", r"\bd = ", "The difference of two groups' means over the SD within all groups."),
     ("d_av", r"\bd_av\b", "The difference of two groups' means over the root of the mean of their variances."),
     ("r_rb", r"\br_rb\b", "Rank-biserial correlation: from −1 (second always larger) to 1 (first always larger)."),
     ("W", r"\bW = [.\d]", "Kendall's W: from 0 (participants rank the conditions differently) to 1 (all alike)."),

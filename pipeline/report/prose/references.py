@@ -25,6 +25,10 @@ _OF_EFFECT_SIZE = {
     "matched-pairs rank-biserial": "kerby2014",
     "Kendall's W": "kendall1939",
 }
+_OF_PAIRS = {
+    "Games and Howell": ("games1976", "every two groups"),
+    "Tukey and Kramer": ("kramer1956", "every two groups"),
+}
 _OF_ESTIMATOR = {
     "one_euro": "casiez2012",
     "holt": "holt2004",
@@ -140,6 +144,9 @@ def _of_methods(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
         test = TESTS[row["test"]]
         for key in test.cite:
             yield key, test.cited_for or test.long_name
+        for name, (key, used_for) in _OF_PAIRS.items():
+            if name in row["method"]:
+                yield key, used_for
         if "Pratt" in row["method"]:
             yield "pratt1959", "zeros of the signed-rank test"
         if row["effect_size"] is not None and row["effect_size_name"] in _OF_EFFECT_SIZE:

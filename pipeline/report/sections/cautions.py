@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from pipeline.analysis.kinds_of_values import SHAPE
 from pipeline.report.document.model import Strong, Text
@@ -11,6 +11,7 @@ from pipeline.report.prose.accuracy_claims import sessions_in_doubt, without_ref
 from pipeline.report.sections import checks, preregistration, recorded_live
 from pipeline.report.sections.material import Material
 from pipeline.statistics import OK, T_BEYOND
+from pipeline.statistics.tukey import METHOD as TUKEY_KRAMER
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import reference_phrase
@@ -115,6 +116,10 @@ def _assumptions(material: Material) -> Iterator[Text]:
     if groups:
         text = f"(Shapiro-Wilk test) for {_measures_of(groups)}: check whether a rank test gives the same result."
         yield (Strong("Values within a group are not normally distributed "), text)
+    unlike = [row for row in rows if row["contrast"] is None and _takes_one_sd(rows, row) and below(row, "levene_p")]
+    if unlike:
+        text = f"(Levene's test) in {_measures_of(unlike)}, and Tukey and Kramer's pairs take one SD for all of them:"
+        yield (Strong("Groups spread differently "), f"{text} without “follow_up: tukey” each pair has its own.")
     shaped = [row for row in material.rows("design_check") if row["what"] == SHAPE]
     if shaped:
         text = f"in {_measures_of(shaped)}: see whether a test of the logarithms (“transform: log” in study.yaml) gives"
@@ -132,6 +137,12 @@ def _assumptions(material: Material) -> Iterator[Text]:
     if undefined:
         yield (f"{counted(undefined, 'comparison')} cannot be computed; the table of comparisons says why.",)
     yield from _narrow_intervals(material)
+
+
+def _takes_one_sd(rows: Sequence[Row], omnibus: Row) -> bool:
+    """Whether the pairs after a test of all groups take these to spread alike."""
+    same = ("measure", "test", "effect")
+    return any(row["method"] == TUKEY_KRAMER and all(row[key] == omnibus[key] for key in same) for row in rows)
 
 
 def _below_in_a_group(row: Row, alpha: float) -> bool:

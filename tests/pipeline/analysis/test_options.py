@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from pipeline.statistics.multiplicity import METHODS, adjusted
+from pipeline.statistics.tukey import tukey_kramer
 from pipeline.study.statistical_tests import ADJUSTMENTS
 from tests.pipeline.helpers import Steadyhand, run
 
@@ -315,3 +316,52 @@ def test_other_programs_are_given_the_logarithms(
     assert "scipy.stats.ttest_rel(x, y) agrees: t, df2, p, interval from, interval to" in ran.out
     assert "scipy.stats.ttest_ind(x, y, equal_var=False) agrees: t, df2, p" in ran.out
     assert "NO KNOWN REASON" not in ran.out
+
+
+GROUPS: Values = {
+    "time_s": {
+        "mouse": [11.0, 10.2, 12.5, 9.8, 13.1, 11.7, 10.9],
+        "touch": [8.1, 9.4, 7.9, 8.8, 10.2, 9.1],
+        "gaze": [14.2, 12.9, 25.8, 13.3, 16.0],
+    }
+}
+
+
+def test_tukeys_pairs_follow_up_groups_and_are_named_cited_and_cautioned(
+    tmp_path: Path, steadyhand: Steadyhand
+) -> None:
+    entry = "measure: time_s, test: anova_welch, follow_up: tukey"
+    declared = "factors: {condition: between}\n"
+    page = read(steadyhand, study(tmp_path / "study", GROUPS, [entry], declared, apart=True))
+    rows = [row for row in steadyhand.results()["comparisons"] if row["contrast"] is not None]
+    expected = tukey_kramer([np.array(values) for values in GROUPS["time_s"].values()], [*GROUPS["time_s"]])
+    assert [row["p"] for row in rows] == [one.p for one in expected]
+    assert {row["adjust"] for row in rows} == {"none"}
+    assert {row["p_adjusted"] for row in rows} == {None}
+    assert "follow-up, Tukey and Kramer's test" in page
+    assert "Groups spread differently (Levene's test) in Time (s)" in page
+    bibliography = (steadyhand.out / "references.bib").read_text(encoding="utf-8")
+    assert "kramer1956" in bibliography
+    assert "games1976" not in bibliography
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        (
+            "test: rm_anova, follow_up: tukey",
+            "rm_anova is not followed up by tukey: within participants all pairs would",
+        ),
+        ("test: mixed_anova, follow_up: tukey", "its pairs within participants would need sphericity"),
+        (
+            "test: kruskal, follow_up: tukey",
+            "kruskal is not followed up by tukey, whose p is of groups of measurements",
+        ),
+        ("test: t_paired, adjust: tukey", "tukey adjusts no p values that are there: it is a test of every two groups"),
+        ("test: anova_welch, follow_up: tukay", 'did you mean "tukey"?'),
+    ],
+)
+def test_tukey_is_refused_where_it_is_wrong(entry: str, why: str, tmp_path: Path, steadyhand: Steadyhand) -> None:
+    ran = steadyhand("compare", study(tmp_path / "study", TIMES, [f"measure: doubt, {entry}"]))
+    assert ran.code == 2
+    assert why in ran.err
