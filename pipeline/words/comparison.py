@@ -70,6 +70,11 @@ def decisive_p(row: Row) -> float | None:
     return unadjusted_p(row) if row["p_adjusted"] is None else float(row["p_adjusted"])
 
 
+def over_all_pairs(row: Row) -> bool:
+    """Whether a pair's p and interval hold for all pairs of its test together, without a family: Tukey's do."""
+    return "p over all pairs" in row["method"]
+
+
 def tested_difference(row: Row) -> tuple[float | None, float | None, float | None]:
     """The mean difference of a row and its interval, as of `details`; each None where it is not known.
 

@@ -16,7 +16,15 @@ from pipeline.statistics.pairs import names_in
 from pipeline.study.measures import headlines, measure
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words.change import direction, meaningful_reduction
-from pipeline.words.comparison import EFFECTS_OF_CONDITION, Row, decisive_p, shift, test_label, tested_difference
+from pipeline.words.comparison import (
+    EFFECTS_OF_CONDITION,
+    Row,
+    decisive_p,
+    over_all_pairs,
+    shift,
+    test_label,
+    tested_difference,
+)
 from pipeline.words.effect_sizes import effect_size
 from pipeline.words.names import measure_label
 from pipeline.words.numbers import MINUS, NO_VALUE, estimate, interval, number, p_value, percent
@@ -132,7 +140,14 @@ def notes(results: Mapping[str, Any]) -> str:
     counts = sorted({row["n"] for row in rows})
     people = "" if not counts else f" n = {counts[0]}" + (f" to {counts[-1]}" if len(counts) > 1 else "") + "."
     adjusted = any(row["p_adjusted"] is not None for row in rows)
-    kind = "p: adjusted over its family where one is stated, intervals not" if adjusted else "p: not adjusted"
+    together = [row for row in rows if over_all_pairs(row)]
+    if adjusted:
+        kind = "p: adjusted over its family where one is stated, intervals not"
+    elif together:
+        alone = "" if len(together) == len(rows) else "; others not adjusted"
+        kind = f"p and intervals of pairs of groups: over all pairs of a measure, effect sizes not{alone}"
+    else:
+        kind = "p: not adjusted"
     level = f"level of significance {100 * study['alpha']:g} %"
     has_ratios = any(row["effect_size_name"] in _RATIOS for row in rows)
     ratios = "; ratios: the first named over the other" if has_ratios else ""

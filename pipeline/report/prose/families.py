@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pipeline.analysis.families import MEASURES, PAIRS
 from pipeline.tables.table import Row
+from pipeline.words.comparison import over_all_pairs
 from pipeline.words.names import adjustment_label
 from pipeline.words.phrases import counted, listing
 
@@ -17,8 +18,10 @@ def families(rows: Sequence[Row]) -> str:
         details = row["details"] or {}
         if row["p_adjusted"] is not None:
             kinds[row["adjust"], details["family"], details["family_size"]] = None
+    together = [row for row in rows if over_all_pairs(row)]
     if not kinds:
-        return "p values are not adjusted"
+        alone = "p values are not adjusted"
+        return f"{alone}, but those of pairs of groups hold for all pairs of a measure together" if together else alone
     parts = [f"by {adjustment_label(method)} over {_members(family, size)}" for method, family, size in kinds]
     return f"p values are adjusted {listing(parts)}"
 

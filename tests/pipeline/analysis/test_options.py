@@ -340,6 +340,10 @@ def test_tukeys_pairs_follow_up_groups_and_are_named_cited_and_cautioned(
     assert {row["p_adjusted"] for row in rows} == {None}
     assert "follow-up, Tukey and Kramer's test" in page
     assert "Groups spread differently (Levene's test) in Time (s)" in page
+    assert "p and intervals of pairs of groups: over all pairs of a measure, effect sizes not;" in page
+    assert "p values are not adjusted, but those of pairs of groups hold for all pairs" in page.replace(
+        "P values", "p values"
+    )
     bibliography = (steadyhand.out / "references.bib").read_text(encoding="utf-8")
     assert "kramer1956" in bibliography
     assert "games1976" not in bibliography
