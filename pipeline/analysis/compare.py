@@ -16,7 +16,7 @@ from pipeline.analysis.complete_cases import People, read_values
 from pipeline.analysis.descriptives import descriptives, differences, intervals_within, means_of_measures
 from pipeline.analysis.design_check import findings
 from pipeline.analysis.fitts_law import fitts_law
-from pipeline.analysis.group_descriptives import by_group
+from pipeline.analysis.group_descriptives import by_group, group_members
 from pipeline.analysis.measure import ALL_DATA
 from pipeline.analysis.normality import normality_rows
 from pipeline.analysis.practice import learning_rows
@@ -65,6 +65,7 @@ def run(work: Work) -> Outcome:
     frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
     requests = [request for entry in all_requests(study, values) for request in entry]
+    frames["group_members"] = tables.frame("group_members", group_members(requests))
     frames["normal_quantiles"] = tables.frame("normal_quantiles", normality_rows(requests))
     frames["descriptives_by_group"] = tables.frame("descriptives_by_group", by_group(requests))
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)

@@ -32,6 +32,23 @@ def by_group(requests: Iterable[Request]) -> list[Row]:
     return rows
 
 
+def group_members(requests: Iterable[Request]) -> list[Row]:
+    """Who is in which group of each measure that is tested between groups, in the groups' order; as `by_group`."""
+    rows: dict[tuple[str, str, str], Row] = {}
+    for request in requests:
+        if TESTS[request.entry.test].design not in ("between", "mixed") or between_factor(request) == CONDITION:
+            continue
+        factor = between_factor(request)
+        measured, _ = rows_and_factors(request, request.measures)
+        members = group_of_each(request, factor, measured)
+        people = [str(person) for person in dict.fromkeys(measured["participant"]) if str(person) in members]
+        for name in group_names(request, factor, members, people):
+            for person in (one for one in people if members[one] == name):
+                row = {"measure": request.measure, "factor": factor, "participant": person, "group": name}
+                rows[request.measure, factor, person] = row
+    return list(rows.values())
+
+
 def _of_measure(request: Request, factor: str) -> list[Row]:
     measured, _ = rows_and_factors(request, request.measures)
     members = group_of_each(request, factor, measured)

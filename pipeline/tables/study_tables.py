@@ -191,6 +191,18 @@ STUDY_TABLES = (
         as_csv=True,
     ),
     Table(
+        "group_members",
+        "One row per measure, factor and participant, where groups of participants are compared: who is in which.",
+        (
+            MEASURE,
+            text("factor", "the factor that tells the groups apart"),
+            PARTICIPANT,
+            text("group", "the participant's level of it"),
+        ),
+        stages=("compare",),
+        as_csv=True,
+    ),
+    Table(
         "normal_quantiles",
         "One row per value whose normality a comparison assumes, beside the normal quantile of its rank (Q-Q plots).",
         (

@@ -61,6 +61,7 @@ def _at_width(page: Path, opened: Tab, checker: str | None) -> Iterator[str]:
     else:
         yield from opened.evaluate("sortingFaults()")
         yield from opened.evaluate("foldFaults()")
+        yield from opened.evaluate("nameFaults()")
         yield from opened.evaluate("copyFaults()")
         yield from opened.evaluate("overprintFaults()")
     yield from opened.evaluate("scrollFaults()")

@@ -52,6 +52,22 @@ async function foldFaults() {
 }
 
 // The button copies the words of its block without links to rows, and says so; where it may not, it says what to do.
+// A mark that has a name lies where the picture shows it, and a tap on it says the name.
+function nameFaults() {
+  const faults = [];
+  for (const picture of document.querySelectorAll(".named")) {
+    const name = picture.closest("figure").id, image = picture.querySelector("img").getBoundingClientRect();
+    const over = picture.querySelector("svg").getBoundingClientRect();
+    if (image.width && Math.abs(image.width - over.width) > 1) faults.push(`${name}: names lie beside the marks`);
+    const marks = [...picture.querySelectorAll("circle")], said = () => picture.parentElement.querySelector(".told-name");
+    marks[0].dispatchEvent(new MouseEvent("click", { bubbles: true }));
+    if (!said() || said().hidden || said().textContent !== marks[0].textContent.trim()) faults.push(`${name}: a tap says nothing`);
+    picture.querySelector("img").click();
+    if (!said().hidden || picture.querySelector(".told")) faults.push(`${name}: a name stays`);
+  }
+  return faults;
+}
+
 async function copyFaults() {
   const faults = [], given = Object.getOwnPropertyDescriptor(navigator, "clipboard");
   let copied = null, allowed = true;

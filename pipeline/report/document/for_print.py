@@ -26,7 +26,8 @@ _ANNEX = "annex"
 _ROWS_MAX = 250  # of a table: five pages
 _TEXTS_MAX = 60  # of words to paste
 _ANNEX_ROWS = 48  # of folded tables in all: with their captions, two pages
-_FIGURE_ROWS = 6  # of these, what a figure takes the place of
+_FIGURE_ROWS = 10  # of these, what a figure takes the place of
+_SHORTEST = 2  # rows of a table that shows at least what it has
 
 
 def for_print(document: Document, names: Mapping[str, str]) -> Document:
@@ -42,8 +43,12 @@ def for_print(document: Document, names: Mapping[str, str]) -> Document:
 def _annex(folded: Sequence[Folded]) -> Iterator[Block]:
     """What is folded and goes to the annex: tables, as many of their rows as there is room for, and figures."""
     tables = [table for fold in folded if fold.in_annex for table in _tables(fold)]
-    rows = _ANNEX_ROWS - _FIGURE_ROWS * sum(len(_annexed(fold)) for fold in folded)
-    shortened = {table.id: table for table in _shortened(tables, rows)}
+    whole = [table for fold in folded if fold.in_annex and fold.whole_in_annex for table in _tables(fold)]
+    figures = sum(len(_annexed(fold)) for fold in folded)
+    taken = _FIGURE_ROWS * figures + sum(len(table.rows) for table in whole)
+    others = [table for table in tables if table not in whole]
+    shared = max(_ANNEX_ROWS - taken, len(others) * _SHORTEST)
+    shortened = {table.id: table for table in [*whole, *_shortened(others, shared)]}
     for fold in folded:
         yield from (shortened[table.id] for table in _tables(fold) if fold.in_annex)
         yield from _annexed(fold)

@@ -131,13 +131,15 @@ class Folded:
     """Tables and figures that most readers pass over, under a line that says what they hold and what it comes to.
 
     A page opens them at a click. In print the line stands alone: tables go to an annex, as far as it may grow, unless
-    they are of no use on paper, and figures are left to the page, unless a paper's reader needs them as much.
+    they are of no use on paper, and figures are left to the page, unless a paper's reader needs them as much. What is
+    of use only as a whole is not shortened there.
     """
 
     summary: str
     blocks: tuple[Table | Figure, ...]
     in_annex: bool = True
     figures_in_annex: bool = False
+    whole_in_annex: bool = False
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,23 @@ function followSections(links) {
   document.querySelectorAll("main > section").forEach((section) => seen.observe(section));
 }
 
+// Who a mark is: a browser shows its title where it is pointed at; a tap writes it below, as a finger points at nothing.
+function tellNames(picture) {
+  const line = document.createElement("p");
+  line.className = "told-name";
+  line.setAttribute("role", "status");
+  picture.addEventListener("click", (event) => {
+    const mark = event.target.closest("circle");
+    picture.querySelectorAll(".told").forEach((other) => other.classList.remove("told"));
+    line.textContent = mark ? mark.textContent : "";
+    line.hidden = !mark;
+    if (!mark) return;
+    mark.classList.add("told");
+    picture.after(line);
+  });
+}
+
+document.querySelectorAll(".named").forEach(tellNames);
 document.querySelectorAll("main table").forEach(makeSortable);
 document.querySelectorAll(".paste").forEach(makeCopyable);
 // A link may lead into what is folded away, which not every browser opens by itself.

@@ -11,6 +11,7 @@ from pipeline.report.figures.drawing import Drawing, Words
 from pipeline.report.figures.error_and_lag import errors, lag_and_error
 from pipeline.report.figures.excerpts import estimates, streams
 from pipeline.report.figures.fitts_law import fitts
+from pipeline.report.figures.group_clouds import groups
 from pipeline.report.figures.hand_paths import path, paths
 from pipeline.report.figures.layout import task_layout
 from pipeline.report.figures.lead_curves import lead
@@ -36,6 +37,7 @@ __all__ = [
     "errors",
     "estimates",
     "fitts",
+    "groups",
     "lag_and_error",
     "lead",
     "noise",

@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
+from pipeline.report.figures.named_marks import name_marks, people
 from pipeline.report.figures.style import COLOURS, GREY, MARKS_MAX, PALE, as_label, lowest, multiples, styled
 from pipeline.report.figures.wording import listed
 from pipeline.study.statistical_tests import TESTS
@@ -94,7 +95,7 @@ def normality(table: pd.DataFrame) -> Figure:
         chart.plot(ends, ends, color=GREY, linewidth=0.8)
         for outside, shade, mark in ((0, COLOURS[0], "o"), (1, COLOURS[1], "D")):
             some = rows[rows["outside"] == outside]
-            chart.scatter(
+            marks = chart.scatter(
                 some["quantile"],
                 some["standardised"],
                 s=11 if outside == 0 else 20,
@@ -104,6 +105,9 @@ def normality(table: pd.DataFrame) -> Figure:
                 zorder=3,
                 rasterized=len(rows) > MARKS_MAX,
             )
+            whose = zip(some["participant"], some["cell"], strict=True)
+            names = [f"{person}, {cell}" if isinstance(cell, str) else str(person) for person, cell in whose]
+            name_marks(marks, people(names, some["value"]))
         title = f"{as_label(panel.measure, _LINE)}\n{as_label(panel.title, _LINE)}"
         chart.set_title(title, fontsize=8)
         if place % across == 0:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
+from pipeline.report.figures.named_marks import name_marks, people
 from pipeline.report.figures.style import (
     BLACK,
     COLOURS,
@@ -130,13 +131,13 @@ def paired(wide: pd.DataFrame, measure: str, shares: bool = False) -> Figure:
     ratio = [len(wide.columns) + 0.4, len(wide.columns) - 0.4]
     options: dict[str, Any] = {"gridspec_kw": {"width_ratios": ratio}} if compared else {}
     figure, axes = panels(1, 2 if compared else 1, 3.1, **options)
-    _rainclouds(axes[0], wide, method_of(wide, measure, shares))
-    _from_zero(axes[0], [wide])
+    rainclouds(axes[0], wide, Drawn(method_of(wide, measure, shares), unit_of(measure)))
+    from_zero(axes[0], [wide])
     axes[0].set_ylabel(as_label(measure_label(measure)))
     axes[0].set_title(f"Participants (n = {len(wide) if one_condition_each(wide) else f'{len(complete)} complete'})")
     if compared:
-        _differences(axes[1], complete)
         unit = unit_of(measure)
+        _differences(axes[1], complete, unit)
         axes[1].set_ylabel(as_label(f"Difference ({unit})") if unit else "Difference")
         axes[1].set_title(f"Differences (n = {len(complete)})")
     return figure
@@ -179,56 +180,79 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
     """The same for every scale of a questionnaire: one small panel per scale, all with the same axis."""
     figure, every, across = multiples(len(wide), 1.9, a_row=3, sharex=False)
     for index, (axes, (measure, table)) in enumerate(zip(every, wide.items(), strict=True)):
-        _rainclouds(axes, table, method_of(table, measure), small=True)
+        rainclouds(axes, table, Drawn(method_of(table, measure)), small=True)
         axes.set_title(f"{as_label(short_label(measure), 24)} (n = {len(table.dropna())})")
         if index % across == 0:
             axes.set_ylabel("Rating")
     limits = {score_limits(name) for name in wide}
     known = limits.pop() if len(limits) == 1 else None
     if known is None:
-        _from_zero(every[0], wide.values())
+        from_zero(every[0], wide.values())
     else:
         low, high = known
         every[0].set_ylim(low, high + 0.04 * (high - low))  # room for a mark at the highest score
     return figure
 
 
-def _rainclouds(axes: Axes, wide: pd.DataFrame, method: str, small: bool = False) -> None:
-    """One raincloud per condition: participants in the middle, density outside, mean and quartiles between."""
+class Drawn(NamedTuple):
+    """How the intervals of means are computed, the measure's unit, which colours, and how many characters fit below."""
+
+    method: str = T
+    unit: str = ""
+    looks: Sequence[int] = ()
+    letters: int = 40
+
+
+def rainclouds(
+    axes: Axes, wide: pd.DataFrame, drawn: Drawn, small: bool = False, joined: pd.DataFrame | None = None
+) -> None:
+    """One raincloud per condition: participants in the middle, density outside, mean and quartiles between.
+
+    Lines join the values of the complete participants, or of those in `joined`, from each to the next that is there.
+    """
     at = np.arange(len(wide.columns))
     complete = wide.dropna().to_numpy(np.float64)
-    if len(at) > 1 and len(complete):
-        faint: dict[str, Any] = {"alpha": 0.45, "linewidth": 0.7, "zorder": 1, "rasterized": complete.size > MARKS_MAX}
-        axes.plot(at, complete.T, color=GREY, **faint)
+    lines = complete if joined is None else joined.to_numpy(np.float64)
+    if len(at) > 1 and len(lines):
+        faint: dict[str, Any] = {"alpha": 0.45, "linewidth": 0.7, "zorder": 1, "rasterized": lines.size > MARKS_MAX}
+        axes.plot(at, lines.T, color=GREY, **faint)
     from pipeline.statistics.estimation import within_intervals
 
-    bounded = method == T_OF_SHARES
-    within = within_intervals(complete, bounded=bounded) if draws_within(wide, method) else [None] * len(at)
+    bounded = drawn.method == T_OF_SHARES
+    within = within_intervals(complete, bounded=bounded) if draws_within(wide, drawn.method) else [None] * len(at)
+    looks = drawn.looks or range(len(at))
     for index, condition in enumerate(wide.columns):
         side = -1 if index == 0 and len(at) > 1 else 1  # the lines from the first condition lead to the right
         ends = within[index]
         if ends is not None:  # in two tiers, as Baguley (2012) has them: inside the interval of the mean itself
-            axes.vlines(index + side * _BESIDE, *ends, color=colour(index), linewidth=3.5 if small else 5, zorder=4)
-        _raincloud(axes, index, side, finite(wide[condition]), (colour(index), marker(index)), method)
-    length = max(8, (24 if small else 40) // len(at))
+            axes.vlines(
+                index + side * _BESIDE, *ends, color=colour(looks[index]), linewidth=3.5 if small else 5, zorder=4
+            )
+        _raincloud(axes, index, side, wide[condition], (colour(looks[index]), marker(looks[index])), drawn)
+    length = max(8, (24 if small else drawn.letters) // len(at))
     axes.set_xticks(at, [as_label(condition, length) for condition in wide.columns])
     axes.set_xlim(-0.6, len(at) - 0.4)
     grouped(axes)
 
 
-def _from_zero(axes: Axes, tables: Iterable[pd.DataFrame]) -> None:
+def from_zero(axes: Axes, tables: Iterable[pd.DataFrame]) -> None:
     """Let the axis begin at zero unless a value is below. Call it last, since it ends matplotlib's own scaling."""
     if not any((finite(table) < 0).any() for table in tables):
         axes.set_ylim(bottom=0)
 
 
-def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple[str, str], method: str = T) -> None:
-    """Participants, density, quartiles and mean of one condition."""
+def _raincloud(axes: Axes, at: float, side: int, of: pd.Series, look: tuple[str, str], drawn: Drawn) -> None:
+    """Participants, density, quartiles and mean of one condition, of values by participant."""
+    known = of[np.isfinite(of.to_numpy(np.float64))]
+    values = finite(known)
     if not len(values):
         return
     shade = look[0]
     rasterized = len(values) > MARKS_MAX
-    axes.scatter(np.full(len(values), at), values, s=13, color=shade, alpha=0.55, zorder=2, rasterized=rasterized)
+    marks = axes.scatter(
+        np.full(len(values), at), values, s=13, color=shade, alpha=0.55, zorder=2, rasterized=rasterized
+    )
+    name_marks(marks, people(known.index, values, drawn.unit))
     density = _density(values)
     if density is not None:
         grid, height = density
@@ -239,7 +263,7 @@ def _raincloud(axes: Axes, at: float, side: int, values: FloatArray, look: tuple
         place = at + side * 0.2
         axes.vlines(place, low, high, color=shade, linewidth=5, alpha=0.35, zorder=2)
         axes.hlines(middle, place - _BOX, place + _BOX, color=shade, linewidth=1.2, zorder=3)
-    draw_mean(axes, at + side * _BESIDE, values, look, method=method)
+    draw_mean(axes, at + side * _BESIDE, values, look, method=drawn.method)
 
 
 def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArray] | None:
@@ -262,14 +286,14 @@ def _density(values: FloatArray, points: int = 60) -> tuple[FloatArray, FloatArr
     return grid, height / height.max()
 
 
-def _differences(axes: Axes, complete: pd.DataFrame) -> None:
+def _differences(axes: Axes, complete: pd.DataFrame, unit: str) -> None:
     """First condition minus each other one: participants, density, mean and interval."""
     first, *others = complete.columns
     axes.axhline(0, color=BLACK, linewidth=0.8)
     for index, other in enumerate(others):
-        difference = finite(complete[first] - complete[other])
+        difference = complete[first] - complete[other]
         look = (COLOURS[2], "D") if len(others) == 1 else (colour(index + 1), marker(index + 1))
-        _raincloud(axes, index, 1, difference, look)
+        _raincloud(axes, index, 1, difference, look, Drawn(unit=unit))
     length = max(10, 34 // len(others))
     labels = [f"{first} {MINUS} {other}" for other in others]
     if len(others) > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -16,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from pipeline.report.figures.named_marks import titled
 from pipeline.report.glyphs import FALLBACK, FAMILY, FONTS, showable
 from pipeline.statistics import T
 from pipeline.statistics.arrays import FloatArray
@@ -31,8 +33,8 @@ BLACK = COLOURS[6]
 FAMILIES = [FAMILY, FALLBACK]
 GREY = "#6b757d"
 PALE = "#e3e7ea"
-WIDTH = 7.2  # inches: the width of a page's text
 MARKS_MAX = 2000  # more are drawn as a bitmap, since an SVG with each of them is slow to open
+WIDTH = 7.2  # inches: the width of a page's text
 _PANELS_A_ROW = 4
 _NAME_LENGTH = 32
 _TICKS = 8.5
@@ -91,7 +93,9 @@ def save(figure: Figure, path: Path) -> None:
         with mpl.rc_context(_STYLE):
             figure.dpi = mpl.rcParams["savefig.dpi"]
             svg: Any = FigureCanvasSVG(figure)
-            svg.print_svg(path, metadata={"Date": None, "Creator": "Steadyhand"})
+            written = io.StringIO()
+            svg.print_svg(written, metadata={"Date": None, "Creator": "Steadyhand"})
+        path.write_text(titled(written.getvalue()), encoding="utf-8", newline="\n")
     finally:
         figure.set_canvas(canvas)
         figure.dpi = dpi

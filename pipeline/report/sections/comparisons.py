@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from pipeline.report.document.model import Block, CrossReference, Paragraph, Section, Strong, Table, columns
 from pipeline.report.prose.families import families
-from pipeline.report.sections import assumptions, normality
+from pipeline.report.sections import assumptions, normality, values
 from pipeline.report.sections.material import Material
 from pipeline.study.statistical_tests import TESTS
 from pipeline.tables.table import Row
@@ -55,7 +55,7 @@ def section(material: Material) -> Section | None:
     return Section(
         "comparisons",
         "All comparisons",
-        (*blocks, *assumptions.checked(rows, material.study), *normality.plots(material)),
+        (*blocks, *assumptions.checked(rows, material.study), *normality.plots(material), *values.tables(material)),
     )
 
 

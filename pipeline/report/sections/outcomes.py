@@ -18,7 +18,7 @@ from pipeline.report.document.model import (
     columns,
 )
 from pipeline.report.figures.selections import offsets_mm
-from pipeline.report.sections import overview
+from pipeline.report.sections import groups, overview
 from pipeline.report.sections.comparisons import DIFFERENCE, ESTIMATES, SHIFT_NOTE, difference_cell, methods
 from pipeline.report.sections.material import Material, first_of, safe_name
 from pipeline.statistics import T
@@ -161,6 +161,7 @@ def _figure_and_tests(material: Material, measure: str) -> list[Block]:
         # Where some measures are tested, those that are not are what most readers pass over.
         passed_over = material.rows("comparisons") and not material.comparisons_of(measure)
         blocks.append(Folded(f"{label} by participant", (drawn,)) if passed_over else drawn)
+    blocks += groups.drawn(material, f"measure-{safe_name(measure)}", [measure])
     for statement in _statements(material.comparisons_of(measure)):
         blocks.append(Paragraph((Strong(f"{label}: "), *statement)))
     return blocks
@@ -222,6 +223,7 @@ def _questionnaire(material: Material, questionnaire: str, names: list[str]) -> 
     if len(wide) > 1:  # of a single score the figure of people has the same
         blocks.append(material.drawn(called, figures.workload, wide))
     blocks.append(material.drawn(f"{called}-people", figures.scales, wide))
+    blocks += groups.drawn(material, called, scales)
     return blocks
 
 

@@ -48,7 +48,7 @@ def section(material: Material) -> Section:
     blocks += recorded_live.blocks(material)
     agreement = material.rows("replay_agreement")
     if agreement:
-        blocks.append(Folded(_agreement_summary(agreement), (_agreement_table(material),)))
+        blocks.append(Folded(_agreement_summary(agreement), (_agreement_table(material),), in_annex=False))
     blocks += [*_exclusions(material), *without_exclusions(material)]
     return Section("quality", "Data quality and exclusions", tuple(blocks))
 
@@ -236,7 +236,7 @@ def _noise(material: Material) -> list[Block]:
         else "Still: the accelerations vary little.",
     )
     drawn = material.drawn("sensor-noise", figures.noise, _residuals(material, names), units)
-    return [drawn, Folded("Sensor noise in each session", (table,))]
+    return [drawn, Folded("Sensor noise in each session", (table,), in_annex=False)]
 
 
 def _residuals(material: Material, names: Sequence[str]) -> pd.DataFrame:

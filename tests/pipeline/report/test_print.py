@@ -65,6 +65,17 @@ def test_a_figure_that_print_needs_too_stands_in_the_annex_beside_its_fold() -> 
     assert annex.blocks == (a_table("shapiro", 3), picture, a_table("lights", 3))
 
 
+def test_a_table_that_is_of_use_only_whole_is_not_shortened_and_the_others_make_room() -> None:
+    (_, annex) = printed(
+        Folded("Values", (a_table("values", 30),), whole_in_annex=True), Folded("Lights", (a_table("lights", 90),))
+    )
+    assert [len(table.rows) for table in annex.blocks if isinstance(table, Table)] == [30, 18]
+    (_, annex) = printed(
+        Folded("Values", (a_table("values", 60),), whole_in_annex=True), Folded("Lights", (a_table("lights", 90),))
+    )
+    assert [len(table.rows) for table in annex.blocks if isinstance(table, Table)] == [60, 2]
+
+
 def test_without_folds_there_is_no_annex() -> None:
     assert len(printed(Paragraph(("All.",)))) == 1
 
