@@ -32,7 +32,7 @@ _NEVER_OVER_1 = ("η²G", "η²p", "r_rb", "W", "ε²", "η²Q")  # printed with
 def effect_size(row: Row, before_interval: str = " ") -> str:
     """`d_z = 0.65 [0.01, 1.27]`, `η²G = .10 [.00, .29]`; a ratio of geometric means as `ratio_to_first` words it.
 
-    Where the row has no effect size, the reason, or `NO_VALUE`.
+    Where the row has no effect size, the reason, or `NO_VALUE`; one without an interval says so.
     """
     if row["effect_size"] is None:
         return str((row["details"] or {}).get("no_effect_size", NO_VALUE))
@@ -40,7 +40,9 @@ def effect_size(row: Row, before_interval: str = " ") -> str:
         return ratio_to_first(row, before_interval)
     bounds = effect_interval(row)
     value = f"{effect_name(row)} = {effect_value(row)}"
-    return value if bounds == NO_VALUE else f"{value}{before_interval}{bounds}"
+    if bounds == NO_VALUE:
+        return f"{value} ({(row['details'] or {}).get('no_interval', 'no interval')})"
+    return f"{value}{before_interval}{bounds}"
 
 
 def effect_name(row: Row) -> str:

@@ -155,7 +155,9 @@ def notes(results: Mapping[str, Any]) -> str:
     roots = " (root): of the mean squared error; percentages are of that itself." if of_squares else ""
     any_shift = any(shift(row) is not None for row in rows)
     shifts = f"{_SHIFT}: Hodges and Lehmann's estimate, which belongs to rank tests." if any_shift else ""
-    marks = f"{ratios}.{roots}{shifts}"
+    estimates = any(row["effect_size_name"] == "estimate" for row in rows)
+    alone = " Effect size –: a model has none but its estimate, which is the difference." if estimates else ""
+    marks = f"{ratios}.{roots}{shifts}{alone}"
     return f"Differences and effect sizes: the first named minus the other{marks}{people} {kind}; {level}."
 
 

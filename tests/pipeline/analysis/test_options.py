@@ -369,3 +369,18 @@ def test_tukey_is_refused_where_it_is_wrong(entry: str, why: str, tmp_path: Path
     ran = steadyhand("compare", study(tmp_path / "study", TIMES, [f"measure: doubt, {entry}"]))
     assert ran.code == 2
     assert why in ran.err
+
+
+PERFECT: Values = {"time_s": {"A": [1.0, 2.0, 3.0, 4.0], "B": [2.0, 3.0, 4.0, 5.0], "C": [3.0, 4.0, 5.0, 6.0]}}
+
+
+def test_an_effect_size_without_an_interval_says_why(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    page = read(steadyhand, study(tmp_path / "study", PERFECT, ["measure: time_s, test: friedman"]))
+    assert "W = 1.00 (no interval: leaving out one participant after the other shows no spread to judge by)" in page
+
+
+def test_a_model_says_that_its_estimate_is_all_it_has(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    page = read(steadyhand, study(tmp_path / "study", TIMES, ["measure: time_s, test: mixed_model"]))
+    assert "Effect size –: a model has none but its estimate, which is the difference." in page
+    paired = read(steadyhand, study(tmp_path / "paired", TIMES, ["measure: time_s, test: t_paired"]))
+    assert "Effect size –" not in paired
