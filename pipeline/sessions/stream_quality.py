@@ -10,6 +10,7 @@ from pipeline.sessions.logs.log import IntArray, Readings
 from pipeline.sessions.sampling import sampling
 from pipeline.statistics.arrays import FloatArray
 from pipeline.tables.columns import S_PER_NS
+from pipeline.words.phrases import counted
 
 _STEP_BACK_MIN = 10  # messages: a clock that went back stays back; a late message comes alone
 _FORWARDS = 0.8  # of the steps in a run; in shuffled messages half of them are
@@ -51,7 +52,7 @@ def quality_row(session: str, stream: str, readings: Readings, notes: list[str])
         if readings.sampled and found.missing is None:
             remarks.append(f"its stamps {found.how}, so how many samples are missing cannot be told")
         elif readings.sampled and found.missing:
-            remarks.append(f"{found.missing} samples missing ({found.share:.1%})")
+            remarks.append(f"{counted(found.missing, 'sample')} missing ({found.share:.1%})")
     row["note"] = "; ".join(remarks) or None
     return row
 

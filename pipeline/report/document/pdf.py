@@ -37,7 +37,7 @@ _TEXT_MAX = 100  # characters that a column of text is wide: else its neighbours
 _PADDING = 2.5  # characters between columns
 _NARROW = frozenset(" .,;:'|!ijl[]()\u00a0\u2009\u202f_")
 _BOLD = 1.2  # the width of bold letters in that of numbers
-_FIGURES_PASSED = 2  # between a figure and the words that may go before it
+_FIGURES_PASSED = 4  # between a figure and the words that may go before it
 _HEAD = 70  # characters of the title that fit at the head of a page beside the section's
 _STANDARDS: list[Literal["ua-1", "a-2a"]] = ["ua-1", "a-2a"]
 
@@ -88,7 +88,7 @@ def _sections(sections: Sequence[Section], names: dict[str, str]) -> Iterator[di
 
 
 def _floats(rest: Sequence[Block], after: Sequence[Block], is_first: bool) -> bool:
-    """Whether a figure may go to the foot of a page while words go on: those that follow it, or two more figures.
+    """Whether a figure may go to the foot of a page while words go on: those that follow it, or four more figures.
 
     `rest` follows in its section and `after` in the next one. A section whose words are over does not go on without
     its first figure.

@@ -3,7 +3,7 @@
 const sessions = JSON.parse(document.getElementById("data").textContent);
 const at = (id) => document.getElementById(id);
 const picture = at("picture");
-const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b58900", "#56b4e9", "#7a5cc9", "#8c564b"];
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#b58900", "#7a5cc9", "#8c564b"];
 const KINDS = { tracker: "tracker, as it arrived", estimator: "estimator", display: "displayed", reference: "reference" };
 const state = { index: 0, lines: [], hidden: new Set(), axis: "", from: 0, to: 1, whole: [0, 1], instant: null };
 
@@ -29,9 +29,9 @@ async function unpacked(session) {
   const bytes = await inflated(session.data);
   let begin = 0;
   const take = (n) => { const values = tenths(bytes, begin, n); begin += 4 * n; return values; };
-  return session.series.map((series, number) => {
+  return session.series.map((series) => {
     const line = { ...series, key: series.kind + " " + series.name, values: {}, errors: {} };
-    line.colour = COLOURS[number % COLOURS.length];
+    line.colour = COLOURS[series.place % COLOURS.length];
     line.time = take(series.n).map((milliseconds) => milliseconds / 1000);
     for (const axis of series.axes) line.values[axis] = take(series.n);
     return line;

@@ -34,13 +34,14 @@ Kind = Literal["tracker", "estimator", "display", "reference"]
 
 @dataclass(frozen=True)
 class Series:
-    """One line of a session: `time_s` (n,) rises, `value_mm` (n, axes)."""
+    """One line of a session: `time_s` (n,) rises, `value_mm` (n, axes); `place` is that of its colour."""
 
     name: str
     kind: Kind
     axes: tuple[str, ...]
     time_s: FloatArray
     value_mm: FloatArray
+    place: int = 0
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,9 @@ def _packed(traces: Traces, step_s: float, events: int = 0) -> dict[str, Any]:
         time_s, value_mm = series.time_s[storable], series.value_mm[storable]
         thin = _first_of_each_step(time_s, step_s)
         parts += [_bytes(time_s[thin] * 1e3), *(_bytes(column) for column in value_mm[thin].T)]
-        listed.append({"name": series.name, "kind": series.kind, "axes": series.axes, "n": int(thin.sum())})
+        listed.append(
+            {"name": series.name, "kind": series.kind, "axes": series.axes, "n": int(thin.sum()), "place": series.place}
+        )
     return {
         "session": traces.session,
         "participant": traces.participant,

@@ -14,6 +14,7 @@ from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.plane import XY, Plane, square
 from pipeline.report.figures.style import (
     BLACK,
+    COLOURS,
     MARKS_MAX,
     as_label,
     as_pixels,
@@ -34,7 +35,12 @@ _VERTICES = 1500  # of a path; a line of more looks the same
 
 
 def _path_words(
-    tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
+    tracks: pd.DataFrame,
+    positions: pd.DataFrame,
+    events: pd.DataFrame,
+    lines: Sequence[str],
+    plane: Plane = XY,
+    looks: Mapping[str, str] | None = None,
 ) -> Words:
     """How large an area each line covers, and how many selections there are."""
     sessions = [*tracks["session"].iloc[:1], *positions["session"].iloc[:1]]
@@ -51,22 +57,38 @@ def _path_words(
 @drawing(_path_words)
 @styled
 def path(
-    tracks: pd.DataFrame, positions: pd.DataFrame, events: pd.DataFrame, lines: Sequence[str], plane: Plane = XY
+    tracks: pd.DataFrame,
+    positions: pd.DataFrame,
+    events: pd.DataFrame,
+    lines: Sequence[str],
+    plane: Plane = XY,
+    looks: Mapping[str, str] | None = None,
 ) -> Figure:
-    """One session's path past its targets: a line for each stream or estimator in `lines`."""
+    """One session's path past its targets: a line for each stream or estimator in `lines`.
+
+    `looks` has the colours of lines that have one in other figures too.
+    """
     drawn = [(line, points_of(tracks, positions, line, plane)) for line in lines]
     extent = _extent([*(points for _, points in drawn), _target_points(events, plane)])
     figure, (axes,) = panels(height=0.9 + 6.0 * float(np.clip(extent[1] / extent[0], 0.25, 0.8)))
+    taken: set[str] = set()
     for index, (line, points) in enumerate(drawn):
         if len(points):
             begin = points[np.isfinite(points).all(axis=1)][:1]
-            look: dict[str, Any] = {"linewidth": 1.1, "alpha": 0.85, "color": colour(index)}
-            axes.plot(*points.T, label=as_label(line), **look)
-            axes.scatter(begin[:, 0], begin[:, 1], s=30, marker=">", color=colour(index), edgecolor="white", zorder=4)
+            shade = _free((looks or {}).get(line, colour(index)), taken)
+            axes.plot(*points.T, label=as_label(line), linewidth=1.1, alpha=0.85, color=shade)
+            axes.scatter(begin[:, 0], begin[:, 1], s=30, marker=">", color=shade, edgecolor="white", zorder=4)
     _draw_targets(axes, events, plane)
     square(axes, plane)
     legend(figure, figure.axes, 5)
     return figure
+
+
+def _free(shade: str, taken: set[str]) -> str:
+    """The colour, or where another line has it the first that none has; it is taken then."""
+    free = next((other for other in (shade, *COLOURS) if other not in taken), shade)
+    taken.add(free)
+    return free
 
 
 def _paths_words(
@@ -76,6 +98,7 @@ def _paths_words(
     sessions: pd.DataFrame,
     shown: Mapping[str, str],
     plane: Plane = XY,
+    conditions: Sequence[str] = (),
 ) -> Words:
     """How many sessions there are of each condition, and which covers the largest area."""
     listed_sessions = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
@@ -109,12 +132,15 @@ def paths(
     sessions: pd.DataFrame,
     shown: Mapping[str, str],
     plane: Plane = XY,
+    conditions: Sequence[str] = (),
 ) -> Figure:
     """Everybody's paths past the targets: one small panel per participant, one line per session.
 
     `sessions` is any table with the columns participant, condition and session; `shown` names the stream or estimator
-    that is drawn for each condition, in the study's order.
+    that is drawn for each condition, in the study's order; `conditions` are all of the study's, for each to have the
+    colour that it has in other figures.
     """
+    order = list(conditions or shown)
     listed_sessions = sessions[["participant", "condition", "session"]].drop_duplicates().dropna()
     people = sorted(set(listed_sessions["participant"]))
     columns = [f"{axis}_mm" for axis in plane]
@@ -124,11 +150,11 @@ def paths(
     for index, (axes, person) in enumerate(zip(every, people, strict=True)):
         of_person = listed_sessions[listed_sessions["participant"] == person]
         zorder = as_pixels(axes, len(tracks) + len(positions))
-        for place, (condition, line) in enumerate(shown.items()):
+        for condition, line in shown.items():
             for session in of_person.loc[of_person["condition"] == condition, "session"]:
                 own_tracks, own_positions = (rows[rows["session"] == session] for rows in (tracks, positions))
                 points = points_of(own_tracks, own_positions, line, plane)
-                axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(place), zorder=zorder)
+                axes.plot(*points.T, linewidth=0.7, alpha=0.85, color=colour(order.index(condition)), zorder=zorder)
         _draw_targets(axes, events[events["session"].isin(of_person["session"])], plane, small=True)
         axes.set_aspect("equal", adjustable="box")
         axes.set_title(as_label(person, 18), fontsize=8.5)
@@ -136,8 +162,8 @@ def paths(
             axes.set_ylabel(f"{plane[1]} (mm)")
     for axes in lowest(every, across):
         axes.set_xlabel(f"{plane[0]} (mm)")
-    for place, (condition, line) in enumerate(shown.items()):
-        every[0].plot([], [], color=colour(place), label=f"{as_label(condition)}: {as_label(line)}")
+    for condition, line in shown.items():
+        every[0].plot([], [], color=colour(order.index(condition)), label=f"{as_label(condition)}: {as_label(line)}")
     legend(figure, [every[0]], 3)
     return figure
 

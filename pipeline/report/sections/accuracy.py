@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import pandas as pd
@@ -141,8 +142,23 @@ def _summary_table(material: Material, rows: list[Row]) -> Table:
         f" interval: share of instants and axes within 1.96 stated SDs of {standard}. Lag: the shift that fits"
         f" {standard} best, positive = late. Lead: the paper's measure, the peak of the cross-correlation with the"
         " tracker as it arrived, positive = ahead of it; fragile where the hand moves only once or drifts. Jitter: SD"
-        " while the hand is slower than 20 mm/s.",
+        f" while the hand is slower than 20 mm/s{of_how_many(rows, 'jitter_mm', n)}."
+        f"{_lags_of_fewer(rows, n)}",
     )
+
+
+def of_how_many(rows: Sequence[Row], figure: str, n: int) -> str:
+    """`, in 5 of 8 sessions`, of a figure that only some sessions have; nothing where all have it."""
+    counts = Counter(row["estimator"] for row in rows if row[figure] is not None)
+    if not counts or all(counts[row["estimator"]] == n for row in rows):
+        return ""
+    low, high = (pick(counts[row["estimator"]] for row in rows) for pick in (min, max))
+    return f", in {low}{f' to {high}' if high > low else ''} of {counted(n, 'session')}"
+
+
+def _lags_of_fewer(rows: Sequence[Row], n: int) -> str:
+    lags = of_how_many(rows, "lag_s", n)
+    return f" Lags are means of those that can be told{lags}." if lags else ""
 
 
 def _session_table(rows: list[Row], alone: Mapping[str, Sequence[str]]) -> Table:

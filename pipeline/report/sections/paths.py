@@ -7,6 +7,7 @@ import pandas as pd
 from pipeline.report import figures
 from pipeline.report.document.model import Block, Section
 from pipeline.report.figures.plane import Plane
+from pipeline.report.figures.style import BLACK, colour
 from pipeline.report.prose.accuracy_claims import without_reference
 from pipeline.report.sections.material import Material, first_of
 
@@ -35,7 +36,19 @@ def _first_session(material: Material, used: list[int], plane: Plane) -> list[Bl
     shown = [line for line in dict.fromkeys(lines) if line in recorded]
     if not shown:
         return []
-    return [material.drawn("path", figures.path, tracks, positions, events, shown, plane)]
+    return [material.drawn("path", figures.path, tracks, positions, events, shown, plane, _looks(material, used[0]))]
+
+
+def _looks(material: Material, place: int) -> dict[str, str]:
+    """Estimators and what a session displayed in the colours of other figures: of its condition, of themselves."""
+    study, condition = material.study, material.sessions[place].condition
+    looks = {name: colour(at) for at, name in enumerate(study.estimators)}
+    reference, display = study.stream_of_kind("reference"), study.stream_of_kind("display")
+    if reference is not None:
+        looks[reference] = BLACK
+    if display is not None and condition in study.conditions:
+        looks[display] = colour(study.conditions.index(condition))
+    return looks
 
 
 def _every_participant(material: Material, used: list[int], plane: Plane) -> list[Block]:
@@ -57,7 +70,9 @@ def _every_participant(material: Material, used: list[int], plane: Plane) -> lis
         parts["events"].append(events)
     sessions = pd.DataFrame([material.sessions[place].ids for place in used])
     joined = [pd.concat(parts[name]) for name in _READ]
-    return [material.drawn("paths", figures.paths, *joined, sessions, ordered, plane, more=more)]
+    return [
+        material.drawn("paths", figures.paths, *joined, sessions, ordered, plane, material.study.conditions, more=more)
+    ]
 
 
 def displayed(material: Material, place: int) -> str | None:

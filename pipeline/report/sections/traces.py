@@ -47,11 +47,17 @@ def _of_session(material: Material, place: int, ingested: Path, fused: Path) -> 
         time_s = samples.arrival if kind == "tracker" else samples.time
         order = np.argsort(time_s, kind="stable")
         if len(order):
-            series.append(Series(name, kind, recording.shown_axes(study, name), time_s[order], samples.value[order]))
+            axes, after = recording.shown_axes(study, name), len(study.estimators)
+            series.append(Series(name, kind, axes, time_s[order], samples.value[order], after))
     columns = [f"{axis}_mm" for axis in study.axes]
-    for estimator, rows in tables.read_thinned("tracks", fused).groupby("estimator", sort=False):
+    of_estimator = dict(list(tables.read_thinned("tracks", fused).groupby("estimator", sort=False)))
+    for at, estimator in enumerate(study.estimators):  # the order and the colours of the figures
+        rows = of_estimator.get(estimator)
+        if rows is None:
+            continue
         time_s = (rows["time_ns"].to_numpy(np.int64) - origin_ns) * S_PER_NS
-        series.append(Series(str(estimator), "estimator", study.axes, time_s, rows[columns].to_numpy(np.float64)))
+        values = rows[columns].to_numpy(np.float64)
+        series.append(Series(estimator, "estimator", study.axes, time_s, values, at))
     scene = _scene(material, place, ingested, origin_ns)
     return Traces(session.id, session.participant, session.condition, tuple(series), scene)
 

@@ -143,6 +143,23 @@ def test_a_table_that_goes_over_a_page_leaves_no_row_alone(paragraphs: int, tmp_
     assert not any(counts[:captioned])
 
 
+def test_no_figure_overtakes_another(tmp_path: Path) -> None:
+    """A section that begins with a figure keeps it there, after those of the section before that float."""
+    size = 'width="500pt" height="330pt"'
+    (tmp_path / "a.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {size}></svg>', encoding="utf-8")
+    words = tuple(Paragraph((f"Line {at} of words.",)) for at in range(30))
+    first, second, third, fourth = (Figure(f"f{at}", "a.svg", "A caption.", "A") for at in range(4))
+    sections = (
+        Section("summary", "Summary", (Paragraph(("The answer.",)),)),
+        Section("one", "One", (*words, first, second, third, Paragraph(("The last words.",)))),
+        Section("two", "Two", (fourth,)),
+        Section("three", "Three", (*words[:8],)),
+    )
+    pdf.render(Document("d", "", "", sections), tmp_path, tmp_path / "r.pdf")
+    text = " ".join(page.extract_text() for page in PdfReader(tmp_path / "r.pdf").pages)
+    assert re.findall(r"Figure (\d)\. ?A caption", text) == ["1", "2", "3", "4"]
+
+
 def test_words_after_a_figure_fill_the_page_on_which_it_does_not_fit(tmp_path: Path) -> None:
     size = 'width="500pt" height="400pt"'
     (tmp_path / "a.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {size}></svg>', encoding="utf-8")

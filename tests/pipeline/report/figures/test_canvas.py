@@ -15,6 +15,7 @@ from pipeline.report import figures
 from pipeline.report.figures.hand_paths import points_of
 from pipeline.report.figures.layout import targets_of
 from pipeline.report.figures.selections import ellipse_95, offsets_mm
+from pipeline.report.figures.style import BLACK, COLOURS
 from pipeline.tables import table as tables
 from tests.pipeline.report.figures.drawn import pictures, saved, texts
 
@@ -80,6 +81,15 @@ def test_a_path_has_its_lines_targets_and_selections(session: Any, tmp_path: Pat
     assert "display 200 × 50 mm, fusion 200 × 50 mm; 1 selection." in said
 
 
+def test_a_line_has_its_colour_of_other_figures_and_no_two_have_one(session: Any) -> None:
+    looks = {"display": COLOURS[2], "fusion": COLOURS[2]}
+    tracks, positions, events = session
+    drawn = figures.path(tracks, positions, events, ["display", "fusion"], looks=looks).axes[0].lines
+    assert [line.get_color() for line in drawn] == [COLOURS[2], COLOURS[0]]
+    (line,) = figures.path(tracks, positions, events, ["display"], looks={"display": BLACK}).axes[0].lines
+    assert line.get_color() == BLACK
+
+
 def test_a_path_is_thinned_in_the_order_of_time(session: Any) -> None:
     tracks, positions, _ = session
     points = points_of(tracks.sample(frac=1, random_state=1), positions, "fusion", ("x", "y"))
@@ -100,6 +110,8 @@ def test_every_participant_has_a_panel_and_the_widest_way_is_named(session: Any,
     both = pd.concat([tracks, far])
     sessions = pd.DataFrame({"participant": ["P1", "P2"], "condition": ["a", "a"], "session": ["P1_a", "P2_a"]})
     figure = figures.paths(both, positions, events, sessions, {"a": "fusion"})
+    of_second = figures.paths(both, positions, events, sessions, {"a": "fusion"}, conditions=["z", "a"])
+    assert {line.get_color() for line in of_second.axes[0].lines} == {COLOURS[1]}  # as in every other figure
     shown = texts(figure, tmp_path)
     assert {"P1", "P2", "a: fusion", "x (mm)", "y (mm)"} <= set(shown)
     assert not [text for text in shown if "n = " in text]  # a panel's number is not the figure's
