@@ -103,7 +103,7 @@ def normality(table: pd.DataFrame) -> Figure:
                 marker=mark,
                 linewidths=0,
                 zorder=3,
-                rasterized=len(rows) > MARKS_MAX,
+                rasterized=len(table) > MARKS_MAX,
             )
             whose = zip(some["participant"], some["cell"], strict=True)
             names = [f"{person}, {cell}" if isinstance(cell, str) else str(person) for person, cell in whose]
