@@ -26,8 +26,8 @@ from pipeline.tables.columns import (
     number,
     text,
 )
-from pipeline.tables.pointing_tables import FITTS, FITTS_POINTS, LEARNING
 from pipeline.tables.people_tables import GROUP_MEMBERS, NORMAL_QUANTILES
+from pipeline.tables.pointing_tables import FITTS, FITTS_POINTS, LEARNING
 from pipeline.tables.recording_tables import (
     ACCURACY,
     ACCURACY_MEANS,

@@ -82,7 +82,8 @@ def test_the_lists_of_results_json_and_their_order_are_a_contract() -> None:
 
 
 def test_the_csv_files_are_what_the_report_says_and_the_trials_and_movements_behind_it() -> None:
-    assert set(AS_CSV) == {*IN_STUDY_RESULTS, "selections", "movements", "trials", "measures", "calibration"}
+    behind = {"selections", "movements", "trials", "measures", "calibration", "group_members", "normal_quantiles"}
+    assert set(AS_CSV) == {*IN_STUDY_RESULTS, *behind}
 
 
 def test_each_stage_writes_the_tables_that_name_it(folder: Folder, steadyhand: Steadyhand) -> None:
