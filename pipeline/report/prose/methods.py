@@ -11,10 +11,11 @@ from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON
 from pipeline.statistics.estimation import PERMUTATIONS, RESAMPLES
 from pipeline.study.comparison import Comparison, matching_measures
 from pipeline.study.settings import Study
-from pipeline.study.statistical_tests import TESTS
+from pipeline.study.statistical_tests import TESTS, TUKEY
 from pipeline.study.streams import Sensing
 from pipeline.tables.table import Row
 from pipeline.words.accuracy_reference import SMOOTHED
+from pipeline.words.comparison import over_all_pairs
 from pipeline.words.estimators import estimator_in_words, setting_in_words, settings_in_words
 from pipeline.words.evidence import resampled
 from pipeline.words.names import adjustment_label, measure_as_subject, unit_of, was
@@ -248,6 +249,9 @@ def _estimates(entry: Comparison, rows: Sequence[Row]) -> Iterator[str]:
 def _follow_up(entry: Comparison, rows: Sequence[Row]) -> str:
     """How the pairs after an entry's test were tested and adjusted, if there are any; rows are of its test."""
     pairs = [row for row in rows if row["contrast"] is not None]
+    if any(over_all_pairs(row) for row in pairs) and entry.follow_up != "none":
+        test = "Tukey and Kramer's" if entry.follow_up == TUKEY else "Games and Howell's"
+        return f", followed up pair by pair with {test} test, whose p values hold for all pairs of a measure together"
     has_follow_up = "follow_up" in TESTS[entry.test].options and any(row["adjust"] == entry.follow_up for row in pairs)
     if not has_follow_up or entry.follow_up == "none":
         return ""

@@ -8,6 +8,7 @@ from typing import Any
 from pipeline.report.document.model import Block, Folded, Table, columns
 from pipeline.statistics import OK
 from pipeline.statistics.diagnostics import OUTLIER_RULE
+from pipeline.statistics.tukey import METHOD as TUKEY_KRAMER
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 from pipeline.words.comparison import contrast
@@ -67,10 +68,11 @@ def of_groups(rows: Sequence[Row], study: Study) -> list[Block]:
         )
         for row in tested
     )
+    with_one_sd = " Tukey and Kramer's pairs assume both." if any(row["method"] == TUKEY_KRAMER for row in rows) else ""
     table = Table(
         "table-diagnostics-groups",
         "Are the groups normally distributed, and do they spread alike? A small p speaks against it. Welch's tests"
-        " assume the former, and do not need the latter.",
+        f" assume the former, and do not need the latter.{with_one_sd}",
         columns(("Measure", "Compared", "Shapiro-Wilk p of each group", "Levene's F", "p"), 2),
         cells,
     )
