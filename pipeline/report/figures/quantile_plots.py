@@ -66,8 +66,9 @@ def _words(table: pd.DataFrame) -> Words:
     else:
         found = f"No value lies outside the band{'' if alone else f' in any of the {len(every)} panels'}"
     caption = (
-        "Q-Q plots: values whose normality tests assume, less their mean and over their SD, against the normal"
-        f" quantiles of their ranks; normal ones follow the line. {found}. Grey: pointwise 95 % band of normal values"
+        "Q-Q plots of the values that tests assume to be normal: each value, as so many SDs from the mean of its"
+        " panel, against what the normal distribution gives for its rank. Normal values follow the line."
+        f" {found}. Grey: pointwise 95 % band of normal values"
         " that are standardised by their own mean and SD (beta distribution of ordered values, narrowed by what mean"
         " and SD take up). About 1 in 20 lies outside by chance; several, or a bend, speak against a normal"
         " distribution."

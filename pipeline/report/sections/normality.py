@@ -28,7 +28,7 @@ def plots(material: Material) -> Iterator[Block]:
     more = " Rows: tables/normal_quantiles.csv."
     if len(outside) > _PANELS_MAX:
         more = (
-            f" The {_PANELS_MAX} of {len(outside)} samples with the largest share of values outside; all are in"
+            f" Of {len(outside)} samples {_PANELS_MAX} are drawn, {_which(leaving)}; all are in"
             " tables/normal_quantiles.csv."
         )
     more += _lacking(material, table)
@@ -38,6 +38,13 @@ def plots(material: Material) -> Iterator[Block]:
     )
     figure = material.drawn("normality", figures.normality, shown, more=more)
     yield Folded(summary, (figure,), figures_in_annex=True)
+
+
+def _which(leaving: int) -> str:
+    """Which of many samples have a panel, if so many have values outside their band."""
+    if leaving >= _PANELS_MAX:
+        return "those with the largest share of values outside"
+    return "all that have values outside and the first of the others" if leaving else "the first ones"
 
 
 def _furthest(table: pd.DataFrame, shares: pd.Series) -> pd.DataFrame:
