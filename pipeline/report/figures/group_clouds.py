@@ -40,8 +40,8 @@ def _groups_words(tables: Mapping[str, pd.DataFrame], factor: str, looks: Sequen
     first = next(iter(tables))
     sizes = listed(f"{name} {tables[first][name].count()}" for name in tables[first])
     marks = (
-        " Each small mark is a participant; shapes show their density, pale bars the middle half of them, large marks"
-        " the means with 95 % intervals."
+        " Each small mark is a participant with a value in every condition; shapes show their density, pale bars the"
+        " middle half of them, large marks the means with 95 % intervals."
     )
     if len(tables) > 1:
         head = f"{counted(len(tables), 'scale')} by {factor}; n: {sizes}."

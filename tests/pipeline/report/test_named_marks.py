@@ -89,6 +89,7 @@ def test_groups_that_are_compared_have_a_figure_of_their_own(steadyhand: Steadyh
     page = read(steadyhand, study(tmp_path / "s", TIMES, entries, "factors: {training: between}\n", people))
     assert "Time (s) by training. Means with 95 % intervals: long, A" in page
     assert "Errors by training. Means with 95 % intervals: long " in page
+    assert "Each small mark is a participant with a value in every condition;" in page
     assert "Point at a mark, or tap it, to see whose it is." in page
 
 
