@@ -202,8 +202,8 @@ def _left_out_intercepts(rows: list[Row]) -> Iterator[Text]:
             if variance == 0 and name != "participant":
                 without.setdefault(name, []).append(row)
     for name, concerned in without.items():
-        text = f"of each {name.replace(':', ' × ')}, in the mixed model for {_measures_of(concerned)}: it finds no"
-        yield (Strong("A random intercept is left out, that "), f"{text} variance between them.")
+        text = f"(that of each {name.replace(':', ' × ')}) in the mixed model for {_measures_of(concerned)}: it finds no"
+        yield (Strong("A random intercept is left out "), f"{text} variance between them.")
 
 
 def _skewed_or_unequal(row: Row) -> bool:

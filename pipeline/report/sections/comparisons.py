@@ -109,7 +109,7 @@ def _methods_of(rows: Sequence[Row]) -> str:
     whole = list(dict.fromkeys(method_in_words(row) for row in rows if row["contrast"] is None))
     pairs = list(dict.fromkeys(method_in_words(row) for row in rows if row["contrast"] is not None))
     whole = [one for one in whole if f"{one}, {CORRECTED}" not in whole]
-    if not (whole and pairs):
+    if not pairs or not whole or pairs == whole:
         return ", or ".join(whole or pairs)
     return f"{', or '.join(whole)}, its pairs by {', or '.join(pairs)}"
 

@@ -74,7 +74,7 @@ def test_targets_without_variance_are_left_out_and_said(tmp_path: Path, steadyha
     (row,) = steadyhand.results()["comparisons"]
     assert row["status"] == "ok"
     assert row["details"]["variances"]["target"] == 0
-    assert "A random intercept is left out, that of each target, in the mixed model for M" in page
+    assert "A random intercept is left out (that of each target) in the mixed model for M" in page
     assert "singular fit, estimated as zero and left out: " in page
 
 

@@ -304,6 +304,7 @@ def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Fol
     assert "Bonferroni-adjusted p" in text
     assert "Singular fit of the mixed model for M: it finds no variance between participants" in text
     assert "singular fit: no variance between participants is found" in text
+    assert "its pairs by linear mixed model" not in text  # all rows of a model have one method
 
 
 @pytest.mark.usefixtures("blank_figures")
