@@ -235,6 +235,7 @@ def _unescaped(value: str) -> str:
 
 def _unmarked(text: str) -> str:
     text = text.replace("``", "“").replace("''", "”").replace("--", "–")
+    text = re.sub(r"`([^`]*?)'(?![\w'])", r"‘\1’", text)  # an apostrophe within, as of Student's, stays one
     return re.sub(r"[{}]", "", re.sub(r"\\([#$%&_])", r"\1", text))
 
 

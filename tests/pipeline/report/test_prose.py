@@ -17,7 +17,7 @@ from pipeline.analysis.comparisons import compared as rows_of
 from pipeline.analysis.complete_cases import Values
 from pipeline.analysis.descriptives import descriptives, means_of_measures
 from pipeline.report.prose.glossary import explained
-from pipeline.report.prose.references import bibliography, escaped, used
+from pipeline.report.prose.references import bibliography, entries, escaped, used
 from pipeline.report.sections.comparisons import anchor
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -314,3 +314,8 @@ def test_a_report_has_words_to_paste_that_lead_to_their_rows(folder: Folder, ste
     assert "Bayes factor, BF₁₀" in text
     # What is pasted holds no links to the report: a page leaves them out of the copy, print leaves them out.
     assert "[row]" not in "".join(sheet.extract_text() for sheet in PdfReader(steadyhand.out / "report.pdf").pages)
+
+
+def test_a_quoted_word_of_a_title_is_in_quotation_marks() -> None:
+    assert "(1947). The generalization of ‘Student's’ problem when" in entries()["welch1947"].text
+    assert "SUS: A “quick and dirty” usability scale" in entries()["brooke1996"].text
