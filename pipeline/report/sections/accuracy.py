@@ -192,7 +192,7 @@ def _session_table(rows: list[Row], alone: Mapping[str, Sequence[str]]) -> Table
     )
     return Table(
         "table-accuracy-sessions",
-        f"The same for each session, the lag with its 95 % interval.{more}",
+        f"Accuracy of each estimator in each session, the lag with its 95 % interval.{more}",
         columns(titles, 2),
         cells,
         "Intervals of the lag: moving-block bootstrap, blocks of 0.5 s.",
