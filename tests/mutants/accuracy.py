@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from tests.fusion_core.accuracy import test_accuracy
+from tests.fusion_core.accuracy import test_accuracy, test_not_claimed, test_stretches
 from tests.mutants.mutant import Mutant
 from tests.pipeline.sessions import test_hand_paths, test_movements
 
-_ACCURACY = (test_accuracy,)
+_ACCURACY = (test_accuracy, test_not_claimed, test_stretches)
 _MOVEMENTS = (test_hand_paths, test_movements)
 
 MUTANTS = (
@@ -60,6 +60,5 @@ MUTANTS = (
     # How people moved.
     Mutant("_PROMINENCE_MIN = 0.1  #", "_PROMINENCE_MIN = 0.05  #", _MOVEMENTS),
     Mutant("float(np.std(deviations, ddof=1))", "float(np.std(deviations))", _MOVEMENTS),
-    Mutant("= np.log2(amplitude / width + 1)", "= np.log2(amplitude / width)", _MOVEMENTS),
     Mutant("return max(0, len(peaks) - 1)", "return len(peaks)", _MOVEMENTS),
 )

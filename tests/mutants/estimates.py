@@ -57,5 +57,6 @@ MUTANTS = (
     # Fitts' law.
     Mutant("stats.t.ppf(0.975, m - 2)", "stats.t.ppf(0.975, m - 1)", _LAWS),
     Mutant("float(np.mean(x / y))", "float(np.mean(x) / np.mean(y))", _LAWS),
+    Mutant("= np.log2(amplitude / width + 1)", "= np.log2(amplitude / width)", _LAWS),
     Mutant("np.log2(amplitude / width + 1), time, own", "np.log2(2 * amplitude / width), time, own", _LAWS),
 )

@@ -25,6 +25,7 @@ def of(time: FloatArray, value: FloatArray) -> Samples:
 def test_rmse_and_stated_sd_are_euclidean() -> None:
     assert accuracy.rmse(np.array([[3.0, 4.0], [0.0, 0.0]]), np.zeros((2, 2))) == pytest.approx(np.sqrt(12.5))
     assert accuracy.stated_sd(np.full((4, 3), 2.0)) == pytest.approx(2 * np.sqrt(3))
+    assert accuracy.stated_sd(np.array([[3.0, 4.0], [0.0, 0.0]])) == pytest.approx(np.sqrt(12.5))
 
 
 def test_coverage_counts_instants_and_axes() -> None:
@@ -95,6 +96,22 @@ def test_lag_is_what_all_costs_give(late_s: float, speed: float) -> None:
         assert np.isnan(found.value)
     else:
         np.testing.assert_allclose([found.value, found.low, found.high], expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lag_is_what_all_costs_give_where_a_hand_goes_to_and_fro(seed: int) -> None:
+    """Four times a second, so that shifts a quarter of a second apart fit about as well in a noisy track."""
+    random = np.random.default_rng(seed)
+    known, time = np.arange(-1, 7, 1 / 100), np.arange(0, 6, 1 / 60)
+
+    def to_and_fro(at: FloatArray) -> FloatArray:
+        return (100 * np.sin(8 * np.pi * at) + 20 * np.sin(3 * at))[:, None]
+
+    estimate = to_and_fro(time - 0.05) + random.normal(0, 60, (360, 1))
+    reference = of(known, to_and_fro(known))
+    found = accuracy.lag(time, estimate, reference, np.random.default_rng(9))
+    expected = plain_lag(time, estimate, reference, np.random.default_rng(9))
+    np.testing.assert_allclose([found.value, found.low, found.high], expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("ahead_s", [0.11, -0.05])
