@@ -6,7 +6,9 @@ from tests.mutants.mutant import Mutant
 from tests.pipeline.statistics import (
     test_against_r,
     test_counterbalancing,
+    test_diagnostics,
     test_equivalence_and_bayes,
+    test_few_people,
     test_follow_ups,
     test_friedman,
     test_groups,
@@ -18,12 +20,16 @@ from tests.pipeline.statistics import (
     test_power_designs,
     test_round_off,
     test_scoring,
+    test_search,
     test_statistics,
 )
 
 _TESTS = (test_against_r, test_statistics)
 _MODELS = (test_models, test_equivalence_and_bayes, test_follow_ups)
 _POWER = (test_power,)
+_FEW = (test_few_people,)
+_DIAGNOSTICS = (test_diagnostics,)
+_SEARCH = (test_search,)
 _ORDERS = (test_counterbalancing,)
 _FRIEDMAN = (test_friedman, test_against_r, test_statistics)
 _GROUPS = (test_groups,)
@@ -45,7 +51,7 @@ MUTANTS = (
     Mutant(
         "min(1.0, ((error_df + 1) * d * gg - 2) / (d * room))", "((error_df + 1) * d * gg - 2) / (d * room)", _TESTS
     ),
-    Mutant("if error_df >= d:", "if error_df > d:", _TESTS),
+    Mutant("if error_df >= d:", "if error_df > d:", _FEW),
     Mutant("float(np.prod(levels) * np.sum(", "float(np.sum(", _TESTS),
     Mutant('squared": explained / (explained + error)', 'squared": explained / (explained + df2 * error)', _TESTS),
     Mutant("-df * rho * np.log(w), d * (d + 1) / 2 - 1", "-df * rho * np.log(w), d * (d + 1) / 2", _TESTS),
@@ -64,15 +70,15 @@ MUTANTS = (
     Mutant("df = len(values) - 2", "df = len(values) - 1", _MODELS),
     Mutant("differences, early, (0.5, -0.5)", "differences, early, (-0.5, 0.5)", _MODELS),
     Mutant("(1 / len(groups[0]) + 1 / len(groups[1]))", "(4 / len(values))", _MODELS),
-    Mutant("elif n < 3:", "elif n < 2:", _MODELS),
-    Mutant("elif early.all() or not early.any():", "elif early.all():", _MODELS),
+    Mutant("elif n < 3:", "elif n < 2:", _FEW),
+    Mutant("elif early.all() or not early.any():", "elif early.all():", _FEW),
     # Descriptives and diagnostics.
     Mutant("stats.t.ppf(0.975, n - 1)) * float(np.std(", "stats.t.ppf(0.975, n)) * float(np.std(", _TESTS),
     Mutant('row["sd"] = float(np.std(values, ddof=1))', 'row["sd"] = float(np.std(values))', _TESTS),
-    Mutant("_FAR_OUT = 3.5", "_FAR_OUT = 3.0", _MODELS),
-    Mutant("_NORMAL_QUARTILE = 0.6745", "_NORMAL_QUARTILE = 1.0", _MODELS),
-    Mutant("np.abs(_NORMAL_QUARTILE * apart / spread)", "_NORMAL_QUARTILE * apart / spread", _MODELS),
-    Mutant("if 3 <= len(values) <= _SHAPIRO_UP_TO", "if 4 <= len(values) <= _SHAPIRO_UP_TO", _MODELS),
+    Mutant("_FAR_OUT = 3.5", "_FAR_OUT = 3.0", _DIAGNOSTICS),
+    Mutant("_NORMAL_QUARTILE = 0.6745", "_NORMAL_QUARTILE = 1.0", _DIAGNOSTICS),
+    Mutant("np.abs(_NORMAL_QUARTILE * apart / spread)", "_NORMAL_QUARTILE * apart / spread", _DIAGNOSTICS),
+    Mutant("if 3 <= len(values) <= _SHAPIRO_UP_TO", "if 4 <= len(values) <= _SHAPIRO_UP_TO", _DIAGNOSTICS),
     # Effect sizes.
     Mutant(
         "standardized_interval(float(dz * np.sqrt(n)), n - 1,",
@@ -130,7 +136,7 @@ MUTANTS = (
     Mutant("others = np.full((1, count), 1 / count)", "others = np.eye(count)[:1]", _MODELS),
     Mutant("np.eye(count)[0] - np.eye(count)[1:] if", "np.eye(count)[1:] - np.eye(count)[0] if", _MODELS),
     Mutant("np.zeros(hypotheses.shape[1]), -hypotheses", "np.zeros(hypotheses.shape[1]), hypotheses", _MODELS),
-    Mutant("people + inside - terms < 1", "people + inside - terms < 0", _MODELS),
+    Mutant("people + inside - terms < 1", "people + inside - terms < 0", _FEW),
     # Paired differences.
     Mutant("np.std(values, ddof=1) / np.sqrt(n))", "np.std(values) / np.sqrt(n))", _TESTS),
     Mutant("df = summary.n - 1\n    statistic, margin", "df = summary.n\n    statistic, margin", _TESTS),
@@ -172,8 +178,8 @@ MUTANTS = (
     Mutant(
         "1 + int(1 - np.log2(design.alpha))", "int(1 - np.log2(design.alpha))", _POWER, "only where the search begins"
     ),
-    Mutant("share(n).interval()[1] >= power", "share(n).interval()[0] >= power", _POWER),
-    Mutant("below, reached, at, step = low - 1, high + 1", "below, reached, at, step = low, high + 1", _POWER),
+    Mutant("share(n).interval()[1] >= power", "share(n).interval()[0] >= power", _SEARCH),
+    Mutant("below, reached, at, step = low - 1, high + 1", "below, reached, at, step = low, high + 1", _SEARCH),
     # Rank tests.
     Mutant("min(w_plus, float(ranks.sum()) - w_plus)", "w_plus", _TESTS),
     Mutant("min(1.0, 2 * _lower_tail(", "min(1.0, _lower_tail(", _TESTS),
@@ -182,7 +188,7 @@ MUTANTS = (
     ),
     Mutant("(1 - level) / 2 * (1 + 1e-12)", "(1 - level) * (1 + 1e-12)", _TESTS),
     Mutant("np.triu_indices(n)", "np.triu_indices(n, 1)", _TESTS),
-    Mutant("(n * squares - k * expected**2)", "(n * n * (k**3 - k) / 12)", _TESTS),
+    Mutant("(n * squares - k * expected**2)", "(n * n * (k**3 - k) / 12)", _FRIEDMAN),
     Mutant("statistic = n * (k - 1) * agreement", "statistic = n * k * agreement", _TESTS),
     Mutant("stats.f.sf(f, k - 1, (k - 1) * (n - 1))", "stats.f.sf(f, k - 1, k * (n - 1))", _TESTS),
     Mutant("n * whole - (n - 1) * without", "n * whole - n * without", _TESTS),

@@ -105,7 +105,7 @@ def test_lag_is_what_all_costs_give_where_a_hand_goes_to_and_fro(seed: int) -> N
     known, time = np.arange(-1, 7, 1 / 100), np.arange(0, 6, 1 / 60)
 
     def to_and_fro(at: FloatArray) -> FloatArray:
-        return (100 * np.sin(8 * np.pi * at) + 20 * np.sin(3 * at))[:, None]
+        return np.column_stack([100 * np.sin(8 * np.pi * at) + 20 * np.sin(3 * at)])
 
     estimate = to_and_fro(time - 0.05) + random.normal(0, 60, (360, 1))
     reference = of(known, to_and_fro(known))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fusion_core import Samples
-from fusion_core.accuracy import noise, stretches
+from fusion_core.accuracy import BoolArray, noise, stretches
 from pipeline.statistics.arrays import FloatArray
 
 
@@ -31,7 +31,7 @@ def test_the_longest_stretch_is_not_the_latest() -> None:
     assert noise.longest([]) is None
 
 
-def held(time: FloatArray, still: FloatArray, rest: FloatArray) -> Samples:
+def held(time: FloatArray, still: BoolArray, rest: FloatArray) -> Samples:
     """Accelerations that go to and fro by 1 mm/s² where the hand is still and by 3000 mm/s² elsewhere."""
     fro = np.where(np.arange(len(time)) % 2 == 0, 1.0, -1.0)
     return Samples(time, time, (rest + fro * np.where(still, 1.0, 3000.0))[:, None])
