@@ -11,6 +11,7 @@ from tests.pipeline.analysis.audit import (
     test_p_values,
     test_printed_files,
     test_signed_rank,
+    test_totals,
 )
 from tests.pipeline.sessions import test_movements, test_replay, test_sessions, test_set_aside
 from tests.pipeline.simulation import test_simulation
@@ -167,7 +168,11 @@ MUTANTS = (
         "factor = Fraction(1, len(parts)) if total.sum is not None",
         _AUDIT,
     ),
-    Mutant("return ceil((low - possible.low) / grain) <= floor((high - possible.low) / grain)", "return True", _AUDIT),
+    Mutant(
+        "return ceil((low - possible.low) / grain) <= floor((high - possible.low) / grain)",
+        "return True",
+        (test_totals,),
+    ),
     Mutant(
         "exact = Fraction(100 * share.count, share.of)", "exact = Fraction(100 * share.count, share.of + 1)", _AUDIT
     ),
