@@ -6,6 +6,7 @@ from tests.mutants.mutant import Mutant
 from tests.pipeline.analysis import test_cases, test_design_check, test_measure
 from tests.pipeline.analysis.audit import (
     test_audit,
+    test_conventions,
     test_granularity,
     test_no_false_accusation,
     test_p_values,
@@ -198,11 +199,11 @@ MUTANTS = (
     Mutant(
         "half, rest = (low / 2, high / 2), (1 - high / 2, 1 - low / 2)",
         "half, rest = (low / 2, high / 2), (1 - high, 1 - low)",
-        (test_no_false_accusation, test_audit),
+        (test_conventions,),
     ),
     Mutant("sqrt(n) * _ratio(low, first[1] + second[1])", "sqrt(n) * _ratio(low, max(first[1], second[1]))", _AUDIT),
     Mutant("variance * (n - 1) for variance, n in zip", "variance * n for variance, n in zip", _AUDIT),
-    Mutant("factor = sqrt(cell.n / (cell.n - 1)) if cell.population else 1.0", "factor = 1.0", _AUDIT),
+    Mutant("factor = sqrt(cell.n / (cell.n - 1)) if cell.population else 1.0", "factor = 1.0", (test_conventions,)),
     Mutant(
         "room = max((float(step.max()) for step in steps if step.size), default=0.0)",
         "room = 0.0",
