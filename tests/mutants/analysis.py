@@ -207,7 +207,7 @@ MUTANTS = (
     Mutant(
         "room = max((float(step.max()) for step in steps if step.size), default=0.0)",
         "room = 0.0",
-        (test_p_values, *_AUDIT),
+        (test_p_values,),
     ),
     Mutant("2 * stats.t.sf(abs(statistic), df[0])", "stats.t.sf(abs(statistic), df[0])", (test_p_values,)),
     Mutant("np.sqrt(1 - min(abs(statistic), 1.0) ** 2)", "(1 - min(abs(statistic), 1.0) ** 2)", (test_p_values,)),
