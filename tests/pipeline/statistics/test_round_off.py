@@ -105,6 +105,12 @@ def everything(size: float) -> list[Result]:
     ]
 
 
+def test_differences_that_are_known_to_a_few_units_only_are_no_ties() -> None:
+    """At 10¹⁵ floats lie an eighth apart, and 64 of these are 8: a difference of 6 may be none; 10 and 12 are two."""
+    first = 1e15 + np.array([6.125, 10.125, 12.125])
+    assert rounded_differences(first, np.full(3, 1e15)).tolist() == [0.0, 10.125, 12.125]
+
+
 # Laws -----------------------------------------------------------------------------------------------------------
 
 decimals = st.integers(-12, 6).flatmap(

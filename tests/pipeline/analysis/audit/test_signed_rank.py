@@ -18,6 +18,7 @@ from pipeline.analysis.audit.signed_rank import (
     exact_tails,
     normal_p_possible,
     smallest_p,
+    sum_fits,
     untied_p_possible,
 )
 from pipeline.statistics.wilcoxon import signed_rank_p
@@ -141,3 +142,29 @@ def test_larger_n_are_judged_by_a_witness(n: int) -> None:
     p = stats.wilcoxon(differences, method="exact").pvalue
     assert untied_p_possible(n, Rounded.read(f"{p:.4f}").interval, 2)
     assert not untied_p_possible(n, at(Fraction(1, 2**n)), 2)
+
+
+@pytest.mark.parametrize("n", [4, 5, 6])
+def test_of_a_rank_sum_of_nought_p_is_that_with_or_without_the_correction_for_continuity(n: int) -> None:
+    """|W − T/2| = n(n + 1)/4, less a half with it, over √(n(n + 1)(2n + 1)/24). SciPy gives both as well."""
+    by_correction = {}
+    for correction in (False, True):
+        size = n * (n + 1) / 4 - (0.5 if correction else 0.0)
+        p = 2 * stats.norm.sf(size / np.sqrt(n * (n + 1) * (2 * n + 1) / 24))
+        ranked = np.arange(1.0, n + 1)
+        assert p == pytest.approx(stats.wilcoxon(ranked, correction=correction, method="approx").pvalue)
+        by_correction[correction] = Rounded.read(f"{p:.4f}").interval
+        assert normal_p_possible(n, by_correction[correction], 2, of_nought)
+    between = (by_correction[False].high + by_correction[True].low) / 2
+    assert not normal_p_possible(n, at(between), 2, of_nought)
+
+
+def of_nought(doubled: int, doubled_total: int) -> bool:
+    return sum_fits(at(Fraction(0)), doubled, doubled_total)
+
+
+@pytest.mark.parametrize("n", [3, 5, 20])
+def test_the_smallest_exact_p_is_that_of_differences_of_one_sign(n: int) -> None:
+    for sides, alternative in ((2, "two-sided"), (1, "greater")):
+        p = stats.wilcoxon(np.arange(1.0, n + 1), alternative=alternative, method="exact").pvalue
+        assert smallest_p(n, sides, "exact") == pytest.approx(p)
