@@ -165,6 +165,7 @@ def of_nought(doubled: int, doubled_total: int) -> bool:
 
 @pytest.mark.parametrize("n", [3, 5, 20])
 def test_the_smallest_exact_p_is_that_of_differences_of_one_sign(n: int) -> None:
-    for sides, alternative in ((2, "two-sided"), (1, "greater")):
+    alternatives: dict[int, Literal["two-sided", "greater"]] = {2: "two-sided", 1: "greater"}
+    for sides, alternative in alternatives.items():
         p = stats.wilcoxon(np.arange(1.0, n + 1), alternative=alternative, method="exact").pvalue
         assert smallest_p(n, sides, "exact") == pytest.approx(p)
