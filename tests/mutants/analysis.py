@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.mutants.mutant import Mutant
 from tests.pipeline.analysis import test_cases, test_design_check, test_measure
+from tests.pipeline.analysis import test_totals as test_questionnaire_totals
 from tests.pipeline.analysis.audit import (
     test_audit,
     test_conventions,
@@ -37,7 +38,11 @@ _REPLAY = (test_replay,)
 
 MUTANTS = (
     # From trials and tables to values.
-    Mutant('if "total" in scales or not has_total(str(questionnaire)):', 'if "total" in scales:', _MEASURE),
+    Mutant(
+        'if "total" in scales or not has_total(str(questionnaire)):',
+        'if "total" in scales:',
+        (test_questionnaire_totals,),
+    ),
     Mutant('if set(rated["scale"]) == scales:', 'if set(rated["scale"]) <= scales:', _MEASURE),
     Mutant('rated["value"].sum(), rated["n"].min()', 'rated["value"].mean(), rated["n"].min()', _MEASURE),
     Mutant(
