@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.mutants.mutant import Mutant
-from tests.pipeline.analysis import test_cases, test_design_check, test_measure
+from tests.pipeline.analysis import test_cases, test_design_check, test_measure, test_orders
 from tests.pipeline.analysis import test_totals as test_questionnaire_totals
 from tests.pipeline.analysis.audit import (
     test_audit,
@@ -121,13 +121,18 @@ MUTANTS = (
     # Orders, and the check of a design.
     Mutant("SOURCES = (LOGS, MEASURES, PARTICIPANTS)", "SOURCES = (PARTICIPANTS, MEASURES, LOGS)", _DESIGN),
     Mutant("len(listed) > 1 and len(set(listed)) == len(listed)", "len(listed) > 1", _DESIGN),
-    Mutant("whole.index(session.condition) + 1", "whole.index(session.condition)", _DESIGN),
+    Mutant("whole.index(session.condition) + 1", "whole.index(session.condition)", (test_orders,)),
     Mutant(
         'once = once[~once.duplicated(["participant", "condition"], keep=False)]',
         'once = once[~once.duplicated(["participant", "condition"])]',
-        _DESIGN,
+        (test_orders,),
     ),
-    Mutant("max(times) - min(times) <= (1 if over else 0)", "max(times) - min(times) <= 1", _DESIGN),
+    Mutant(
+        "max(times) - min(times) <= (1 if over else 0)",
+        "max(times) - min(times) <= 1",
+        _DESIGN,
+        "where nobody is over, the mean of the counts is a whole number, so counts that differ do so by two or more",
+    ),
     Mutant("max(times) - min(times) <= (1 if over else 0)", "max(times) - min(times) <= 0", _DESIGN),
     Mutant("remark if result.p < alpha else None", "remark if result.p > alpha else None", _DESIGN),
     Mutant('("condition", "factor(period)"), "period")', '("condition", "period"), "period")', _DESIGN),
