@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -14,7 +15,7 @@ from pipeline.report.figures.wording import listed, mean_with_interval, spaced
 from pipeline.words.names import measure_label, short_label, unit_of
 from pipeline.words.phrases import counted
 
-_LETTERS = 84  # below a panel as wide as the page
+_LETTERS = 84  # beside each other below panels as wide as the page
 
 
 def by_group(wide: pd.DataFrame, groups: Mapping[str, str], names: Sequence[str], conditions: bool) -> pd.DataFrame:
@@ -66,10 +67,18 @@ def groups(tables: Mapping[str, pd.DataFrame], factor: str, looks: Sequence[int]
     alone = len(tables) == 1
     figure, every, across = multiples(len(tables), 2.4 if alone else 1.9, a_row=1 if alone else 2, sharex=False)
     for index, (axes, (measure, wide)) in enumerate(zip(every, tables.items(), strict=True)):
-        drawn = Drawn(method_of(wide, measure), unit_of(measure), looks, letters=_LETTERS)
+        drawn = Drawn(method_of(wide, measure), unit_of(measure), looks)
         rainclouds(axes, wide, drawn, small=not alone, joined=wide)
+        length = max(8, _LETTERS // (across * len(wide.columns)))
+        axes.set_xticks(range(len(wide.columns)), [_in_lines(name, length) for name in wide.columns])
         axes.set_title(f"{as_label(short_label(measure), 40)} by {as_label(factor, 20)}")
         if index % across == 0:
             axes.set_ylabel(as_label(measure_label(measure)) if alone else "Rating")
     from_zero(every[0], tables.values())
     return figure
+
+
+def _in_lines(column: str, length: int) -> str:
+    """A group's name in lines so long, two at most, and below it the condition's: cut, groups could look alike."""
+    parts = (as_label(part, 2 * length - 1) for part in column.rsplit(", ", 1))
+    return "\n".join(line for part in parts for line in wrap(part, length)[:2])

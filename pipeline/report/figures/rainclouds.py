@@ -195,12 +195,11 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
 
 
 class Drawn(NamedTuple):
-    """How the intervals of means are computed, the measure's unit, which colours, and how many characters fit below."""
+    """How the intervals of means are computed, the measure's unit, and which colours."""
 
     method: str = T
     unit: str = ""
     looks: Sequence[int] = ()
-    letters: int = 40
 
 
 def rainclouds(
@@ -229,7 +228,7 @@ def rainclouds(
                 index + side * _BESIDE, *ends, color=colour(looks[index]), linewidth=3.5 if small else 5, zorder=4
             )
         _raincloud(axes, index, side, wide[condition], (colour(looks[index]), marker(looks[index])), drawn)
-    length = max(8, (24 if small else drawn.letters) // len(at))
+    length = max(8, (24 if small else 40) // len(at))
     axes.set_xticks(at, [as_label(condition, length) for condition in wide.columns])
     axes.set_xlim(-0.6, len(at) - 0.4)
     grouped(axes)

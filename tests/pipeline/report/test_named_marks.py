@@ -11,7 +11,7 @@ import pytest
 from pipeline.report import figures
 from pipeline.report.document.compact_svg import compact
 from pipeline.report.document.pictures import pictures
-from pipeline.report.figures.group_clouds import by_group
+from pipeline.report.figures.group_clouds import by_group, groups
 from pipeline.report.figures.named_marks import named_marks
 from tests.pipeline.analysis.test_options import TIMES, Values, read, study
 from tests.pipeline.helpers import Steadyhand
@@ -81,6 +81,15 @@ def test_groups_are_columns_and_a_condition_of_each_where_both_matter() -> None:
     cells = by_group(wide, group_of, ["none", "long"], conditions=True)
     assert list(cells) == ["none, A", "none, B", "long, A", "long, B"]
     assert cells.loc["P1"].dropna().to_dict() == {"long, A": 1.0, "long, B": 3.0}
+
+
+def test_groups_with_long_names_are_told_apart_below_small_panels() -> None:
+    values = pd.Series([1.0, 2.0, 4.0])
+    names = ["short course, kinect", "short course, fusion", "short talk, kinect", "short talk, fusion"]
+    wide = pd.DataFrame(dict.fromkeys(names, values))
+    figure = groups({f"nasa_tlx/{scale}": wide for scale in ("mental", "physical", "effort")}, "training")
+    labels = [tick.get_text() for tick in figure.axes[0].get_xticklabels()]
+    assert labels == ["short\ncourse\nkinect", "short\ncourse\nfusion", "short talk\nkinect", "short talk\nfusion"]
 
 
 def test_groups_that_are_compared_have_a_figure_of_their_own(steadyhand: Steadyhand, tmp_path: Path) -> None:
