@@ -135,7 +135,7 @@ def lines_for_first_page(lines: Sequence[Line], most: int = LINES_MAX) -> list[L
 def notes(results: Mapping[str, Any]) -> str:
     """The note below the table: which way differences go, how many participants, which p is shown, and its level."""
     study = results["study"]
-    pairs = _pairs_in_question(results["comparisons"], study["conditions"], study["question"])
+    pairs = list(_pairs_in_question(results["comparisons"], study["conditions"], study["question"]))
     rows = [row for row, _ in pairs if row["status"] == OK]
     counts = sorted({row["n"] for row in rows})
     people = "" if not counts else f" n = {counts[0]}" + (f" to {counts[-1]}" if len(counts) > 1 else "") + "."
@@ -157,8 +157,21 @@ def notes(results: Mapping[str, Any]) -> str:
     shifts = f"{_SHIFT}: Hodges and Lehmann's estimate, which belongs to rank tests." if any_shift else ""
     estimates = any(row["effect_size_name"] == "estimate" for row in rows)
     alone = " Effect size –: a model has none but its estimate, which is the difference." if estimates else ""
-    marks = f"{ratios}.{roots}{shifts}{alone}"
+    marks = f"{ratios}.{roots}{shifts}{alone}{_without_means(results, pairs)}"
     return f"Differences and effect sizes: the first named minus the other{marks}{people} {kind}; {level}."
+
+
+def _without_means(results: Mapping[str, Any], pairs: Sequence[tuple[Row, tuple[str, str]]]) -> str:
+    """Why a line shows no means although the tables have them; empty where none lacks them."""
+    described = {(row["measure"], row["condition"]): row for row in results["descriptives"]}
+    for row, names in pairs:
+        one, other = (described.get((row["measure"], name)) for name in names)
+        if row["status"] == OK and one and other and _means(row, one, other) == NO_VALUE:
+            return (
+                " Means –: those in the tables need not agree with the difference, which is of other participants,"
+                " weighs them otherwise, or is a model's estimate."
+            )
+    return ""
 
 
 def _pairs_in_question(

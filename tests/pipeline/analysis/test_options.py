@@ -386,3 +386,12 @@ def test_a_model_says_that_its_estimate_is_all_it_has(tmp_path: Path, steadyhand
     assert "Effect size –: a model has none but its estimate, which is the difference." in page
     paired = read(steadyhand, study(tmp_path / "paired", TIMES, ["measure: time_s, test: t_paired"]))
     assert "Effect size –" not in paired
+
+
+def test_why_a_line_has_no_means_is_said(tmp_path: Path, steadyhand: Steadyhand) -> None:
+    entry = ["measure: time_s, test: t_paired"]
+    one_lacks_b: Values = {"time_s": {"A": TIMES["time_s"]["A"], "B": TIMES["time_s"]["B"][:-1]}}
+    page = read(steadyhand, study(tmp_path / "study", one_lacks_b, entry))
+    assert "Means –: those in the tables need not agree with the difference, which is of other participants," in page
+    whole = read(steadyhand, study(tmp_path / "whole", TIMES, entry))
+    assert "Means –" not in whole
