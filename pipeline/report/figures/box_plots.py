@@ -21,7 +21,7 @@ from pipeline.report.figures.style import (
     panels,
     styled,
 )
-from pipeline.report.figures.wording import complete_counts
+from pipeline.report.figures.wording import counts_of_columns
 from pipeline.words.names import short_label
 from pipeline.words.phrases import counted, listing
 
@@ -31,8 +31,8 @@ def _workload_words(wide: Mapping[str, pd.DataFrame]) -> Words:
     conditions = list(next(iter(wide.values())).columns)
     names = listing([short_label(name) for name in wide])
     head = (
-        f"Ratings by scale and condition ({complete_counts(wide)}): boxes show the middle half of the participants, the"
-        " thick line is the median, marks are single participants."
+        f"Ratings by scale and condition ({counts_of_columns(wide)} a box): boxes show the middle half of the"
+        " participants, the thick line is the median, marks are single participants."
     )
     alt = f"Box plots of {names} for {listing(conditions)}."
     if len(conditions) > 1:

@@ -33,6 +33,13 @@ def spaced(unit: str) -> str:
     return f" {unit}" if unit else ""
 
 
+def counts_of_columns(wide: Mapping[str, pd.DataFrame]) -> str:
+    """`n = 12`, or `n = 10 to 12` where columns differ in how many participants have a value in them."""
+    counts = [int(count) for table in wide.values() for count in table.count()]
+    low, high = min(counts), max(counts)
+    return f"n = {low}" if low == high else f"n = {low} to {high}"
+
+
 def complete_counts(wide: Mapping[str, pd.DataFrame]) -> str:
     """`n = 12 complete`, or `n = 10 to 12 complete` where the measures differ in how many are complete."""
     complete = [len(table.dropna()) for table in wide.values()]

@@ -55,13 +55,16 @@ def _furthest(table: pd.DataFrame, shares: pd.Series) -> pd.DataFrame:
 
 
 def _lacking(material: Material, table: pd.DataFrame) -> str:
-    """Which measures have no panel, although a test of them assumes normality."""
+    """What has no panel, although a test of it assumes normality."""
     assumed = [row["measure"] for row in material.rows("comparisons") if _assumes(row["test"])]
     missing: Sequence[str] = [name for name in dict.fromkeys(assumed) if name not in set(table["measure"])]
-    if not missing:
-        return ""
-    names = listing([measure_label(name) for name in missing])
-    return f" Without a panel, for fewer than three values or none that vary: {names}."
+    said = ""
+    if missing:
+        names = listing([measure_label(name) for name in missing])
+        said = f" Without a panel, for fewer than three values or none that vary: {names}."
+    if any(row["test"] == "mixed_anova" and row["contrast"] is not None for row in material.rows("comparisons")):
+        said += " The pairs that follow up a mixed ANOVA have no panels of their own."
+    return said
 
 
 def _assumes(test: str) -> bool:

@@ -62,6 +62,7 @@ def test_three_conditions_have_residuals_and_their_pairs(steadyhand: Steadyhand,
     assert kinds(rows) == {("time_s", "residuals", "condition"): 24} | pairs
     assert {row["cell"] for row in rows if row["kind"] == "residuals"} == {"A", "B", "C"}
     assert "Rows: tables/normal_quantiles.csv." in page
+    assert "no panels of their own" not in page
 
 
 def test_rank_tests_need_no_plot_and_a_sample_is_drawn_once(steadyhand: Steadyhand, tmp_path: Path) -> None:
@@ -95,6 +96,7 @@ def test_groups_and_mixed_designs_and_models_have_their_own(steadyhand: Steadyha
         ("time_s", "residuals", "condition"): 10 + 20,  # one of each person, and of the model one of each value
     }
     assert re.search(r"outside the 95 % band in \d of 5 samples", page)
+    assert "The pairs that follow up a mixed ANOVA have no panels of their own." in page
 
 
 def test_a_measure_without_a_plot_is_named(steadyhand: Steadyhand, tmp_path: Path) -> None:

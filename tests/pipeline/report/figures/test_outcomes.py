@@ -125,6 +125,13 @@ def test_odd_data_are_drawn_and_described(values: list[list[float]], tmp_path: P
         assert "nan" not in f"{said.caption}{said.alt}"
 
 
+def test_boxes_hold_whoever_has_a_value_and_the_caption_counts_them() -> None:
+    wide = TIMES.assign(fusion=[np.nan, *TIMES["fusion"][1:]])
+    n = len(TIMES)
+    assert f"(n = {n} a box)" in figures.workload.words({"q/one": TIMES}).caption
+    assert f"(n = {n - 1} to {n} a box)" in figures.workload.words({"q/one": TIMES, "q/two": wide}).caption
+
+
 def test_one_condition_has_no_differences() -> None:
     wide = TIMES[["kinect"]]
     assert len(figures.paired(wide, MEASURE).axes) == 1
