@@ -41,8 +41,9 @@ def simulated() -> tuple[Log, Study]:
     return session(Hand())
 
 
+@cache
 def recordings(study_name: str) -> list[tuple[str, Log, Study]]:
-    """The sessions of a study of real recordings."""
+    """The sessions of a study of real recordings: read once, since what spoils a log gives another one."""
     root = real(study_name)
     study = load_study(root)
     wanted = [of_stream(stream) for stream in study.streams.values()]
@@ -54,6 +55,12 @@ def alarms(log: Log, study: Study) -> list[Finding]:
     return [one for one in checked(of_log(log, study)) if one.status != "green"]
 
 
+@cache
+def alarms_of(fault: Fault) -> list[Finding]:
+    """What is not green of the simulated session with a fault; more than one test looks at it."""
+    return alarms(*fault.spoil(*simulated()))
+
+
 def names_the_cause(found: Sequence[Finding], fault: Fault) -> bool:
     """Is there an alarm of the right check whose message names the cause?"""
     return any(one.check.partition(":")[0] == fault.check and fault.says in one.message for one in found)
@@ -61,7 +68,7 @@ def names_the_cause(found: Sequence[Finding], fault: Fault) -> bool:
 
 @pytest.mark.parametrize("fault", [*FAULTS, *EVENT_FAULTS], ids=lambda fault: fault.name)
 def test_a_fault_is_found_and_its_cause_named(fault: Fault) -> None:
-    found = alarms(*fault.spoil(*simulated()))
+    found = alarms_of(fault)
     assert names_the_cause(found, fault), "\n".join(str(one) for one in found)
 
 
@@ -109,7 +116,7 @@ def test_targets_off_the_rings_of_the_task_are_found() -> None:
 def test_the_unit_alone_is_named_and_not_what_follows_from_it() -> None:
     for name in ("tracker in inches", "accelerometer in mm/s²"):
         fault = next(one for one in FAULTS if one.name == name)
-        assert not any("noise" in one.check for one in alarms(*fault.spoil(*simulated()))), name
+        assert not any("noise" in one.check for one in alarms_of(fault)), name
 
 
 def test_nothing_is_found_where_nothing_is_wrong() -> None:
@@ -129,7 +136,7 @@ def test_nothing_is_found_in_real_recordings(study_name: str) -> None:
 
 def test_every_finding_that_is_not_green_says_what_to_do() -> None:
     for fault in (*FAULTS, *EVENT_FAULTS):
-        for one in alarms(*fault.spoil(*simulated())):
+        for one in alarms_of(fault):
             assert one.message
             assert one.found
             assert one.expected
