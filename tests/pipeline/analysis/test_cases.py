@@ -113,7 +113,7 @@ def test_a_column_that_tells_groups_apart_is_no_factor_within(tmp_path: Path, st
     assert "mixed_anova" in ran.err
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_family_may_span_measures_and_entries(tmp_path: Path, steadyhand: Steadyhand) -> None:
     """Three tests in two entries, one of them of two measures: Holm's factors are 3, 2 and 1."""
     study = tmp_path / "family2"
@@ -158,7 +158,7 @@ def test_no_percentage_of_a_scale_without_a_zero(results: Results, steadyhand: S
     assert [row["mean_difference"] < 0 for row in found] == [True, True]
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_the_direction_is_that_of_the_difference(tmp_path: Path, steadyhand: Steadyhand) -> None:
     """Means of −0.50 and 0.39: higher by 0.89, and no percentage."""
     shutil.copytree(CASES / "signed", tmp_path / "signed")
@@ -307,7 +307,7 @@ def test_rows_of_one_condition_do_not_count_as_if_it_had_been_met_anew(results: 
     assert model["p"] == pytest.approx(rows(found, "rm_anova")[0]["p"], rel=1e-6)
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_aligned_ranks_of_cells_that_spread_unlike_are_cautioned_of(tmp_path: Path, steadyhand: Steadyhand) -> None:
     shutil.copytree(CASES / "art", tmp_path / "art")
     assert steadyhand("report", tmp_path / "art").code == 0

@@ -39,7 +39,7 @@ def test_half_a_character_in_expected_json_and_results_json_is_said(
     assert run(capsys, monkeypatch, "diff", tmp_path, tmp_path).code == 0
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_only_files_of_a_report_are_removed_whatever_its_provenance_lists(study: Path, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", study).code == 0
     mine = steadyhand.out / "mine.txt"
@@ -54,7 +54,7 @@ def test_only_files_of_a_report_are_removed_whatever_its_provenance_lists(study:
     assert (steadyhand.out.parent / "outside.txt").is_file()
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 @pytest.mark.parametrize(("name", "root"), [("..\\..\\x", "_.._x"), ("C:y", "C_y"), ("a study", "a study")])
 def test_the_archive_unpacks_below_one_folder_everywhere(
     folder: Folder, steadyhand: Steadyhand, name: str, root: str

@@ -52,7 +52,7 @@ def test_what_people_bring_goes_from_new_to_results(
 
 
 @pytest.mark.parametrize("template", NAMES)
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_template_passes_report_at_once(tmp_path: Path, new: New, steadyhand: Steadyhand, template: str) -> None:
     study = tmp_path / "study"
     assert new(study, "--template", template).code == 0

@@ -87,7 +87,7 @@ def test_while_a_run_computes(study: Path, steadyhand: Steadyhand, disk: Failing
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_figures")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_while_a_report_is_put_in_its_place(study: Path, steadyhand: Steadyhand, disk: FailingDisk) -> None:
     assert steadyhand("report", study).code == 0
     _check(

@@ -53,7 +53,7 @@ def test_a_second_run_computes_nothing(update: Callable[[], Result]) -> None:
     assert set(update().computed.values()) == {0}
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_second_report_says_that_nothing_was_computed(study: Path, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", study).code == 0
     before = {path: path.stat().st_mtime_ns for path in steadyhand.out.rglob("*.*") if path.name != "provenance.json"}

@@ -102,7 +102,7 @@ def test_groups_that_are_compared_have_a_figure_of_their_own(steadyhand: Steadyh
     assert "Point at a mark, or tap it, to see whose it is." in page
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_values_of_everybody_are_a_table(steadyhand: Steadyhand, tmp_path: Path) -> None:
     values: Values = {**TIMES, "nasa_tlx/effort": {"A": [10.0] * 10, "B": [20.0] * 5 + [30.0] * 5}}
     entries = ["measure: [time_s, errors], test: t_paired", "measure: nasa_tlx/*, test: wilcoxon"]
@@ -111,7 +111,7 @@ def test_values_of_everybody_are_a_table(steadyhand: Steadyhand, tmp_path: Path)
     assert "Each participant's rating under each condition" in page
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_values_of_people_who_met_one_condition_each_stand_beside_it(steadyhand: Steadyhand, tmp_path: Path) -> None:
     folder = study(
         tmp_path / "s",

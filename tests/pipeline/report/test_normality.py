@@ -14,7 +14,7 @@ from pipeline.report.sections.normality import _PANELS_MAX, _which
 from tests.pipeline.analysis.test_options import TIMES, Values, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures")
+pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
 
 Rows = list[dict[str, str]]
 SKEWED = [1.0, 1.1, 1.2, 1.2, 1.3, 1.4, 1.5, 1.6, 1.8, 9.0]

@@ -26,7 +26,7 @@ def many(folder: Folder, people: int) -> Path:
     return root
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 @pytest.mark.parametrize(("people", "pages"), [(40, 0), (41, 41)])
 def test_more_than_forty_participants_have_a_page_each(
     people: int, pages: int, folder: Folder, steadyhand: Steadyhand
@@ -38,7 +38,7 @@ def test_more_than_forty_participants_have_a_page_each(
     assert len(found) == pages
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_participants_page_has_their_values_sessions_and_gaps(folder: Folder, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", many(folder, 41)).code == 0
     first, second, third = (

@@ -214,7 +214,7 @@ def test_every_number_of_a_comparison_on_the_page_stands_in_results_json(report:
         assert (f"=\u00a0{row['statistic']:g}" if ranks else f"{row['statistic']:.2f}") in page
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_files_of_an_earlier_report_that_are_no_more_are_removed(
     finished: Path, steadyhand: Steadyhand, tmp_path: Path
 ) -> None:
@@ -244,7 +244,7 @@ def test_names_in_any_script_are_drawn_and_set(folder: Folder, steadyhand: Stead
     assert "□□ □" in PdfReader(steadyhand.out / "report.pdf").pages[0].extract_text()
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) -> None:
     """A sentence, a line of the table and the method of each, with the figures of results.json."""
     tests = [
@@ -285,7 +285,7 @@ def test_every_test_reads_in_the_report(folder: Folder, steadyhand: Steadyhand) 
         assert as_printed(row["found"]) in text
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Folder, steadyhand: Steadyhand) -> None:
     rows = "".join(
         f"P{person},{condition},m,{value}\n"
@@ -307,7 +307,7 @@ def test_follow_ups_share_a_sentence_and_a_singular_fit_is_a_caution(folder: Fol
     assert "its pairs by linear mixed model" not in text  # all rows of a model have one method
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_questionnaire_of_which_only_the_total_was_kept_is_shown(folder: Folder, steadyhand: Steadyhand) -> None:
     rows = "".join(
         f"P{person},{each},nasa_tlx,total,{person}{ord(each) - 96}\n" for person in range(3) for each in "ab"

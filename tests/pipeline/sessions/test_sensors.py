@@ -57,7 +57,7 @@ def more_sensors(seconds: float = 6.0) -> list[Message]:
     return messages
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_more_sensors_are_a_few_lines_of_the_study(folder: Folder, steadyhand: Steadyhand) -> None:
     root = folder(SETTINGS)
     write_session(root / "data" / "P1_a.mcap", more_sensors())
@@ -93,7 +93,7 @@ def test_what_does_not_fit_is_named(old: str, new: str, message: str, folder: Fo
     assert message in ran.err
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_without_a_reference_all_readings_smoothed_stand_in_and_the_report_says_so(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
@@ -165,7 +165,7 @@ estimators:
 """
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_lever_arm_is_learned_or_given_and_either_helps(folder: Folder, steadyhand: Steadyhand) -> None:
     found = {}
     for name, more in (

@@ -38,7 +38,7 @@ def test_measures_by_their_definitions(study: Path, steadyhand: Steadyhand) -> N
         assert found["completion_time_s", condition] == pytest.approx(3.4 - 0.5)
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_what_each_estimator_would_have_shown_at_the_selection(study: Path, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", study).code == 0
     trials = (steadyhand.out / "tables" / "trials.csv").read_text().splitlines()
@@ -195,7 +195,7 @@ def test_an_accuracy_study_may_exclude_a_session(study: Path, steadyhand: Steady
     assert {row["session"] for row in steadyhand.results()["accuracy"]} == {"P1_b", "P2_a", "P2_b"}
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_study_of_events_alone(folder: Folder, steadyhand: Steadyhand) -> None:
     settings = "conditions: [a, b]\nsessions: '{participant}_{condition}.mcap'\nevents: {topic: /events}\n"
     root = folder(settings + "comparisons: [{measure: selection_mse_mm2, test: t_paired}]\n")
@@ -214,7 +214,7 @@ def test_the_study_is_never_written_over(study: Path, steadyhand: Steadyhand) ->
     assert {path: path.read_bytes() for path in before} == before
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 @pytest.mark.parametrize("lacking", ["imu", "orientation", "tracker"])
 def test_a_study_with_fewer_sensors(folder: Folder, steadyhand: Steadyhand, lacking: str) -> None:
     """Without an IMU, without orientation, or without a tracker: what can be said is said."""

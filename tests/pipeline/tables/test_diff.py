@@ -90,7 +90,7 @@ def test_the_same_results_are_the_same(study: Path, diff: Diff) -> None:
     }
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_a_changed_input_is_named_with_the_numbers_it_moved(study: Path, diff: Diff) -> None:
     one = diff.compared(study, "one")
     (study / "measures.csv").write_text(MEASURES.replace("P3,a,m,3", "P3,a,m,30"))
@@ -220,7 +220,7 @@ def test_provenance_of_other_results_explains_nothing(study: Path, diff: Diff) -
     assert "there is no provenance.json beside it" in diff(one, other).err
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_compare_into_a_reports_folder_leaves_no_old_provenance(study: Path, diff: Diff) -> None:
     out = diff.compared(study, "one", "report")
     drawn = sorted((out / "figures").iterdir())
