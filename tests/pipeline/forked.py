@@ -15,6 +15,7 @@ FORKED.set_forkserver_preload(
         "pipeline.analysis.compare",
         "pipeline.report.write",
         "distributed.dashboard.worker",  # where Dask is installed
+        "tests.pipeline.warmed",
         "tests.pipeline.dying",
         "tests.pipeline.engine.test_cache",
     ]
