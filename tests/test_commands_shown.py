@@ -78,12 +78,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def briefer(settings: str) -> str:
-    """The simulated study with three participants in the place of twelve, and with the first third of their task."""
+    """The simulated study with three participants in the place of twelve, and with the first of their six targets."""
     for words, instead in (
         (r"  participants: 12\n", "  participants: 3\n"),
         (r"  repeats: 20\n", "  repeats: 1\n"),
-        (r"(  path_mm:.*\n(?:    - .*\n){4})(?:    - .*\n)+", r"\1"),
-        (r"  targets_mm: \[((?:\[[^]]*\], ){2}).*\]\n", r"  targets_mm: [\1]\n"),
+        (r"(  path_mm:.*\n(?:    - .*\n){2})(?:    - .*\n)+", r"\1"),
+        (r"  targets_mm: \[((?:\[[^]]*\], ){1}).*\]\n", r"  targets_mm: [\1]\n"),
     ):
         settings, times = re.subn(words, instead, settings)
         assert times == 1, words

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,22 +16,36 @@ from pipeline.engine.cache import file_digest
 from pipeline.sessions import ingest
 from pipeline.study.folder import load_study
 from tests.conftest import STREAMS, session_messages, write_session
-from tests.pipeline.helpers import Steadyhand
+from tests.pipeline.helpers import Steadyhand, exit_code
 
 SAID = "changed while it was read; wait until nothing writes to it any more, and run the command again"
 SETTINGS = (
     "conditions: [a, b]\nsessions: data/{participant}_{condition}.mcap\nestimators: {raw: {type: raw}}\n"
     "measures: measures.csv\n" + STREAMS
 )
+ResultsOf = Callable[[Path], bytes]
 MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\n"
 
 
-@pytest.fixture
-def study(folder: Callable[..., Path]) -> Path:
-    root = folder(SETTINGS, **{"measures.csv": MEASURES})
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study and the cache of a run that nothing disturbed, to be copied."""
+    root = tmp_path_factory.mktemp("finished")
+    study = root / "study"
+    study.mkdir()
+    (study / "study.yaml").write_text(SETTINGS, encoding="utf-8")
+    (study / "measures.csv").write_text(MEASURES, encoding="utf-8")
     for seed, condition in enumerate("ab"):
-        write_session(root / "data" / f"P1_{condition}.mcap", session_messages(2.5, seed=seed))
+        write_session(study / "data" / f"P1_{condition}.mcap", session_messages(2.5, seed=seed))
+    with pytest.MonkeyPatch.context() as patch:
+        words = ("compare", study, "--out", root / "out", "--cache", root / "cache", "--jobs", "1")
+        assert exit_code(patch, *words) == 0
     return root
+
+
+@pytest.fixture
+def study(finished: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(finished / "study", tmp_path / "study")
 
 
 class Between:
@@ -63,12 +78,19 @@ def between(monkeypatch: pytest.MonkeyPatch) -> Between:
     return Between(monkeypatch)
 
 
-def results_of(study: Path, steadyhand: Steadyhand, cache: Path) -> bytes:
-    """results.json of the study as it is now, computed in an empty cache."""
-    kept, steadyhand.cache = steadyhand.cache, cache
-    assert steadyhand("compare", study).code == 0
-    steadyhand.cache = kept
-    return (steadyhand.out / "results.json").read_bytes()
+@pytest.fixture
+def results_of(finished: Path, steadyhand: Steadyhand, tmp_path: Path) -> ResultsOf:
+    """results.json of a study as it is now, with a cache that holds nothing of a run that was disturbed."""
+
+    def compute(study: Path) -> bytes:
+        kept, steadyhand.cache = steadyhand.cache, tmp_path / "undisturbed"
+        shutil.copytree(finished / "cache", steadyhand.cache)
+        assert steadyhand("compare", study).code == 0
+        shutil.rmtree(steadyhand.cache)
+        steadyhand.cache = kept
+        return (steadyhand.out / "results.json").read_bytes()
+
+    return compute
 
 
 def inputs(steadyhand: Steadyhand) -> dict[str, str]:
@@ -78,9 +100,9 @@ def inputs(steadyhand: Steadyhand) -> dict[str, str]:
 
 @pytest.mark.parametrize("after", [False, True])
 def test_a_log_that_changes_before_or_after_it_is_read_is_read_once_more(
-    study: Path, steadyhand: Steadyhand, between: Between, tmp_path: Path, after: bool
+    study: Path, steadyhand: Steadyhand, between: Between, results_of: ResultsOf, after: bool
 ) -> None:
-    before = results_of(study, steadyhand, tmp_path / "before")
+    before = results_of(study)
     log = study / "data" / "P1_a.mcap"
     first = log.read_bytes()
     between(ingest, lambda _: write_session(log, session_messages(2.5, seed=9)), after=after)
@@ -88,17 +110,17 @@ def test_a_log_that_changes_before_or_after_it_is_read_is_read_once_more(
     assert (ran.code, "changed" in ran.err) == (0, False)
     changed = (steadyhand.out / "results.json").read_bytes()
     assert inputs(steadyhand)["data/P1_a.mcap"] == file_digest(log)
-    assert changed == results_of(study, steadyhand, tmp_path / "changed") != before
+    assert changed == results_of(study) != before
     log.write_bytes(first)
     assert steadyhand("compare", study).code == 0
     assert (steadyhand.out / "results.json").read_bytes() == before
 
 
 def test_a_log_that_is_another_for_a_moment_is_read_once_more(
-    study: Path, steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    study: Path, steadyhand: Steadyhand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, results_of: ResultsOf
 ) -> None:
     log = study / "data" / "P1_a.mcap"
-    undisturbed = results_of(study, steadyhand, tmp_path / "undisturbed")
+    undisturbed = results_of(study)
     first, original, calls = log.read_bytes(), ingest.run, 0
     write_session(tmp_path / "other.mcap", session_messages(2.5, seed=9))
 
@@ -120,9 +142,9 @@ def test_a_log_that_is_another_for_a_moment_is_read_once_more(
 
 @pytest.mark.parametrize("harm", ["rewritten", "cut", "removed"])
 def test_a_log_that_keeps_changing_is_set_aside_and_read_by_the_next_run(
-    study: Path, steadyhand: Steadyhand, between: Between, tmp_path: Path, harm: str
+    study: Path, steadyhand: Steadyhand, between: Between, results_of: ResultsOf, harm: str
 ) -> None:
-    undisturbed = results_of(study, steadyhand, tmp_path / "undisturbed")
+    undisturbed = results_of(study)
     log = study / "data" / "P1_a.mcap"
     first = log.read_bytes()
 
@@ -148,14 +170,14 @@ def test_a_log_that_keeps_changing_is_set_aside_and_read_by_the_next_run(
 
 @pytest.mark.parametrize("stage", [measure, compare])
 def test_a_table_that_changes_while_it_is_read_never_poisons_the_cache(
-    study: Path, steadyhand: Steadyhand, between: Between, tmp_path: Path, stage: object
+    study: Path, steadyhand: Steadyhand, between: Between, results_of: ResultsOf, stage: object
 ) -> None:
     table = "measures.csv"
     if stage is compare:
         (study / "study.yaml").write_text(SETTINGS + "participants: people.csv\n")
         table = "people.csv"
         (study / table).write_text("participant,sex\nP1,f\n")
-    before = results_of(study, steadyhand, tmp_path / "before")
+    before = results_of(study)
     first = (study / table).read_text()
     other = first.replace("m,1", "m,5").replace(",f", ",m")
     between(stage, lambda _: (study / table).write_text(other))
@@ -163,7 +185,7 @@ def test_a_table_that_changes_while_it_is_read_never_poisons_the_cache(
     assert (ran.code, "changed" in ran.err) == (0, False)
     changed = (steadyhand.out / "results.json").read_bytes()
     assert inputs(steadyhand)[table] == file_digest(study / table)
-    assert changed == results_of(study, steadyhand, tmp_path / "changed") != before
+    assert changed == results_of(study) != before
     (study / table).write_text(first)
     assert steadyhand("compare", study).code == 0
     assert (steadyhand.out / "results.json").read_bytes() == before
