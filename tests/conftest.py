@@ -176,7 +176,10 @@ def blank_print(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For a test that makes one report again and again: the files of figures are there, and none is even drawn."""
+    """For a test of a report's words alone, or of many reports: the files of figures are there, and none is even drawn.
+
+    Captions and descriptions are those of the figures; that they can be drawn is for tests with `blank_figures`.
+    """
     from pipeline.report import figures
 
     monkeypatch.setattr(figures, "draw", lambda _figure, path, *_: path.write_text(EMPTY_FIGURE, encoding="utf-8"))

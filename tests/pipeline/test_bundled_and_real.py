@@ -92,6 +92,7 @@ INDEPENDENT = {
 }
 
 
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 @pytest.mark.parametrize("study", list(INDEPENDENT))
 def test_accuracy_on_real_recordings_agrees_with_an_independent_implementation(
     study: str, steadyhand: Steadyhand
@@ -162,6 +163,7 @@ def test_with_the_orientation_withheld_it_is_found(study: str, tmp_path: Path) -
         assert rmse(fused[known], truth[known]) <= 0.7 * window_mm, session.id
 
 
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_vr_pointing_agrees_with_r(steadyhand: Steadyhand) -> None:
     """F, epsilon, p and effect size as R's afex gives them on participant means."""
     assert steadyhand("report", real("vr-pointing")).code == 0

@@ -16,7 +16,7 @@ from pipeline.statistics.descriptive import mean_interval
 from tests.pipeline.analysis.test_options import Row, compared, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 PAIRED = ["measure: m, test: t_paired"]
 

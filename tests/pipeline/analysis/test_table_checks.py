@@ -174,7 +174,7 @@ def test_codes_listed_under_missing_are_missing_values(folder: Folder, steadyhan
     assert [row["check"] for row in found["checks"] if row["status"] != "green"] == []
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_milliseconds_in_a_table_are_said_on_the_console_and_the_first_page(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:

@@ -11,7 +11,7 @@ import pytest
 from tests.pipeline.helpers import Ran, exit_code, run
 from tests.pipeline.made_once import made_once
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 Folder = Callable[..., Path]
 Plan = Callable[..., Ran]

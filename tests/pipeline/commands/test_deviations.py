@@ -20,7 +20,7 @@ from tests.pipeline.helpers import Steadyhand
 
 __all__ = ["plan", "preregistered", "registered"]  # fixtures
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 
 def changed(registered: Path, **replaced: str) -> Path:

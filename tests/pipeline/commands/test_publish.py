@@ -52,7 +52,7 @@ def study(folder: Callable[..., Path]) -> Path:
     return folder("conditions: [a, b]\nmeasures: m.csv\n", **{"m.csv": rows})
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 @pytest.mark.parametrize(
     ("asked", "names"),
     [
@@ -87,7 +87,7 @@ def test_a_format_that_is_not_known_is_said_before_anything_is_computed(study: P
     assert not steadyhand.cache.exists()
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_the_archive_is_written_anew_only_where_something_changed(study: Path, steadyhand: Steadyhand) -> None:
     steadyhand("report", study)
     archive = steadyhand.out / "report.zip"

@@ -147,7 +147,7 @@ def test_groups_of_participants_are_pairs_too(steadyhand: Steadyhand, tmp_path: 
     assert "[" in line.difference
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_the_first_page_has_the_lines_as_a_table(steadyhand: Steadyhand, tmp_path: Path) -> None:
     folder = study(tmp_path / "s", THREE, ["measure: time_s, test: t_paired"])
     assert steadyhand("report", folder, "--format", "html,json").code == 0

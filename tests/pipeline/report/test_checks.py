@@ -55,7 +55,7 @@ def test_one_log_under_two_names_is_said(folder: Folder, steadyhand: Steadyhand)
     assert "the logs of P01_a and P03_a hold the same readings" in row["message"]
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_a_contradiction_stands_on_the_first_page_and_the_exit_code_is_as_before(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
@@ -72,7 +72,7 @@ def test_a_contradiction_stands_on_the_first_page_and_the_exit_code_is_as_before
     assert "they are in g" in (steadyhand.out / "tables" / "checks.csv").read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_without_a_fault_the_report_says_the_lag_and_no_caution(folder: Folder, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", study_of(folder, None)).code == 0
     rows = steadyhand.results()["checks"]

@@ -132,7 +132,7 @@ def test_bad_limits_are_an_error_that_names_them(
     assert message in ran.err
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_the_report_counts_the_lights_first(folder: Folder, steadyhand: Steadyhand) -> None:
     root = folder(
         "conditions: [a]\nsessions: '{participant}_{condition}.mcap'\nquality_limits: {gap_s: [0.001, 10]}\n" + STREAMS
@@ -187,7 +187,7 @@ def test_comparisons_without_the_exclusions_are_those_of_a_study_that_has_none(
     assert found["comparisons"] != whole["comparisons"]
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_the_report_shows_what_changes_without_the_exclusions(folder: Folder, steadyhand: Steadyhand) -> None:
     assert steadyhand("report", folder(SETTINGS + EXCLUSIONS, **tables())).code == 0
     text = " ".join("".join(checked((steadyhand.out / "report.html").read_text(encoding="utf-8")).text).split())
@@ -204,7 +204,7 @@ def test_the_report_shows_what_changes_without_the_exclusions(folder: Folder, st
     assert (steadyhand.out / "tables" / "comparisons_all_data.csv").is_file()
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_exclusions_that_change_no_comparison_are_said_to(folder: Folder, steadyhand: Steadyhand) -> None:
     settings = SETTINGS.replace("  - {measure: time_s, test: rm_anova}\n", "").replace(
         "  - {measure: tlx/*, test: wilcoxon, adjust: holm}\n", ""

@@ -12,7 +12,7 @@ from pipeline.study.statistical_tests import TESTS
 from tests.pipeline.analysis.test_options import TIMES, Values, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 ANSWERS: Values = {"m": {"A": [0, 1, 0, 0, 1, 0], "B": [1, 1, 1, 0, 1, 1]}}
 

@@ -12,7 +12,7 @@ import pytest
 from pipeline.words.phrases import all_of, counted
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 Page = Callable[[str, str, str], str]
 

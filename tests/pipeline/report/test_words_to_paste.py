@@ -12,7 +12,7 @@ from scipy import stats
 from tests.pipeline.analysis.test_options import Values, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 ALIKE: Values = {
     "time_s": {

@@ -90,7 +90,7 @@ def test_the_same_results_are_the_same(study: Path, diff: Diff) -> None:
     }
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_a_changed_input_is_named_with_the_numbers_it_moved(study: Path, diff: Diff) -> None:
     one = diff.compared(study, "one")
     (study / "measures.csv").write_text(MEASURES.replace("P3,a,m,3", "P3,a,m,30"))
