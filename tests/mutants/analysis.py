@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.mutants.mutant import Mutant
-from tests.pipeline.analysis import test_cases, test_design_check, test_measure, test_orders
+from tests.pipeline.analysis import test_cases, test_design_check, test_measure, test_orders, test_shown_at_selection
 from tests.pipeline.analysis import test_totals as test_questionnaire_totals
 from tests.pipeline.analysis.audit import (
     test_audit,
@@ -70,12 +70,12 @@ MUTANTS = (
     Mutant(
         'known.groupby([*cell, "participant"])["squared_error_mm2"].mean()',
         'known.groupby([*cell, "participant"])["squared_error_mm2"].max()',
-        _SESSIONS,
+        (test_shown_at_selection,),
     ),
     Mutant(
         "float(np.sqrt(errors[condition, estimator].mean()))",
         "float(np.sqrt(errors[condition, estimator]).mean())",
-        _SESSIONS,
+        (test_shown_at_selection,),
     ),
     # Comparisons.
     Mutant('row["contrast"] is not None and pairs[row["measure"], row["effect"]] > 1', "False", _CASES),

@@ -50,6 +50,19 @@ def test_there_is_no_total_of_a_person_who_left_a_scale_out(folder: Folder, stea
     assert ("P2", "t_paired: no value in b") in reasons
 
 
+def test_a_total_can_be_excluded_and_its_scales_stay(folder: Folder, steadyhand: Steadyhand) -> None:
+    """There is no total yet when the rows of the tables are left out, so it is left out afterwards."""
+    exclusion = "exclusions: [{participant: P2, condition: b, measure: nasa_tlx/total, reason: told to hurry}]\n"
+    study = folder(f"conditions: [a, b]\nquestionnaires: q.csv\n{exclusion}", **{"q.csv": ratings()})
+    assert steadyhand("compare", study).code == 0
+    described = steadyhand.results()["descriptives"]
+    in_b = the(described, measure="nasa_tlx/total", condition="b")
+    assert (in_b["n"], in_b["mean"]) == (2, (72 + 192) / 2)
+    assert the(described, measure="nasa_tlx/total", condition="a")["n"] == 3
+    mental = the(described, measure="nasa_tlx/mental", condition="b")
+    assert (mental["n"], mental["mean"]) == (3, (22 + 42 + 62) / 3)
+
+
 TIMES = {
     ("P1", "a"): [10, 11, 15, 12],
     ("P1", "b"): [7, 8, 6, 13],
