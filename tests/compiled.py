@@ -18,7 +18,7 @@ from fusion_core.compilation import code_folder
 from pipeline.simulation import hand_steps
 from tests.fusion_core import test_conformance, test_likelihood
 from tests.fusion_core.accuracy import test_accuracy
-from tests.fusion_core.kalman import test_smoothing
+from tests.fusion_core.kalman import test_kalman, test_smoothing
 from tests.fusion_core.phone import test_orientation
 from tests.pipeline.simulation import test_simulation
 
@@ -54,9 +54,14 @@ PIECES: tuple[tuple[Callable[..., None], tuple[object, ...]], ...] = (
     (test_smoothing.test_a_smoothed_position_is_the_posterior_given_every_reading, ()),
     (estimator, ("position_kalman",)),
     (estimator, ("fusion_kalman, fixed gain",)),
+    (test_smoothing.test_waiting_makes_steadier_and_all_readings_steadiest, ()),
+    (test_conformance.test_streams_that_are_missing_or_empty_are_no_fault, ("window_gp", ("tracker",), ())),
     (test_smoothing.test_a_fixed_lag_is_the_smoother_on_what_had_arrived, ()),
     (test_accuracy.test_lag_is_found_to_a_fraction_of_a_sample, (0.0,)),
+    (test_kalman.test_fusion_is_the_posterior_of_all_readings_whatever_their_order_of_arrival, ()),
+    (test_orientation.test_the_heading_reading_by_reading_is_that_of_the_whole_recording, (0.0,)),
     (estimator, ("window_gp, regular",)),
+    (test_conformance.test_streams_that_are_missing_or_empty_are_no_fault, ("window_gp, regular", ("tracker",), ())),
 )
 
 if __name__ == "__main__":
