@@ -156,6 +156,7 @@ def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: P
     assert computed_in == str(os.getpid()) != helped_by
 
 
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 @pytest.mark.parametrize("options", [("--jobs", "1"), ("--jobs", "2", "--executor", "inline")])
 def test_one_job_or_inline_starts_no_process(
     options: tuple[str, ...],
