@@ -15,6 +15,8 @@ from tests.pipeline import r_reference
 from tests.pipeline.analysis.test_options import read
 from tests.pipeline.helpers import Steadyhand
 
+pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+
 BINARY, CLUSTERED = r_reference.expected("binary"), r_reference.expected("clustered")
 FIT = 1e-6  # where R's and statsmodels' iterations stop
 

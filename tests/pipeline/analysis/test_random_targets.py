@@ -11,6 +11,8 @@ from tests.pipeline.analysis.test_options import read
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.statistics.r_cases import expected, rows
 
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
+
 CROSSED = "value ~ condition + (1 | participant) + (1 | participant:condition) + (1 | target)"
 
 

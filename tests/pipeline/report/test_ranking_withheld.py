@@ -16,7 +16,7 @@ from tests.pipeline.report.test_checks import SETTINGS, text_of
 from tests.pipeline.sessions.checks.hand import Hand, messages, session
 from tests.pipeline.sessions.checks.ways_to_spoil import IMU
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 Folder = Callable[..., Path]
 ESTIMATORS = "estimators: {raw: {type: raw}, fusion: {type: fusion_kalman}}"
