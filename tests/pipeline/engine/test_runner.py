@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +19,6 @@ from pipeline.stages import COMPARE
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand
 
-Folder = Callable[..., Path]
 SETTINGS = (
     """
 title: T
@@ -34,12 +34,27 @@ measures: measures.csv
 MEASURES = "participant,condition,measure,value\nP1,a,m,1\nP1,b,m,2\n"
 
 
-@pytest.fixture
-def study(folder: Folder) -> Path:
-    root = folder(SETTINGS, **{"measures.csv": MEASURES})
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study and the cache of its first run, to be copied."""
+    root = tmp_path_factory.mktemp("finished")
     for condition in "ab":
-        write_session(root / "data" / f"P1_{condition}.mcap", session_messages(2.5))
+        write_session(root / "study" / "data" / f"P1_{condition}.mcap", session_messages(2.5))
+    (root / "study" / "study.yaml").write_text(SETTINGS, encoding="utf-8")
+    (root / "study" / "measures.csv").write_text(MEASURES, encoding="utf-8")
+    bring_up_to_date(root / "study", COMPARE, Resources(Cache(root / "cache"), InThisProcess(), PlainLines()))
     return root
+
+
+@pytest.fixture
+def study(finished: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(finished / "study", tmp_path / "study")
+
+
+@pytest.fixture
+def filled(finished: Path, tmp_path: Path) -> None:
+    """The cache holds a run of the study."""
+    shutil.copytree(finished / "cache", tmp_path / "cache")
 
 
 @pytest.fixture
@@ -62,6 +77,7 @@ def test_a_second_report_says_that_nothing_was_computed(study: Path, steadyhand:
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
+@pytest.mark.usefixtures("filled")
 @pytest.mark.parametrize(
     ("before", "after", "computed"),
     [
@@ -86,6 +102,7 @@ def test_a_setting_reaches_the_stages_that_use_it_and_no_others(
     assert again & {next(stage for stage in ("ingest", "fuse", "assess", "measure", "compare") if stage in computed)}
 
 
+@pytest.mark.usefixtures("filled")
 def test_a_changed_log_reaches_its_own_session_only(study: Path, update: Callable[[], Result]) -> None:
     update()
     write_session(study / "data" / "P1_a.mcap", session_messages(2.5, seed=9))
@@ -93,12 +110,14 @@ def test_a_changed_log_reaches_its_own_session_only(study: Path, update: Callabl
     assert (computed["ingest"], computed["fuse"], computed["assess"]) == (1, 1, 1)
 
 
+@pytest.mark.usefixtures("filled")
 def test_a_new_session_computes_that_session(study: Path, update: Callable[[], Result]) -> None:
     update()
     write_session(study / "data" / "P2_a.mcap", session_messages(2.5, seed=3))
     assert update().computed["fuse"] == 1
 
 
+@pytest.mark.usefixtures("filled")
 def test_a_damaged_entry_is_computed_again(update: Callable[[], Result]) -> None:
     entry = update().entries["fuse"]["P1_a"].folder
     (entry / "tracks.parquet").write_bytes(b"half")
