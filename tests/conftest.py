@@ -151,6 +151,21 @@ def steadyhand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPat
     return Steadyhand(capsys, monkeypatch, tmp_path)
 
 
+@pytest.fixture(scope="module")
+def cache_of_module(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for one cache."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def one_cache(steadyhand: Steadyhand, cache_of_module: Path) -> None:
+    """For a whole file of tests whose studies are much alike: what one has computed, the others need not.
+
+    Not for tests of what is computed, nor beside a test that changes how something is computed.
+    """
+    steadyhand.cache = cache_of_module
+
+
 EMPTY_FIGURE = '<svg xmlns="http://www.w3.org/2000/svg" width="100" height="50" viewBox="0 0 100 50"></svg>'
 
 

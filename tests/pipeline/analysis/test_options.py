@@ -18,7 +18,7 @@ from pipeline.statistics.tukey import tukey_kramer
 from pipeline.study.statistical_tests import ADJUSTMENTS
 from tests.pipeline.helpers import Steadyhand, run
 
-pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print", "one_cache")
 
 Row = dict[str, Any]
 Values = Mapping[str, Mapping[str, Sequence[float]]]

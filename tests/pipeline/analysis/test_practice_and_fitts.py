@@ -15,7 +15,7 @@ from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.reference import the
 from tests.pipeline.report.pages import checked
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print", "one_cache")
 
 Folder = Callable[..., Path]
 

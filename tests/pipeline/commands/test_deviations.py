@@ -20,7 +20,7 @@ from tests.pipeline.helpers import Steadyhand
 
 __all__ = ["plan", "preregistered", "registered"]  # fixtures
 
-pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print", "one_cache")
 
 
 def changed(registered: Path, **replaced: str) -> Path:
@@ -198,7 +198,8 @@ def test_the_first_page_lists_the_deviations(registered: Path, steadyhand: Stead
     assert "The preregistration was altered" not in page
 
 
-def test_an_altered_file_is_a_red_caution(registered: Path, steadyhand: Steadyhand) -> None:
+def test_an_altered_file_is_a_red_caution(registered: Path, steadyhand: Steadyhand, tmp_path: Path) -> None:
+    steadyhand.cache = tmp_path / "cache"
     assert steadyhand("report", registered, "--format", "html,json").code == 0
     path = registered / "preregistered.yaml"
     path.write_text(path.read_text(encoding="utf-8").replace("alpha: 0.05", "alpha: 0.1"), encoding="utf-8")
@@ -212,7 +213,8 @@ def test_an_altered_file_is_a_red_caution(registered: Path, steadyhand: Steadyha
     assert "preregistered.yaml" in (steadyhand.out / "provenance.json").read_text(encoding="utf-8")
 
 
-def test_a_file_that_comes_or_goes_is_noticed(registered: Path, steadyhand: Steadyhand) -> None:
+def test_a_file_that_comes_or_goes_is_noticed(registered: Path, steadyhand: Steadyhand, tmp_path: Path) -> None:
+    steadyhand.cache = tmp_path / "cache"
     assert steadyhand("compare", registered).code == 0
     assert "nothing was computed again" in steadyhand("compare", registered).out
     (registered / "preregistered.yaml").unlink()
