@@ -23,11 +23,13 @@ MEASURES = "participant,condition,measure,value\n" + "".join(
 
 
 class Check:
-    """`steadyhand check` with a cache of its own."""
+    """`steadyhand check` with a cache of all these tests."""
 
-    def __init__(self, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def __init__(
+        self, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cache: Path
+    ) -> None:
         self._capsys, self._monkeypatch = capsys, monkeypatch
-        self._options = ("--cache", str(tmp_path / "cache"), "--jobs", "1")
+        self._options = ("--cache", str(cache), "--jobs", "1")
         self.junit = tmp_path / "ci" / "junit.xml"
 
     def __call__(self, *words: str | Path) -> Ran:
@@ -40,8 +42,10 @@ class Check:
 
 
 @pytest.fixture
-def check(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Check:
-    return Check(capsys, monkeypatch, tmp_path)
+def check(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cache_of_module: Path
+) -> Check:
+    return Check(capsys, monkeypatch, tmp_path, cache_of_module)
 
 
 def edit(study: Path, figure: str, value: object) -> None:

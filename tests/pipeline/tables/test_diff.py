@@ -30,15 +30,17 @@ MEASURES = "participant,condition,measure,value\n" + "".join(
 
 
 class Diff:
-    """`steadyhand compare` and `steadyhand diff` with a cache of their own."""
+    """`steadyhand compare` and `steadyhand diff` with a cache of all these tests."""
 
-    def __init__(self, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, root: Path) -> None:
-        self._capsys, self._monkeypatch, self._root = capsys, monkeypatch, root
+    def __init__(
+        self, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, root: Path, cache: Path
+    ) -> None:
+        self._capsys, self._monkeypatch, self._root, self._cache = capsys, monkeypatch, root, cache
 
     def compared(self, study: Path, name: str, command: str = "compare", *words: str) -> Path:
         """A folder with the study's results as it is now."""
         out = self._root / "out" / name
-        options: list[str | Path] = ["--out", out, "--cache", self._root / "cache", "--jobs", "1", *words]
+        options: list[str | Path] = ["--out", out, "--cache", self._cache, "--jobs", "1", *words]
         assert run(self._capsys, self._monkeypatch, command, study, *options).code == 0
         return out
 
@@ -52,8 +54,10 @@ class Diff:
 
 
 @pytest.fixture
-def diff(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Diff:
-    return Diff(capsys, monkeypatch, tmp_path)
+def diff(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cache_of_module: Path
+) -> Diff:
+    return Diff(capsys, monkeypatch, tmp_path, cache_of_module)
 
 
 @pytest.fixture
