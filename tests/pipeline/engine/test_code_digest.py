@@ -39,9 +39,15 @@ def digests(root: Path) -> dict[str, str]:
     return {stage.name: code.digest(stage.module) for stage in STAGES}
 
 
-def reached_by(root: Path, path: str, content: bytes | None = None, before: dict[str, str] | None = None) -> set[str]:
+@pytest.fixture(scope="module")
+def before(copied: Path) -> dict[str, str]:
+    """The digests of the packages as they are between tests."""
+    return digests(copied)
+
+
+def reached_by(root: Path, before: dict[str, str], path: str, content: bytes | None = None) -> set[str]:
     """The stages whose digest another content of a file changes; the file is put back."""
-    before, target = before or digests(root), root / path
+    target = root / path
     original = target.read_bytes() if target.exists() else None
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_bytes(content if content is not None else (original or b"") + b"\n# edited\n")
@@ -53,13 +59,13 @@ def reached_by(root: Path, path: str, content: bytes | None = None, before: dict
     return {name for name in before if before[name] != after[name]}
 
 
-def test_a_module_reaches_the_stages_that_import_it(copied: Path) -> None:
+def test_a_module_reaches_the_stages_that_import_it(copied: Path, before: dict[str, str]) -> None:
     """However indirectly, and also where it is named as text."""
-    assert reached_by(copied, "fusion_core/window/gp.py") == {"fuse", "assess", "compare", "report"}
-    assert reached_by(copied, "pipeline/sessions/logs/mcap/container.py") == {"ingest"}
-    assert reached_by(copied, "pipeline/sessions/logs/mcap/protobuf_template.py") == {"ingest"}
-    assert reached_by(copied, "pipeline/statistics/wilcoxon.py") == {"compare"}
-    assert reached_by(copied, "pipeline/words/numbers.py") >= {"compare", "report"}
+    assert reached_by(copied, before, "fusion_core/window/gp.py") == {"fuse", "assess", "compare", "report"}
+    assert reached_by(copied, before, "pipeline/sessions/logs/mcap/container.py") == {"ingest"}
+    assert reached_by(copied, before, "pipeline/sessions/logs/mcap/protobuf_template.py") == {"ingest"}
+    assert reached_by(copied, before, "pipeline/statistics/wilcoxon.py") == {"compare"}
+    assert reached_by(copied, before, "pipeline/words/numbers.py") >= {"compare", "report"}
 
 
 def test_a_new_import_is_followed(copied: Path) -> None:
@@ -67,7 +73,7 @@ def test_a_new_import_is_followed(copied: Path) -> None:
     importing = (copied / path).read_bytes() + b"\nimport pipeline.statistics.wilcoxon\n"
     original = (copied / path).read_bytes()
     (copied / path).write_bytes(importing)
-    assert reached_by(copied, "pipeline/statistics/wilcoxon.py") == {"ingest", "compare"}
+    assert reached_by(copied, digests(copied), "pipeline/statistics/wilcoxon.py") == {"ingest", "compare"}
     (copied / path).write_bytes(original)
 
 
@@ -116,29 +122,28 @@ def test_every_import_that_pythons_parser_finds_is_found(package: str) -> None:
         assert set(imports(source)) >= parsed(source), path
 
 
-def test_every_file_that_is_no_python_reaches_the_stages_of_its_folder(copied: Path) -> None:
+def test_every_file_that_is_no_python_reaches_the_stages_of_its_folder(copied: Path, before: dict[str, str]) -> None:
     """Templates, scripts, styles, references: whatever git lists below the packages."""
     no_stages = ("pipeline/analysis/against/recompute.R", "pipeline/commands/", "pipeline/live/")  # no stage runs them
     others = [name for name in listed_by_git() if not name.endswith(".py") and not name.startswith(no_stages)]
     assert {Path(name).suffix for name in others} >= {".js", ".css", ".jinja", ".typ", ".bib"}
-    before = digests(copied)
     for name in others:
-        reached = reached_by(copied, name, before=before)
+        reached = reached_by(copied, before, name)
         assert reached >= ({"report"} if name.startswith("pipeline/report/") else {"fuse"}), name
         assert not name.startswith("pipeline/report/") or reached == {"report"}, name
 
 
-def test_a_kind_of_file_that_nobody_has_thought_of_counts(copied: Path) -> None:
-    assert reached_by(copied, "pipeline/report/document/icons.woff2") == {"report"}
-    assert reached_by(copied, "pipeline/report/document/fonts/sans.ttf") == {"report"}
+def test_a_kind_of_file_that_nobody_has_thought_of_counts(copied: Path, before: dict[str, str]) -> None:
+    assert reached_by(copied, before, "pipeline/report/document/icons.woff2") == {"report"}
+    assert reached_by(copied, before, "pipeline/report/document/fonts/sans.ttf") == {"report"}
 
 
 @pytest.mark.parametrize(
     "name",
     ["__pycache__/html.cpython-311.pyc", ".style.css.swp", "style.css~", "#style.css#", ".DS_Store", "html.pyc"],
 )
-def test_what_python_and_editors_leave_does_not_count(copied: Path, name: str) -> None:
-    assert reached_by(copied, f"pipeline/report/document/{name}", b"left behind") == set()
+def test_what_python_and_editors_leave_does_not_count(copied: Path, before: dict[str, str], name: str) -> None:
+    assert reached_by(copied, before, f"pipeline/report/document/{name}", b"left behind") == set()
 
 
 def test_installed_packages_have_the_digests_of_the_clone(copied: Path) -> None:
