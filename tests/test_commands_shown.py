@@ -128,7 +128,7 @@ def prepared(words: list[str], place: Path, monkeypatch: pytest.MonkeyPatch) -> 
             assert exit_code(monkeypatch, *run) == 0
 
 
-@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.usefixtures("blank_figures", "blank_print")
 @pytest.mark.parametrize("command", every_command())
 def test_it_runs(
     command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

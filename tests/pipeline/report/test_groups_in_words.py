@@ -13,7 +13,7 @@ from pipeline.words.names import was
 from tests.pipeline.analysis.test_options import Values, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print", "one_cache")
 
 BETWEEN: Values = {
     "completion_time_s": {

@@ -10,6 +10,8 @@ import pytest
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.study.kept_tables import CASES, Folder, copied, means, proposed, squared_errors
 
+pytestmark = pytest.mark.usefixtures("one_cache")
+
 
 def practice_trials() -> pd.DataFrame:
     return pd.read_csv(CASES / "practice" / "trials.csv")

@@ -12,6 +12,8 @@ import pytest
 from tests.pipeline.helpers import Steadyhand
 from tests.pipeline.study.kept_tables import CASES, Folder, add, copied, means, proposed, squared_errors
 
+pytestmark = pytest.mark.usefixtures("one_cache")
+
 
 @pytest.mark.parametrize(
     ("case", "lines"),
