@@ -23,6 +23,10 @@ An acceleration costs one step of an integral, a frame one prediction and one co
 the frame before. All that the states do to an acceleration is linear (`rows.py`), so the integrals of the readings and
 of their derivatives are enough: nothing is gone through again when a mounting error is learned.
 
+**A reading of the phone** becomes a row, unless its orientation is one to which no hand can have turned it
+(`believed.py`); it is then as if the phone had been silent. After a longer silence the state goes on from the first row
+that speaks again, with the phone where its lever arm has turned it.
+
 **A frame** (`steps.py`): the state is moved to it (`moments.py`); is it a measurement at all (`judged.py`: a held
 position, exact zeros, a jump that no hand makes), or has the fusion gone astray?; the bank takes it in and says what
 the scales are (`bank.py`); so do the offsets of the clock (`clock.py`, `offset.py`); the state takes it in with these.

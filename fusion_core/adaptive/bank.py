@@ -78,6 +78,17 @@ def begin_again(model: Model, state: State, position: FloatArray) -> None:
 
 
 @compiled(inner=True)
+def to_phone(model: Model, state: State, turned: FloatArray) -> None:
+    """As `moments.to_phone`, with the large filter's lever arm."""
+    for axis in range(model.dimension):
+        arm = 0.0
+        for part in range(3):
+            arm += turned[axis, part] * state.mean[ARM + part]
+        for member in range(MEMBERS):
+            state.bank_mean[axis, member] -= arm
+
+
+@compiled(inner=True)
 def considered(model: Model, state: State, turned: FloatArray, coupling: FloatArray, dt: float) -> tuple[float, float]:
     """Variance of positions and density of accelerations, an axis, that come of what is not known yet.
 

@@ -29,6 +29,7 @@ from fusion_core.adaptive.layout import (
     ROWS,
     STAMP,
     TRUST,
+    UNSURE,
     VELOCITY,
     Model,
     Phone,
@@ -77,6 +78,7 @@ def begin_again(model: Model, state: State, position: FloatArray, turned: FloatA
                 state.clock_mean[one, row, axis] = 0.0
             if axis < model.dimension:
                 state.clock_mean[one, 0, axis] = position[axis]
+    state.fact[UNSURE] = 0.0
     to_phone(state, turned)
 
 
@@ -105,7 +107,6 @@ def take_in(
     stamp: float,
     value: FloatArray,
     turned: FloatArray,
-    more_psd: float,
     news: int,
 ) -> None:
     """All moved to the stamp of a frame, each by its own offset; and with `news` the position taken in.
@@ -117,7 +118,8 @@ def take_in(
     if dt > 0.0:
         state.fact[STAMP] = stamp
         apart = np.empty((OFFSETS, 3))
-        _move(state, dt, more_psd)
+        _move(state, dt, state.fact[UNSURE] / dt)
+        state.fact[UNSURE] = 0.0
         _move_means(model, state, phone, before, stamp, value, apart)
         if news:
             _correct(model, state, apart, turned, dt)

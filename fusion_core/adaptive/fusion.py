@@ -53,7 +53,8 @@ class FusionAdaptive:
     noise where the noise's does. Readings later than `history_s` are left out.
 
     Two clocks that disagree do not say which is wrong. `trusted_clock` names the sensor whose stamps, less its stated
-    latency, are right. Without it the accelerometer's are believed, and the SD counts its being wrong as likely.
+    latency, are right. Without it the accelerometer's are believed, but for its share of a disagreement of some ms, and
+    the SD counts its being wrong as likely.
 
     Raises ValueError for other sensors than these two, a sensor later than the history, or a clock of neither.
     """

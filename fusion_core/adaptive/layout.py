@@ -41,7 +41,8 @@ TRACKER_VARIANCE, ACCELERATION_PSD, RATE_PSD, USES_PHONE, DRIFT_VARIANCE, DRIFT_
 ROWS, WAITING, TAKEN, TOO_LATE, KNOWS_ARM, HAS_DIFFERED, STRANGE = 0, 1, 2, 3, 4, 5, 6
 ASTRAY = 7  # frames in a row that the fusion alone did not expect
 IN_A_ROW = 8  # frames that were measurements, since there was none for a while
-COUNTS = 9
+HAS_TURNED, LOST = 9, 10  # is an orientation known, and is the newest one not believed
+COUNTS = 11
 
 # State.fact.
 AT, BEGAN, STRANGE_SINCE, PHONE_AHEAD = 0, 1, 2, 3  # times in s; how far the phone's stamps are ahead of their arrival
@@ -56,7 +57,10 @@ AT_LARGEST = 21  # how often the largest component came again
 PACE = 22  # the mean squared speed of the hand, an axis
 CLOCK_STEADY_S = 23  # as CLOCK_S, were the clock a steady one
 SEEN, SEEN_S = 24, 27  # the newest frame that was a measurement (3), and when it was measured
-FACTS = 28
+TURNED_S, NEW_S = 28, 29  # when the newest orientation that is believed was logged, and when for the first time
+LOST_SINCE = 30  # when those began that are not
+UNSURE = 31  # what is not known of accelerations since the stamp, (mm/s)²: an integral of densities
+FACTS = 32
 
 # A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
 # position (3) and its variance as the filters state it.
@@ -101,6 +105,7 @@ class State(Protocol):
     clock_covariance: FloatArray  # (15, 15), of all: four of each axis, and the lever arm
     clock_weight: FloatArray  # (2, offsets): log likelihoods with forgetting, of a steady clock and of one that wanders
     clock_foretold: FloatArray  # (2,): log likelihood with forgetting, of the frames as each kind foretold them
+    turned: FloatArray  # (9,): the newest orientation that is believed
     usual: FloatArray  # (3, 3 + INPUTS): slow averages of lever-arm and input couplings
     waiting: FloatArray  # (most + 1, 5): time, arrival and value of frames not taken in yet
 
@@ -144,6 +149,7 @@ STATE = np.dtype(
         ("clock_covariance", np.float64, (15, 15)),
         ("clock_weight", np.float64, (2, OFFSETS)),
         ("clock_foretold", np.float64, (2,)),
+        ("turned", np.float64, (9,)),
         ("usual", np.float64, (3, 3 + INPUTS)),
         ("waiting", np.float64, (MOST_WAITING + 1, 5)),
     ]

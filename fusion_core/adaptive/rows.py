@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fusion_core.adaptive import believed
 from fusion_core.adaptive.layout import (
     AT_LARGEST,
     BIAS,
@@ -59,12 +60,17 @@ _ROUND_OFF = 1e-9
 
 @compiled(inner=True)
 def put_in(model: Model, state: State, phone: Phone, reading: FloatArray) -> int:
-    """A reading put in at its time; returns where, −1 if there is one of that time. There must be room."""
+    """A reading put in at its time; returns where, −1 if there is one of that time or its orientation is not believed.
+
+    There must be room.
+    """
     count, time = state.count[ROWS], reading[TIME] - state.fact[PHONE_AHEAD]
     at = count
     while at > 0 and phone.time[at - 1] > time:
         at -= 1
     if at > 0 and time - phone.time[at - 1] < _SAME_S:
+        return -1
+    if at == count and not believed.is_believed(state, reading):
         return -1
     for to in range(count, at, -1):
         _copy_row(phone, to - 1, to)
@@ -296,8 +302,11 @@ def turned_at(state: State, phone: Phone, time: float, turned: FloatArray) -> bo
         return False
     following = min(row + 1, count - 1)
     step, share = phone.time[following] - phone.time[row], 0.0
-    if 0.0 < step < 2 * HOLD_S and phone.row[following, KNOWN] >= ORIENTED:
-        share = min(max((time - phone.time[row]) / step, 0.0), 1.0)
+    if phone.row[following, KNOWN] >= ORIENTED:
+        if step > LONG_S:
+            share = 1.0  # as `steps` has turned the phone by when it speaks again
+        elif 0.0 < step < 2 * HOLD_S:
+            share = min(max((time - phone.time[row]) / step, 0.0), 1.0)
     for axis in range(3):
         for column in range(3):
             at = TURNED + 3 * axis + column

@@ -57,6 +57,8 @@ from fusion_core.compilation import compiled
 from fusion_core.samples import FloatArray
 
 _ANSWERS = 3
+_STEADY_SD_S = 0.003  # of a phone's stamps, and of a tracker's whose latency is known
+_UNKNOWN_SD_S = 0.05  # of a tracker's whose latency is not
 _SCORES = 150  # over how many frames errors are averaged
 _SURPRISES = 300  # and surprises, which are noisier
 _ENOUGH = 60  # frames scored, before which nothing is made of it
@@ -214,6 +216,19 @@ def _of_clocks(model: Model, state: State) -> float:
     return float(squared * off)
 
 
+@compiled
+def _of_the_phone(state: State) -> float:
+    """The share of what the clocks disagree by that is likely the phone's.
+
+    Of a millisecond or two as much as the tracker's; of a twentieth of a second nothing: no phone's clock is so far
+    off as a latency that nobody has measured. As likely as not, the tracker's was.
+    """
+    found, squared, phone = state.fact[CLOCK_VARIANCE], state.fact[CLOCK_S] ** 2, _STEADY_SD_S**2
+    known, unknown = phone + _STEADY_SD_S**2 + found, phone + _UNKNOWN_SD_S**2 + found
+    likely, other = np.exp(-0.5 * squared / known) / np.sqrt(known), np.exp(-0.5 * squared / unknown) / np.sqrt(unknown)
+    return float(phone * (likely / known + other / unknown) / (likely + other))
+
+
 @compiled(inner=True)
 def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArray, sd: FloatArray, at: int) -> None:
     """Position and SD at a time, into row `at` of `mean` and `sd`; NaN before the first position."""
@@ -223,6 +238,8 @@ def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArr
         return
     if model.trusted == THE_TRACKER:
         time += state.fact[CLOCK_S]
+    elif model.trusted == NEITHER:
+        time += _of_the_phone(state) * state.fact[CLOCK_S]
     answers = np.empty(SHOWN)
     answer(model, state, phone, time, answers)
     variance = answers[STATED]

@@ -19,12 +19,14 @@ from fusion_core.adaptive.layout import (
     FACTS,
     INPUTS,
     IS_FRAME,
+    KNOWN,
     KNOWS_ARM,
     LAST,
     MOST_WAITING,
     NOISE,
     NOISE_DRIFT,
     NOISE_DRIFT_S,
+    ORIENTED,
     PHONE_AHEAD,
     READ,
     ROW,
@@ -35,6 +37,8 @@ from fusion_core.adaptive.layout import (
     TIME,
     TOO_LATE,
     TRUST,
+    TURNED,
+    UNSURE,
     VELOCITY,
     WAITING,
     Model,
@@ -99,8 +103,13 @@ def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> No
     count = state.count[ROWS]
     if count > 0 and state.count[TAKEN] > 0:
         oldest = phone.time[count - 1] - model.history_s
+        speaks_again = newest == count - 1 and newest > 0 and phone.time[newest] - phone.time[newest - 1] > rows.LONG_S
+        if speaks_again:
+            oldest = phone.time[newest]  # no silence lies in the head: it takes a speed to last
         if oldest > state.fact[AT]:
             _advance(model, state, phone, oldest)
+        if speaks_again:
+            _turn(model, state, phone, newest)
         extends = newest == count - 1 and newest > 0 and before == state.fact[AT] and phone.time[newest - 1] > before
         if extends and phone.time[newest] - phone.time[newest - 1] <= rows.LONG_S:
             _extend_head(state, phone)
@@ -108,6 +117,20 @@ def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> No
             rows.integrate(phone.time, count, phone.row, state.fact[AT], phone.time[count - 1], state.head)
         if newest == count - 1:
             shown.answer(model, state, phone, phone.time[newest], phone.shown[newest])
+
+
+@compiled
+def _turn(model: Model, state: State, phone: Phone, row: int) -> None:
+    """The phone has turned while it was silent: the tracked point is where it was thought to be, the phone is not."""
+    turn = np.empty((3, 3))
+    for axis in range(3):
+        for part in range(3):
+            at = TURNED + 3 * axis + part
+            turn[axis, part] = phone.row[row, at] - phone.row[row - 1, at]
+    if state.count[KNOWS_ARM] and min(phone.row[row, KNOWN], phone.row[row - 1, KNOWN]) >= ORIENTED:
+        bank.to_phone(model, state, turn)
+        moments.to_phone(state, turn)
+        clock.to_phone(state, turn)
 
 
 @compiled
@@ -179,12 +202,11 @@ def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
 
 
 @compiled
-def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[float, float, float]:
-    """Everything moved to `time`; returns the duration, and what the small filters are to consider: a variance
-    of positions and a density of accelerations."""
+def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[float, float]:
+    """Everything moved to `time`; returns the duration, and the variance of positions that the bank is to consider."""
     dt = time - state.fact[AT]
     if dt <= 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0
     total, coupling, net = np.empty((2, ROW)), np.empty((2, 3, INPUTS)), np.empty((2, 3))
     unknown = rows.integrate(phone.time, state.count[ROWS], phone.row, state.fact[AT], time, total)
     for order in range(2):
@@ -205,7 +227,8 @@ def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[flo
         clock.to_phone(state, turned)
     of_positions, of_accelerations = bank.considered(model, state, turned, coupling, dt)
     bank.move(model, state, dt, net, unknown + of_accelerations)
-    return dt, of_positions, unknown + of_accelerations
+    state.fact[UNSURE] += dt * (unknown + of_accelerations)
+    return dt, of_positions
 
 
 @compiled
@@ -213,7 +236,7 @@ def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: Floa
     """A frame taken in, measured at its stamp by the tracker's clock, if it is a measurement at all."""
     time = stamp + state.fact[CLOCK_S]
     ago = max(state.fact[AT] - time, 0.0)
-    dt, of_positions, of_accelerations = _advance(model, state, phone, time)
+    dt, of_positions = _advance(model, state, phone, time)
     of_positions += _of_clock(model, state)
     state.count[TAKEN] += 1
     turned, of_phone = np.zeros((3, 3)), np.empty(3)
@@ -230,7 +253,7 @@ def _take_in(model: Model, state: State, phone: Phone, stamp: float, value: Floa
         bank.take_in(model, state, of_phone, of_positions, max(dt, 1e-3))
         bank.judge(model, state)
     if news or verdict == judged.NOTHING:
-        clock.take_in(model, state, phone, stamp, value, turned, of_accelerations, news)
+        clock.take_in(model, state, phone, stamp, value, turned, news)
     if verdict == judged.MEASURED:
         moments.correct(model, state, ago, turned, value, state.fact[NOISE] + _of_clock(model, state))
         seen.see(model, state, time, value)

@@ -109,7 +109,7 @@ class Dense:
         of_positions += squared_speed * self.clock.variance
         self._bank(dt, net, of_phone, of_positions, of_accelerations)
         self.judge()
-        self.clock.take(self, self.stamp, stamp, position, of_accelerations, turned)
+        self.clock.take(self, self.stamp, stamp, position, of_accelerations * dt / (stamp - self.stamp), turned)
         self.stamp = stamp
         self._correct(turned, position, squared_speed * self.clock.variance)
 

@@ -49,11 +49,12 @@ def test_a_trusted_tracker_puts_an_early_phone_right() -> None:
     assert _rmse(by_tracker, early) < 0.7 * _rmse(FUSION, early)
 
 
-def test_a_trusted_phone_changes_the_interval_alone_and_only_where_the_clocks_disagree() -> None:
+def test_a_trusted_phone_changes_the_interval_and_only_where_the_clocks_disagree() -> None:
+    """The estimate as well, by its share of some milliseconds; of the thirty that the tracker is late by, nothing."""
     late = recorded(simulated(20.0), DEPARTURES["latency 130 ms"])
     either, phone = (one.replay(late.samples, late.times) for one in (FUSION, FusionAdaptive(SENSORS, 0.5, "imu")))
-    np.testing.assert_array_equal(either.mean, phone.mean)
-    assert np.all(either.sd >= phone.sd)
+    assert np.abs(either.mean[-300:] - phone.mean[-300:]).max() < 0.1 * SENSORS["tracker"].noise_sd
+    assert np.all(either.sd[-300:] >= phone.sd[-300:])
     assert np.mean(either.sd[-300:]) > 1.05 * np.mean(phone.sd[-300:])
 
 
