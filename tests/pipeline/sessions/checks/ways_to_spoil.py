@@ -250,6 +250,15 @@ def frozen(value: np.ndarray) -> np.ndarray:
     return value
 
 
+def taken_for_another(quaternion: np.ndarray) -> np.ndarray:
+    """Twice, for 25 readings, the optics take other markers for the phone's: it is turned by 70°."""
+    turn = Rotation.from_euler("y", 70.0, degrees=True)
+    for begin in (len(quaternion) // 3, len(quaternion) // 2):
+        part = slice(begin, begin + 25)
+        quaternion[part] = (turn * Rotation.from_quat(quaternion[part])).as_quat()
+    return quaternion
+
+
 def about(axis: str, degrees: float) -> Callable[[np.ndarray], np.ndarray]:
     """Positions turned about an axis."""
     turn = Rotation.from_euler(axis, degrees, degrees=True)
