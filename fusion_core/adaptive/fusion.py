@@ -26,8 +26,8 @@ _NO_READINGS, _NO_TIMES, _NO_ROWS = np.empty((0, READING)), np.empty(0), np.empt
 _PRIOR_SD = {
     layout.BIAS: (3, 300.0, 10.0),  # how many, SD, walk per √s: mm/s²
     layout.MOUNTING: (3, 0.05, 0.0),  # rad: 3°
-    layout.OFFSET: (3, 100.0, 5.0),  # mm/s²: half a degree of tilt
-    layout.TURN: (2, 0.1, 0.002),  # 6°, or 10 % of scale
+    layout.OFFSET: (3, 100.0, 10.0),  # mm/s²: half a degree of tilt
+    layout.TURN: (2, 0.1, 0.004),  # 6°, or 10 % of scale
     layout.ARM: (3, 50.0, 0.0),  # mm
 }
 _SPEED_SD = 500.0  # mm/s, as of fusion_kalman: a hand that reaches
