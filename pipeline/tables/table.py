@@ -21,8 +21,9 @@ from pipeline.tables.columns import COUNT, FLOAT, TEXT
 
 pa.set_memory_pool(pa.system_memory_pool())  # the default pool would keep the memory of thousands of small tables
 
-_NULLABLE = {TEXT: pd.StringDtype(), COUNT: pd.Int64Dtype()}
-_PANDAS = {**_NULLABLE, FLOAT: np.dtype("float64")}  # as a frame holds them
+_FEW, _MANY = pd.StringDtype("python"), pd.StringDtype("pyarrow")
+_PANDAS = {TEXT: (_FEW, _MANY), COUNT: (pd.Int64Dtype(),), FLOAT: (np.dtype("float64"),)}  # as a frame holds them
+_FEW_ROWS = 512
 _SMALL = 512  # rows
 _SMALL_BYTES = 2**24
 ROWS_AT_ONCE = 2**18
@@ -95,7 +96,9 @@ def of_columns(name: str, length: int, columns: Mapping[str, Any]) -> pa.Table:
 def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
     """A frame with exactly the table's columns, in its order and types."""
     columns = TABLES[name].columns
-    if data.columns.tolist() == TABLES[name].names and data.dtypes.tolist() == [_PANDAS[c.kind] for c in columns]:
+    if data.columns.tolist() == TABLES[name].names and all(
+        held in _PANDAS[column.kind] for held, column in zip(data.dtypes, columns, strict=True)
+    ):
         return data.copy(deep=False)
     converted = {}
     for column in columns:
@@ -107,14 +110,14 @@ def as_table(name: str, data: pd.DataFrame) -> pd.DataFrame:
 def _missing(kind: pa.DataType, index: pd.Index) -> pd.Series:
     if kind == FLOAT:
         return pd.Series(np.nan, index=index, dtype="float64")
-    return pd.Series(pd.NA, index=index, dtype="string" if kind == TEXT else "Int64")
+    return pd.Series(pd.NA, index=index, dtype=_text(len(index)) if kind == TEXT else "Int64")
 
 
 def _typed(values: pd.Series, kind: pa.DataType) -> pd.Series:
-    if values.dtype == _PANDAS[kind]:
+    if values.dtype in _PANDAS[kind]:
         return values
     if kind == TEXT:
-        return values.astype("string")
+        return values.astype(_text(len(values)))
     if kind == FLOAT:
         return pd.to_numeric(values).astype("float64")
     return pd.to_numeric(values).astype("Int64")
@@ -212,12 +215,22 @@ def _cells(column: pd.Series) -> list[Any]:
 
 def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
     """Read a table from one or many folders; a folder without it counts as empty."""
-    # Straight to the types of `as_table`: by way of Python objects it takes three times as long.
     table = read_arrow(name, folders)
     if len(table) == 0:
         return _empty(name).copy(deep=False)
-    frame: pd.DataFrame = table.to_pandas(types_mapper=_NULLABLE.get)
+    return _as_frame(table)
+
+
+def _as_frame(table: pa.Table) -> pd.DataFrame:
+    # Straight to the types of `as_table`: by way of Python objects it takes three times as long.
+    types = {TEXT: _text(len(table)), COUNT: pd.Int64Dtype()}
+    frame: pd.DataFrame = table.to_pandas(types_mapper=types.get)
     return frame
+
+
+def _text(rows: int) -> Any:
+    """Python's in a table of few rows, which pandas goes through sooner; Arrow's in one of many, a quarter as large."""
+    return _FEW if rows <= _FEW_ROWS else _MANY
 
 
 def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
@@ -260,8 +273,7 @@ def read_thinned(name: str, folder: Path) -> pd.DataFrame:
     for part in read_parts(name, folder):
         kept.append(part.take(np.arange(-begin % every, len(part), every)))
         begin += len(part)
-    frame: pd.DataFrame = pa.concat_tables(kept).to_pandas(types_mapper=_NULLABLE.get)
-    return frame
+    return _as_frame(pa.concat_tables(kept))
 
 
 def _read_file(name: str, path: Path) -> pa.Table:
