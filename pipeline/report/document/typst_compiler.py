@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,15 @@ def compiler_of(source: bytes, figures: Path, **inputs: str) -> typst.Compiler:
     return typst.Compiler(
         source,
         root=figures.resolve(),
-        font_paths=typst.Fonts(include_system_fonts=False, font_paths=[FONTS, fallback_folder()]),
+        font_paths=_fonts(),
         ignore_system_fonts=True,
         sys_inputs=inputs,
     )
+
+
+@cache
+def _fonts() -> typst.Fonts:
+    """The program's fonts, looked through once: that takes longer than to typeset a small figure."""
+    import typst
+
+    return typst.Fonts(include_system_fonts=False, font_paths=[FONTS, fallback_folder()])
