@@ -105,6 +105,7 @@ def partial_eta_squared_interval(
 
 
 def _solve(function: Callable[[float], float], low: float, high: float) -> float | None:
-    if not np.isfinite(function(low)) or not np.isfinite(function(high)) or function(low) * function(high) > 0:
+    ends = function(low), function(high)
+    if not np.all(np.isfinite(ends)) or ends[0] * ends[1] > 0:
         return None
     return float(optimize.brentq(function, low, high, xtol=1e-10, rtol=1e-12))
