@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.result import negligible
@@ -43,8 +43,10 @@ def normal_quantiles(values: FloatArray) -> NormalQuantiles | None:
     ranks[np.argsort(apart, kind="stable")] = np.arange(1, n + 1)
     tail = (1 - LEVEL) / 2
     shares = (tail, 0.5, 1 - tail)
-    low, middle, high = (np.asarray(stats.norm.ppf(stats.beta.ppf(share, ranks, n + 1 - ranks))) for share in shares)
-    variance = ((high - low) / 2 / stats.norm.ppf(1 - tail)) ** 2
+    # The quantiles of `scipy.stats`, whose checks of what it is given take thirty times as long as the numbers.
+    places = (special.betaincinv(ranks, n + 1 - ranks, share) for share in shares)
+    low, middle, high = (np.asarray(special.ndtri(place), np.float64) for place in places)
+    variance = ((high - low) / 2 / special.ndtri(1 - tail)) ** 2
     shorter = np.sqrt(np.maximum(0.0, 1 - (1 + middle**2 / 2) / (n * variance)))
     ends: list[FloatArray] = [middle + shorter * (end - middle) for end in (low, high)]
     return NormalQuantiles(apart / np.std(apart, ddof=1), middle, *ends)

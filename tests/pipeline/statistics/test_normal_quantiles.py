@@ -27,6 +27,19 @@ def test_places_are_medians_of_ordered_normal_values() -> None:
     assert found.quantiles == pytest.approx([0.0, ends, -ends], abs=1e-12)
 
 
+@pytest.mark.parametrize("n", [3, 10, 47, 1000])
+def test_places_are_the_quantiles_of_scipys_distributions(n: int) -> None:
+    found = normal_quantiles(np.sqrt(np.arange(n, dtype=np.float64)))
+    assert found is not None
+    ranks = np.arange(1, n + 1)
+    low, middle, high = (stats.norm.ppf(stats.beta.ppf(share, ranks, n + 1 - ranks)) for share in (0.025, 0.5, 0.975))
+    variance = ((high - low) / 2 / stats.norm.ppf(0.975)) ** 2
+    shorter = np.sqrt(np.maximum(0.0, 1 - (1 + middle**2 / 2) / (n * variance)))
+    assert np.array_equal(found.quantiles, middle)
+    assert found.low == pytest.approx(middle + shorter * (low - middle), rel=1e-14)
+    assert found.high == pytest.approx(middle + shorter * (high - middle), rel=1e-14)
+
+
 @pytest.mark.parametrize("n", [6, 12, 36, 150])
 def test_about_95_of_100_normal_values_lie_in_the_band(n: int) -> None:
     """The band is that of a value's rank, the same for every sample: so all of them are looked at beside one."""
