@@ -128,12 +128,19 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
     if len(data) == 0:
         data = TABLES[name].schema.empty_table()
     elif isinstance(data, pd.DataFrame):
-        data = pa.Table.from_pandas(as_table(name, data), schema=TABLES[name].schema, preserve_index=False)
+        data = _as_arrow(name, as_table(name, data))
     with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
         if len(data):
             pq.write_table(data.replace_schema_metadata(None), file, **_as_file(name, len(data) <= _SMALL))
         else:
             file.write(_empty_file(name))
+
+
+def _as_arrow(name: str, data: pd.DataFrame) -> pa.Table:
+    """Column by column: `Table.from_pandas` also makes metadata for pandas, which is not kept."""
+    schema = TABLES[name].schema
+    columns = [pa.array(data[column.name], column.type, from_pandas=True) for column in schema]
+    return pa.Table.from_arrays(columns, schema=schema)
 
 
 @cache
