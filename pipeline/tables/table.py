@@ -21,8 +21,12 @@ from pipeline.tables.columns import COUNT, FLOAT, TEXT
 
 pa.set_memory_pool(pa.system_memory_pool())  # the default pool would keep the memory of thousands of small tables
 
-_FEW, _MANY = pd.StringDtype("python"), pd.StringDtype("pyarrow")
-_PANDAS = {TEXT: (_FEW, _MANY), COUNT: (pd.Int64Dtype(),), FLOAT: (np.dtype("float64"),)}  # as a frame holds them
+_MANY = pd.StringDtype("pyarrow")
+_PANDAS = {
+    TEXT: (pd.StringDtype("python"), _MANY),
+    COUNT: (pd.Int64Dtype(),),
+    FLOAT: (np.dtype("float64"),),
+}  # as a frame holds them
 _FEW_ROWS = 512
 _SMALL = 512  # rows
 _SMALL_BYTES = 2**24
@@ -43,13 +47,16 @@ def frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
     listed = list(rows)
     columns = _known_columns(name, listed)
     if not listed:
-        return _empty(name).copy(deep=False)
+        return _empty(name, _text(0)).copy(deep=False)
     return as_table(name, pd.DataFrame([[row.get(column) for column in columns] for row in listed], columns=columns))
 
 
 @cache
-def _empty(name: str) -> pd.DataFrame:
-    """A comparison has some twenty tables, most of them without rows; converting each column of these took longest."""
+def _empty(name: str, _: Any) -> pd.DataFrame:
+    """A comparison has some twenty tables, most of them without rows; converting each column of these took longest.
+
+    Its text is of the type given, which is that of all tables at the time.
+    """
     return as_table(name, pd.DataFrame(columns=TABLES[name].names))
 
 
@@ -224,7 +231,7 @@ def read(name: str, folders: Path | Sequence[Path]) -> pd.DataFrame:
     """Read a table from one or many folders; a folder without it counts as empty."""
     table = read_arrow(name, folders)
     if len(table) == 0:
-        return _empty(name).copy(deep=False)
+        return _empty(name, _text(0)).copy(deep=False)
     return _as_frame(table)
 
 
@@ -236,8 +243,11 @@ def _as_frame(table: pa.Table) -> pd.DataFrame:
 
 
 def _text(rows: int) -> Any:
-    """Python's in a table of few rows, which pandas goes through sooner; Arrow's in one of many, a quarter as large."""
-    return _FEW if rows <= _FEW_ROWS else _MANY
+    """Of few rows as pandas is set to: Python's while a stage runs, which takes less time. Of many Arrow's.
+
+    Arrow's is a quarter as large.
+    """
+    return pd.StringDtype() if rows <= _FEW_ROWS else _MANY
 
 
 def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
