@@ -22,11 +22,11 @@ from pipeline.tables.columns import COUNT, FLOAT, TEXT
 pa.set_memory_pool(pa.system_memory_pool())  # the default pool would keep the memory of thousands of small tables
 
 _MANY = pd.StringDtype("pyarrow")
-_PANDAS = {
+_PANDAS = {  # as a frame holds them
     TEXT: (pd.StringDtype("python"), _MANY),
     COUNT: (pd.Int64Dtype(),),
     FLOAT: (np.dtype("float64"),),
-}  # as a frame holds them
+}
 _FEW_ROWS = 512
 _SMALL = 512  # rows
 _SMALL_BYTES = 2**24
