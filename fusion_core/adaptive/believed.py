@@ -18,6 +18,7 @@ from fusion_core.adaptive.layout import (
     ROTATION,
     TIME,
     TURNED_S,
+    Model,
     State,
 )
 from fusion_core.compilation import compiled
@@ -31,17 +32,22 @@ _LOST_S = 1.0  # what stays so long is where the phone is
 
 
 @compiled(inner=True)
-def is_believed(state: State, reading: FloatArray) -> bool:
+def is_believed(model: Model, state: State, reading: FloatArray) -> bool:
     """Can a hand have turned the phone to a reading's orientation since the last one that was believed?
 
-    An orientation may be found less often than readings are logged, and be repeated in between.
+    An orientation may be found less often than readings are logged, and be repeated in between. Of one axis or two it is
+    known how far they have turned, which is at most as far as the phone.
     """
     if reading[ORIENTATION] < ORIENTED:
         return True
-    time, cosine, same = reading[TIME], -0.5, True
-    for at in range(9):
-        cosine += reading[ROTATION + at] * state.turned[at] / 2.0
-        same &= reading[ROTATION + at] == state.turned[at]
+    time, least, trace, same = reading[TIME], 1.0, 0.0, True
+    for axis in range(model.dimension):
+        of_axis = 0.0
+        for at in range(3 * axis, 3 * axis + 3):
+            of_axis += reading[ROTATION + at] * state.turned[at]
+            same &= reading[ROTATION + at] == state.turned[at]
+        least, trace = min(least, of_axis), trace + of_axis
+    cosine = (trace - 1.0) / 2.0 if model.dimension == 3 else least
     if state.count[HAS_TURNED] and not same:
         angle, since = np.arccos(min(max(cosine, -1.0), 1.0)), max(time - state.fact[TURNED_S], 0.0)
         if state.count[LOST] == 0:

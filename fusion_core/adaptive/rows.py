@@ -70,7 +70,7 @@ def put_in(model: Model, state: State, phone: Phone, reading: FloatArray) -> int
         at -= 1
     if at > 0 and time - phone.time[at - 1] < _SAME_S:
         return -1
-    if at == count and not believed.is_believed(state, reading):
+    if at == count and not believed.is_believed(model, state, reading):
         return -1
     for to in range(count, at, -1):
         _copy_row(phone, to - 1, to)

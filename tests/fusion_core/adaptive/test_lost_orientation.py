@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fusion_core import Estimator, FusionAdaptive, PositionKalman, Raw
+from fusion_core.adaptive.layout import ROWS
 from fusion_core.samples import Samples
 from tests.benchmarks.departures import SENSORS, Departure, Recorded, recorded, simulated
 
@@ -58,23 +59,48 @@ def test_an_orientation_that_stays_elsewhere_is_believed_after_a_second() -> Non
     assert _rms_mm(FUSION, whole, 13.5, 40.0) < _rms_mm(Raw(SENSORS), whole, 13.5, 40.0)
 
 
-@settings(max_examples=10, deadline=None)
-@given(st.floats(1.0, 30.0), st.sampled_from([30.0, 90.0, 200.0]), st.integers(1, 3))
-def test_no_turn_that_a_gyroscope_can_read_is_taken_for_a_loss(rad_s: float, rate_hz: float, repeated: int) -> None:
-    """Whatever the rate of readings, and where each orientation is logged up to three times (at 90 Hz)."""
+@settings(max_examples=20, deadline=None)
+@given(st.floats(1.0, 30.0), st.sampled_from([30.0, 90.0, 200.0]), st.integers(1, 3), st.integers(1, 3))
+def test_no_turn_that_a_gyroscope_can_read_is_taken_for_a_loss(
+    rad_s: float, rate_hz: float, repeated: int, dimension: int
+) -> None:
+    """Whatever the rate of readings and the number of axes, and where each orientation is logged up to three times."""
     repeated = repeated if rate_hz == 90.0 else 1
     time = np.arange(0, 3, 1 / rate_hz)
     known = time[np.arange(len(time)) // repeated * repeated]
     turned = Rotation.from_rotvec(np.outer(known * rad_s, [0.6, 0.64, 0.48]))
     frames = np.arange(0, 3, 1 / 30)
+    positions = np.random.default_rng(0).normal(0, 8, (len(frames), dimension))
+    rotation, force = turned.as_matrix()[:, :dimension], turned.inv().apply([0, 0, 9806.65])
+    estimator = FusionAdaptive({name: replace(sensor, dimension=dimension) for name, sensor in SENSORS.items()})
     samples = {
-        "tracker": Samples(frames, frames + 0.1, np.random.default_rng(0).normal(0, 8, (len(frames), 3))),
-        "imu": Samples(time, time, np.zeros((len(time), 3)), turned.as_matrix(), turned.inv().apply([0, 0, 9806.65])),
+        "tracker": Samples(frames, frames + 0.1, positions),
+        "imu": Samples(time, time, np.zeros((len(time), dimension)), rotation, force),
     }
-    state = FUSION.start()
-    _, state = FUSION.resume(state, samples, np.empty(0))
-    kept = state.phone.time[: state.state["count"][0, 0]]
+    _, state = estimator.resume(estimator.start(), samples, np.empty(0))
+    kept = state.phone.time[: state.state["count"][0, ROWS]]
     np.testing.assert_array_equal(kept, time[-len(kept) :])
+
+
+@pytest.mark.parametrize("dimension", [1, 2])
+def test_of_one_or_two_axes_an_orientation_is_lost_as_well(dimension: int) -> None:
+    """And one that is not lost is believed: readings are left out for the time of the loss alone."""
+    time = np.arange(0, 3, 1 / 90)
+    lost = (time > 1.0) & (time < 1.3)
+    turned = Rotation.from_rotvec(np.outer(np.sin(2 * time) + 2.0 * lost, [0.0, 0.0, 1.0]))
+    frames = np.arange(0, 3, 1 / 30)
+    estimator = FusionAdaptive(
+        {name: replace(sensor, dimension=dimension) for name, sensor in SENSORS.items()}, history_s=2.0
+    )
+    rotation, force = turned.as_matrix()[:, :dimension], turned.inv().apply([0, 0, 9806.65])
+    samples = {
+        "tracker": Samples(frames, frames + 0.1, np.zeros((len(frames), dimension))),
+        "imu": Samples(time, time, np.zeros((len(time), dimension)), rotation, force),
+    }
+    _, state = estimator.resume(estimator.start(), samples, np.empty(0))
+    kept = state.phone.time[: state.state["count"][0, ROWS]]
+    np.testing.assert_array_equal(kept, time[~lost][-len(kept) :])
+    assert kept[0] < 1.0
 
 
 def test_a_phone_that_turned_while_it_was_silent_is_beside_the_hand_at_once() -> None:
