@@ -35,8 +35,8 @@ _LOST_S = 1.0  # what stays so long is where the phone is
 def is_believed(model: Model, state: State, reading: FloatArray) -> bool:
     """Can a hand have turned the phone to a reading's orientation since the last one that was believed?
 
-    An orientation may be found less often than readings are logged, and be repeated in between. Of one axis or two it is
-    known how far they have turned, which is at most as far as the phone.
+    An orientation may be found less often than readings are logged, and be repeated in between. Of one axis or two it
+    is known how far they have turned, which is at most as far as the phone.
     """
     if reading[ORIENTATION] < ORIENTED:
         return True
