@@ -28,7 +28,7 @@ _FASTEST_RAD_S = 35.0  # 2000° a second: as far as gyroscopes of phones go
 _AT_ONCE_RAD = 0.1  # of stamps that are off by some ms
 _REPEATED_S = 0.03  # a new orientation comes so often, or the phone rests
 _BACK_RAD, _BACK_RAD_S = 0.5, 3.0  # as near to where it was lost, and for each second since: then it is back
-_LOST_S = 1.0  # what stays so long is where the phone is
+_LOST_S = 0.3  # what stays so long is where the phone is, for all that is known
 
 
 @compiled(inner=True)

@@ -53,7 +53,7 @@ def test_an_orientation_that_is_lost_for_a_moment_is_as_good_as_none(angle_deg: 
     assert lost < 0.5 * _rms_mm(Raw(SENSORS), _turned_by(0.0, 0, 0), 20.0, 22.0)
 
 
-def test_an_orientation_that_stays_elsewhere_is_believed_after_a_second() -> None:
+def test_an_orientation_that_stays_elsewhere_is_believed_in_time() -> None:
     """For all that is known the phone was put into its holder anew: then the heading is found again, as ever."""
     whole = _turned_by(60.0, 12.0, 99.0, 40.0)
     assert _rms_mm(FUSION, whole, 13.5, 40.0) < _rms_mm(Raw(SENSORS), whole, 13.5, 40.0)
