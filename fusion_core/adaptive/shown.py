@@ -220,8 +220,8 @@ def _of_clocks(model: Model, state: State) -> float:
 def _of_the_phone(state: State) -> float:
     """The share of what the clocks disagree by that is likely the phone's.
 
-    Of a millisecond or two as much as the tracker's; of a twentieth of a second nothing: no phone's clock is so far
-    off as a latency that nobody has measured. As likely as not, the tracker's was.
+    Of a millisecond or two as much as the tracker's, as far as it is known at all; of a twentieth of a second nothing:
+    no phone's clock is so far off as a latency that nobody has measured. As likely as not, the tracker's was.
     """
     found, squared, phone = state.fact[CLOCK_VARIANCE], state.fact[CLOCK_S] ** 2, _STEADY_SD_S**2
     known, unknown = phone + _STEADY_SD_S**2 + found, phone + _UNKNOWN_SD_S**2 + found
