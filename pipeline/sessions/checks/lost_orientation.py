@@ -21,7 +21,7 @@ _MANY = 0.01
 
 
 def orientation_jumps(recorded: Recorded) -> Iterator[Finding]:
-    """Turns between neighbouring readings that are faster than any hand's. Two or three at once are one jump."""
+    """Turns between neighbouring readings that are faster than any hand's; away and back again are two."""
     for imu in recorded.imus:
         steps = _steps(imu)
         if steps is None:
