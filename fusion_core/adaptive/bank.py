@@ -233,6 +233,12 @@ def judge(model: Model, state: State) -> None:
     state.fact[NOISE_DRIFT_S] = np.exp(drift_s / drifting) if drifting > 0.0 else 0.0
 
 
+@compiled(inner=True)
+def noise(state: State) -> float:
+    """The variance of a position's noise, as found."""
+    return float(state.fact[NOISE] + state.fact[NOISE_DRIFT])
+
+
 @compiled
 def _to_shares(model: Model, state: State, begin: int, end: int) -> None:
     """The shares of the members from `begin` to `end`, which sum to 1."""

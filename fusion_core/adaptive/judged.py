@@ -18,8 +18,6 @@ from fusion_core.adaptive.layout import (
     HAS_DIFFERED,
     KNOWS_ARM,
     LAST,
-    NOISE,
-    NOISE_DRIFT,
     POSITION,
     SEEN,
     SEEN_S,
@@ -86,7 +84,7 @@ def _from_expected(model: Model, state: State, of_phone: FloatArray) -> tuple[fl
         apart = of_phone[axis] - state.mean[POSITION + axis] - state.mean[DRIFT + axis]
         squared += apart * apart
         variance += state.covariance[POSITION + axis, POSITION + axis] / model.dimension
-    return squared, float(_JUMP_MM + _GATE * np.sqrt(variance + state.fact[NOISE] + state.fact[NOISE_DRIFT]))
+    return squared, float(_JUMP_MM + _GATE * np.sqrt(variance + bank.noise(state)))
 
 
 @compiled

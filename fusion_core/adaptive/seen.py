@@ -7,11 +7,10 @@ than accelerations do.
 
 from __future__ import annotations
 
+from fusion_core.adaptive import bank
 from fusion_core.adaptive.layout import (
     FUSED,
     IN_A_ROW,
-    NOISE,
-    NOISE_DRIFT,
     PACE,
     SEEN,
     SEEN_S,
@@ -54,7 +53,7 @@ def draw(model: Model, state: State, time: float, variance: float, answers: Floa
     if followed or state.count[TAKEN] < _KNOWN_AFTER:
         return variance
     variance *= max(state.fact[SURPRISE], 1.0)
-    far = state.fact[NOISE] + state.fact[NOISE_DRIFT] + _gone(state, since)
+    far = bank.noise(state) + _gone(state, since)
     drawn = variance**2 / (variance**2 + far**2)
     for axis in range(model.dimension):
         answers[FUSED + axis] += drawn * (state.fact[SEEN + axis] - answers[FUSED + axis])

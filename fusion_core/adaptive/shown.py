@@ -32,8 +32,6 @@ from fusion_core.adaptive.layout import (
     KNOWS_ARM,
     MIXED,
     NEITHER,
-    NOISE,
-    NOISE_DRIFT,
     ORIENTED,
     POSITION,
     ROW,
@@ -119,8 +117,8 @@ def answer(model: Model, state: State, phone: Phone, time: float, answers: Float
     _weights(model, state, weight)
     answers[STATED] = own * weight[0]
     for other in range(1, _ANSWERS):
-        apart = state.fact[ERROR + other] - _noise(state)
-        answers[STATED] += weight[other] * max(apart, _LEAST_OF_NOISE * _noise(state))
+        apart = state.fact[ERROR + other] - bank.noise(state)
+        answers[STATED] += weight[other] * max(apart, _LEAST_OF_NOISE * bank.noise(state))
     for axis in range(3):
         answers[MIXED + axis] = weight[0] * answers[FUSED + axis]
         answers[MIXED + axis] += weight[1] * answers[AHEAD + axis] + weight[2] * answers[HELD + axis]
@@ -179,7 +177,7 @@ def score(model: Model, state: State, phone: Phone, time: float, position: Float
             state.fact[ERROR + one] += (newer if one == 0 else of_positions) * (squared - state.fact[ERROR + one])
         else:
             newer = max(1.0 / state.fact[SCORED], 1.0 / _SURPRISES)
-            surprise = min(squared / (shown[row, STATED] + _noise(state)), _MOST_SURPRISE)
+            surprise = min(squared / (shown[row, STATED] + bank.noise(state)), _MOST_SURPRISE)
             state.fact[SURPRISE] += newer * (surprise - state.fact[SURPRISE])
 
 
@@ -191,13 +189,7 @@ def _moving(model: Model, state: State, shown: FloatArray, row: int, share: floa
         ahead, held = AHEAD + axis, HELD + axis
         first, second = shown[row, ahead] - shown[row, held], shown[row + 1, ahead] - shown[row + 1, held]
         squared += ((1.0 - share) * first + share * second) ** 2 / model.dimension
-    return float(squared / (squared + _noise(state)))
-
-
-@compiled
-def _noise(state: State) -> float:
-    """The variance of a position's noise, as found."""
-    return float(state.fact[NOISE] + state.fact[NOISE_DRIFT])
+    return float(squared / (squared + bank.noise(state)))
 
 
 @compiled
@@ -244,7 +236,7 @@ def expect(model: Model, state: State, phone: Phone, time: float, mean: FloatArr
     answer(model, state, phone, time, answers)
     variance = answers[STATED]
     if state.fact[SCORED] >= _ENOUGH and state.fact[SURPRISE] > 1.0:
-        variance += (state.fact[SURPRISE] - 1.0) * (variance + _noise(state))
+        variance += (state.fact[SURPRISE] - 1.0) * (variance + bank.noise(state))
     variance += _of_clocks(model, state)
     for axis in range(model.dimension):
         mean[at, axis], sd[at, axis] = answers[MIXED + axis], np.sqrt(variance)

@@ -111,12 +111,20 @@ def _arrive(model: Model, state: State, phone: Phone, reading: FloatArray) -> No
         if speaks_again:
             _turn(model, state, phone, newest)
         extends = newest == count - 1 and newest > 0 and before == state.fact[AT] and phone.time[newest - 1] > before
-        if extends and phone.time[newest] - phone.time[newest - 1] <= rows.LONG_S:
+        if extends:
             _extend_head(state, phone)
         else:
             rows.integrate(phone.time, count, phone.row, state.fact[AT], phone.time[count - 1], state.head)
         if newest == count - 1:
             shown.answer(model, state, phone, phone.time[newest], phone.shown[newest])
+
+
+@compiled
+def _to_phone(model: Model, state: State, turned: FloatArray) -> None:
+    """All filters from the tracked point to the phone: p − R r, with the rotation or by how much it has changed."""
+    bank.to_phone(model, state, turned)
+    moments.to_phone(state, turned)
+    clock.to_phone(state, turned)
 
 
 @compiled
@@ -128,9 +136,7 @@ def _turn(model: Model, state: State, phone: Phone, row: int) -> None:
             at = TURNED + 3 * axis + part
             turn[axis, part] = phone.row[row, at] - phone.row[row - 1, at]
     if state.count[KNOWS_ARM] and min(phone.row[row, KNOWN], phone.row[row - 1, KNOWN]) >= ORIENTED:
-        bank.to_phone(model, state, turn)
-        moments.to_phone(state, turn)
-        clock.to_phone(state, turn)
+        _to_phone(model, state, turn)
 
 
 @compiled
@@ -223,8 +229,7 @@ def _advance(model: Model, state: State, phone: Phone, time: float) -> tuple[flo
     turned = np.empty((3, 3))
     if rows.turned_at(state, phone, time, turned) and not state.count[KNOWS_ARM]:
         state.count[KNOWS_ARM] = 1
-        moments.to_phone(state, turned)
-        clock.to_phone(state, turned)
+        _to_phone(model, state, turned)
     of_positions, of_accelerations = bank.considered(model, state, turned, coupling, dt)
     bank.move(model, state, dt, net, unknown + of_accelerations)
     state.fact[UNSURE] += dt * (unknown + of_accelerations)
