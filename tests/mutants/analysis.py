@@ -3,7 +3,17 @@
 from __future__ import annotations
 
 from tests.mutants.mutant import Mutant
-from tests.pipeline.analysis import test_cases, test_design_check, test_measure, test_orders, test_shown_at_selection
+from tests.pipeline.analysis import (
+    test_cases,
+    test_design_check,
+    test_families,
+    test_measure,
+    test_missing,
+    test_model_rows,
+    test_orders,
+    test_ranking,
+    test_shown_at_selection,
+)
 from tests.pipeline.analysis import test_totals as test_questionnaire_totals
 from tests.pipeline.analysis.audit import (
     test_audit,
@@ -30,11 +40,11 @@ from tests.pipeline.study import test_tables_in
 _MEASURE = (test_measure, test_tables_in)
 _SESSIONS = (test_measure, test_tables_in, test_sessions, test_set_aside)
 _OF_MODELS = (test_models, test_equivalence_and_bayes, test_follow_ups)
-_COMPARED = (test_measure, test_against_r, test_statistics, *_OF_MODELS)
-_CASES = (test_cases, test_measure, *_OF_MODELS)
+_COMPARED = (test_model_rows, test_measure, test_against_r, test_statistics, *_OF_MODELS)
+_CASES = (test_families, test_cases, test_measure, *_OF_MODELS)
 _DESIGN = (test_design_check,)
 _AUDIT = (test_audit, test_printed_files, test_no_false_accusation)
-_REPLAY = (test_replay,)
+_RANKED = (test_ranking, test_replay)
 
 MUTANTS = (
     # From trials and tables to values.
@@ -93,7 +103,7 @@ MUTANTS = (
     Mutant(
         'expression.fullmatch(name) and not (is_pattern and name.endswith("/total"))',
         "expression.fullmatch(name)",
-        _MEASURE,
+        (test_families,),
     ),
     Mutant('"reduction": 1 - second / first if', '"reduction": second / first - 1 if', _COMPARED),
     Mutant('{"mean_difference": first - second,', '{"mean_difference": second - first,', _COMPARED),
@@ -148,25 +158,27 @@ MUTANTS = (
         _DESIGN,
     ),
     # What is not in the values.
-    Mutant("if len(missing) == len(all_trials):", "if len(missing) == 0:", _MEASURE),
-    Mutant("excluded.session is None and excluded.covers(", "excluded.covers(", _SESSIONS),
+    Mutant("if len(missing) == len(all_trials):", "if len(missing) == 0:", (test_missing,)),
+    Mutant("excluded.session is None and excluded.covers(", "excluded.covers(", (test_missing,)),
     Mutant(
-        "for participant in sorted(listed - set(named)):", "for participant in sorted(set(named) - listed):", _SESSIONS
+        "for participant in sorted(listed - set(named)):",
+        "for participant in sorted(set(named) - listed):",
+        (test_missing,),
     ),
     # Variants ranked.
     Mutant(
         'rows.sort(key=lambda row: row.get("rmse_mm", np.inf))',
         'rows.sort(key=lambda row: row.get("rmse_mm", 0.0))',
-        _REPLAY,
+        _RANKED,
     ),
-    Mutant('max(summary["ci_low"], possible[0])', 'summary["ci_low"]', _REPLAY),
-    Mutant('float(np.sqrt(max(0.0, summary["ci_low"])))', 'float(np.sqrt(abs(summary["ci_low"])))', _REPLAY),
+    Mutant('max(summary["ci_low"], possible[0])', 'summary["ci_low"]', _RANKED),
+    Mutant('float(np.sqrt(max(0.0, summary["ci_low"])))', 'float(np.sqrt(abs(summary["ci_low"])))', _RANKED),
     Mutant(
         'known.groupby(["study", "session"])["squared_error_mm2"].mean()',
         'known.groupby(["study", "session"])["squared_error_mm2"].median()',
-        _REPLAY,
+        _RANKED,
     ),
-    Mutant("set.intersection(*per_study)", "set.union(*per_study)", _REPLAY),
+    Mutant("set.intersection(*per_study)", "set.union(*per_study)", _RANKED),
     # Reductions of simulated studies.
     Mutant("(1.0 - both[second] / both[first])", "(both[second] / both[first])", (test_simulation,)),
     Mutant("np.percentile(share, [2.5, 97.5])", "np.percentile(share, [5, 95])", (test_simulation,)),
