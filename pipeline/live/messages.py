@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+VERSION = 1
+"""Of these messages, as each page says in its first one; a page that a browser has kept may be of an older one."""
 FRAME_BYTES = 4096
 """The longest message of a page."""
 DATAGRAM_BYTES = 1472

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.live import desk, health
+from pipeline.live import desk, health, messages
 from pipeline.live.outgoing import Whole
 from pipeline.live.run_state import StudyRun
 
@@ -83,6 +83,8 @@ def _of_phone(run: StudyRun) -> Iterator[tuple[str, str]]:
         yield "red", "No phone is connected. Scan the code with the phone."
     if run.is_away or run.is_hidden:
         yield "red", "Connected; its page is not in view or out of reach: wake the phone up."
+    if hello is not None and hello.version != messages.VERSION:
+        yield "red", "Connected; its page is of another version of Steadyhand: load it anew."
     if sends_motion and hello is not None and hello.permission in _NO_MOTION:
         yield "red", "Connected; it gives no motion: see its page."
     if run.battery is not None and run.battery < _LOW_BATTERY:

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from fusion_core import ESTIMATORS
+from pipeline.live.messages import VERSION
 from tests.conftest import CLONE
 
 PAGES = CLONE / "pipeline" / "live" / "pages"
@@ -116,3 +117,8 @@ def test_no_estimator_is_named_to_a_participant(page: str) -> None:
     for estimator in ESTIMATORS:
         if estimator != "raw":  # an everyday word
             assert estimator not in everything
+
+
+def test_every_page_says_the_version_of_its_messages() -> None:
+    said = {name(path): re.findall(r"version: (\d+)", read(path)) for path in SCRIPTS if '"hello"' in read(path)}
+    assert said == {page: [str(VERSION)] for page in ("operator.js", "phone.js", "questionnaire.js")}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.live import panel
 from pipeline.live.events import Action, Close, Said
-from pipeline.live.messages import Battery, Hello, Ping, Visible
+from pipeline.live.messages import VERSION, Battery, Hello, Ping, Visible
 from tests.pipeline.live.lab import MS, PHONE, Lab, lab, notes
 from tests.pipeline.live.studies import STUDY
 
@@ -47,3 +47,10 @@ def test_a_phone_whose_browser_gives_no_motion_is_red(tmp_path: Path) -> None:
     lab.happens(Said("phone", PHONE, Hello("phone", 1, "a browser", permission="denied", wake_lock=True), lab.now))
     light = panel.lights(lab.run, lab.now).content["lights"]["phone"]  # type: ignore[index]
     assert light == {"light": "red", "text": "Connected; it gives no motion: see its page."}
+
+
+def test_a_page_that_a_browser_has_kept_of_an_older_version_is_red(lab: Lab) -> None:
+    """What it sends may mean something else now."""
+    lab.happens(Said("phone", PHONE, Hello("phone", VERSION + 1, "a browser", wake_lock=True), lab.now))
+    light = panel.lights(lab.run, lab.now).content["lights"]["phone"]  # type: ignore[index]
+    assert light == {"light": "red", "text": "Connected; its page is of another version of Steadyhand: load it anew."}
