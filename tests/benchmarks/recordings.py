@@ -1,6 +1,6 @@
 """Estimators on recordings that anyone can fetch: a hundred of phones and hand-held sensors, under every departure.
 
-`python -m tests.benchmarks.recordings --phones FOLDER --sensors FOLDER [--departures]` takes clones of
+`python -m tests.benchmarks.recordings --phones FOLDER --sensors FOLDER [--departures | --together N]` takes clones of
 github.com/tyrex-team/benchmarks-attitude-smartphones (Michel et al. 2017) and github.com/dlaidig/broad (Laidig et al.
 2021). A minute of each is used; the tracker is made of the optical reference, as in `departures`. A phone's clock is
 brought to the optics' by how fast both turn, and its accelerometer's, which may differ by some ms, by the size of the
@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +23,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from fusion_core import Estimator, FusionAdaptive, PositionKalman, Raw
 from fusion_core.samples import FloatArray, Samples
-from tests.benchmarks.departures import DEPARTURES, G_MM_S2, SENSORS, Recorded, Source, recorded
+from tests.benchmarks.departures import DEPARTURES, G_MM_S2, SENSORS, Departure, Recorded, Source, recorded
 from tests.benchmarks.stress import ESTIMATORS, Score, score
 from tests.benchmarks.told import rmse_mm
 
@@ -39,6 +40,8 @@ _SETTLED_S, _STILL_S, _SECONDS = 15.0, 3.0, 60.0
 _STEP_S, _FINE_S = 0.002, 0.06
 _MISALIGNED_DEG = 20.0  # a phone that seems turned so far in its holder was not brought to the optics' time
 _GAP_S = 0.1
+_FEWEST = 100  # instants of a part that is worth a figure
+_TOO_SURE = 0.9  # where a 95 % interval holds less, it is named
 
 Optics = tuple[FloatArray, FloatArray, FloatArray]
 """Times (n,) in s, positions (n, 3) in mm and rotations (n, 3, 3) where both are known."""
@@ -210,6 +213,39 @@ def under_departures(sources: list[Source]) -> None:
         print(f"  {departure:<32}{figures}  {', '.join(worse)}", flush=True)
 
 
+def together(sources: list[Source], count: int) -> None:
+    """Parts of 15 to 60 s under two to four departures at once, drawn at random: where it loses, or says too little."""
+    rows, known = [], [name for name in DEPARTURES if name != "as stated"]
+    for seed in range(count):
+        random = np.random.default_rng(seed)
+        source = sources[random.integers(len(sources))]
+        seconds = random.uniform(15.0, _SECONDS)
+        begin = source.time[0] + random.uniform(0.0, max(np.ptp(source.time) - seconds, 0.0))
+        part = source.between(begin, begin + seconds)
+        names = list(random.choice(known, random.integers(2, 5), replace=False))
+        whole = _without_gaps(recorded(part, _at_once(names), seed), part)
+        if len(whole.times) < _FEWEST:
+            continue
+        own, *alone = (score(kind(SENSORS), whole, part.reference) for kind in (FusionAdaptive, Raw, PositionKalman))
+        rows.append((own.rmse_mm / min(one.rmse_mm for one in alone), own.coverage))
+        if rows[-1][0] > 1.0 or rows[-1][1] < _TOO_SURE:
+            print(f"  {source.name}, {', '.join(names)}: {rows[-1][0]:.2f}, {rows[-1][1]:.2f}", flush=True)
+    ratio, holds = np.array(rows).T
+    print(
+        f"{len(rows)} parts: {np.median(ratio):.2f} times the better of raw and position_kalman (median), worse in"
+        f" {np.sum(ratio > 1.0)}, at the most {ratio.max():.2f} times; its 95 % interval holds {holds.mean():.3f},"
+        f" under {_TOO_SURE:.0%} in {np.sum(holds < _TOO_SURE)}"
+    )
+
+
+def _at_once(names: list[str]) -> Departure:
+    """Several departures; of two that are of one kind, the later."""
+    usual, changed = asdict(DEPARTURES["as stated"]), dict[str, Any]()
+    for name in names:
+        changed |= {key: value for key, value in asdict(DEPARTURES[name]).items() if value != usual[key]}
+    return Departure(**changed)
+
+
 def _geometric(values: list[float] | FloatArray) -> float:
     return float(np.exp(np.mean(np.log(values))))
 
@@ -220,12 +256,15 @@ def main() -> None:
     asked.add_argument("--phones", type=Path, metavar="FOLDER")
     asked.add_argument("--sensors", type=Path, metavar="FOLDER")
     asked.add_argument("--departures", action="store_true", help="every departure, on every fourth recording")
+    asked.add_argument("--together", type=int, metavar="N", help="N parts of recordings, several departures at once")
     given = asked.parse_args()
     sources = list(phones(given.phones)) if given.phones else []
     sources += list(sensors(given.sensors)) if given.sensors else []
     print(f"{len(sources)} recordings of {_SECONDS:g} s, RMSE in mm")
     if given.departures:
         under_departures(sources[1::4])
+    elif given.together:
+        together(sources, given.together)
     else:
         as_stated(sources)
 
