@@ -3,6 +3,9 @@
 A tracker repeats itself, says zero, or follows another body for a while; a frame is then far from where the hand was
 expected. The expectation can be wrong as well: accelerations beyond the phone's range send the fusion away within a
 second. What positions alone expected tells the two apart. From another body they are as far, a hand they followed.
+
+Where the fusion soon knows little, as with an orientation that is itself found from the motion, its gate widens until
+another body fits. That one came by a leap from the hand, and goes on from there; by that it is told for as long.
 """
 
 from __future__ import annotations
@@ -15,13 +18,17 @@ from fusion_core.adaptive.layout import (
     ARM,
     ASTRAY,
     DRIFT,
+    ELSEWHERE,
     HAS_DIFFERED,
     KNOWS_ARM,
     LAST,
+    LAST_S,
     POSITION,
     SEEN,
     SEEN_S,
     SHOWN,
+    STEP_MM,
+    STEP_S,
     STRANGE,
     STRANGE_MM,
     STRANGE_SINCE,
@@ -30,13 +37,13 @@ from fusion_core.adaptive.layout import (
     State,
 )
 from fusion_core.compilation import compiled
+from fusion_core.phone.sightings import BELIEVED_AFTER_S, FASTEST_MM_S, LEAP_SDS, LEAST_FRAME_S
 from fusion_core.samples import FloatArray
 
 NOTHING, MEASURED, BELIEVED_AGAIN = 0, 1, 2
 _JUMP_MM = 60.0  # and six SDs: no hand goes further from where it was expected
 _GATE = 6.0
 _RUNAWAY = 2.0  # times as far off as at first: another body stays where it is, a wrong speed runs away
-_BELIEVED_AFTER_S = 1.3  # a jump that stays so long is where the hand is now
 _NEAR = 0.5  # times as far from positions alone as from the fusion
 _ASTRAY_AFTER = 3  # frames in a row: one may have been late, and the next with it
 
@@ -52,7 +59,7 @@ def judge(
     of_phone: FloatArray,
 ) -> int:
     """What a frame is to be taken for; the phone's rotation and position by it are written on the way."""
-    if not _is_news(model, state, value):
+    if not _is_news(model, state, value, time):
         return NOTHING
     for axis in range(3):
         of_phone[axis] = value[axis]
@@ -61,6 +68,14 @@ def judge(
         for axis in range(model.dimension):
             for part in range(3):
                 of_phone[axis] -= turned[axis, part] * state.mean[ARM + part]
+    return _verdict(model, state, time, value, of_phone)
+
+
+@compiled
+def _verdict(model: Model, state: State, time: float, value: FloatArray, of_phone: FloatArray) -> int:
+    """What a frame that is news is to be taken for."""
+    if _is_elsewhere(model, state, of_phone, time):
+        return NOTHING
     if state.count[STRANGE] == 0 and _is_astray(model, state, time, value, of_phone):
         state.count[ASTRAY] += 1
         if state.count[ASTRAY] < _ASTRAY_AFTER:
@@ -68,7 +83,7 @@ def judge(
         state.count[ASTRAY] = 0
         return BELIEVED_AGAIN
     state.count[ASTRAY] = 0
-    if _is_strange(model, state, of_phone, time):
+    if _is_strange(model, state, of_phone, value, time):
         return NOTHING
     if state.count[STRANGE] > 0:
         state.count[STRANGE] = 0
@@ -102,34 +117,70 @@ def _is_astray(model: Model, state: State, time: float, value: FloatArray, of_ph
 
 
 @compiled
-def _is_news(model: Model, state: State, value: FloatArray) -> bool:
+def _is_news(model: Model, state: State, value: FloatArray, time: float) -> bool:
     """A tracker that has lost its target repeats the last position or says zero: no noise does that on all axes.
 
     Unless it never said anything else.
     """
-    repeated, zero = True, True
+    repeated, zero, squared = True, True, 0.0
     for axis in range(model.dimension):
         repeated &= value[axis] == state.fact[LAST + axis]
         zero &= value[axis] == 0.0
+        squared += (value[axis] - state.fact[LAST + axis]) ** 2
         state.fact[LAST + axis] = value[axis]
+    state.fact[STEP_MM], state.fact[STEP_S], state.fact[LAST_S] = np.sqrt(squared), time - state.fact[LAST_S], time
     if not (repeated or zero):
         state.count[HAS_DIFFERED] = 1
     return not (repeated or zero) or state.count[HAS_DIFFERED] == 0
 
 
 @compiled
-def _is_strange(model: Model, state: State, of_phone: FloatArray, time: float) -> bool:
+def _is_elsewhere(model: Model, state: State, of_phone: FloatArray, time: float) -> bool:
+    """Does a frame go on from those of another body, rather than from where the hand was expected?"""
+    if state.count[STRANGE] == 0 or state.count[ELSEWHERE] == 0:
+        return False
+    squared, _ = _from_expected(model, state, of_phone)
+    step_mm, recent = state.fact[STEP_MM], time - state.fact[STRANGE_SINCE] < BELIEVED_AFTER_S
+    has_leapt_back = step_mm > _reach(state, state.fact[STEP_S])
+    if recent and not has_leapt_back and step_mm * step_mm < squared:
+        state.count[STRANGE] += 1
+        return True
+    state.count[ELSEWHERE] = 0
+    if has_leapt_back:
+        state.count[STRANGE] = 0
+    return False
+
+
+@compiled
+def _reach(state: State, seconds: float) -> float:
+    """How far two of a hand's frames can be apart."""
+    return float(FASTEST_MM_S * max(seconds, LEAST_FRAME_S) + LEAP_SDS * np.sqrt(bank.noise(state)))
+
+
+@compiled
+def _has_leapt(model: Model, state: State, value: FloatArray, time: float) -> bool:
+    """Further from where the hand was seen last than any hand goes."""
+    squared = 0.0
+    for axis in range(model.dimension):
+        squared += (value[axis] - state.fact[SEEN + axis]) ** 2
+    return bool(squared > _reach(state, time - state.fact[SEEN_S]) ** 2)
+
+
+@compiled
+def _is_strange(model: Model, state: State, of_phone: FloatArray, value: FloatArray, time: float) -> bool:
     """Further from what was expected than a hand goes: another body's, for as long as that can be.
 
     Leaves the count of strange frames above zero with the first that is believed again where it is.
     """
     squared, most_mm = _from_expected(model, state, of_phone)
-    if squared <= most_mm * most_mm:
+    leapt = state.count[STRANGE] == 0 and _has_leapt(model, state, value, time)
+    if squared <= most_mm * most_mm and not leapt:
         state.count[STRANGE] = 0
         return False
     if state.count[STRANGE] == 0:
         state.fact[STRANGE_SINCE], state.fact[STRANGE_MM] = time, np.sqrt(squared)
+        state.count[ELSEWHERE] = int(leapt)
     state.count[STRANGE] += 1
     if state.count[STRANGE] > 2 and squared > (_RUNAWAY * state.fact[STRANGE_MM]) ** 2:
         return False
-    return bool(time - state.fact[STRANGE_SINCE] < _BELIEVED_AFTER_S)
+    return bool(time - state.fact[STRANGE_SINCE] < BELIEVED_AFTER_S)

@@ -42,7 +42,8 @@ ROWS, WAITING, TAKEN, TOO_LATE, KNOWS_ARM, HAS_DIFFERED, STRANGE = 0, 1, 2, 3, 4
 ASTRAY = 7  # frames in a row that the fusion alone did not expect
 IN_A_ROW = 8  # frames that were measurements, since there was none for a while
 HAS_TURNED, LOST = 9, 10  # is an orientation known, and is the newest one not believed
-COUNTS = 11
+ELSEWHERE = 11  # are strange frames another body's, to which the tracker has leapt
+COUNTS = 12
 
 # State.fact.
 AT, BEGAN, STRANGE_SINCE, PHONE_AHEAD = 0, 1, 2, 3  # times in s; how far the phone's stamps are ahead of their arrival
@@ -60,7 +61,9 @@ SEEN, SEEN_S = 24, 27  # the newest frame that was a measurement (3), and when i
 TURNED_S, NEW_S = 28, 29  # when the newest orientation that is believed was logged, and when for the first time
 LOST_SINCE = 30  # when those began that are not
 UNSURE = 31  # what is not known of accelerations since the stamp, (mm/s)²: an integral of densities
-FACTS = 32
+STEP_MM, STEP_S = 32, 33  # from the newest frame but one to the newest
+LAST_S = 34  # when the newest frame was measured
+FACTS = 35
 
 # A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
 # position (3) and its variance as the filters state it.

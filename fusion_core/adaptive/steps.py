@@ -22,6 +22,7 @@ from fusion_core.adaptive.layout import (
     KNOWN,
     KNOWS_ARM,
     LAST,
+    LAST_S,
     MOST_WAITING,
     NOISE,
     NOISE_DRIFT,
@@ -197,7 +198,7 @@ def _take_first(model: Model, state: State, phone: Phone) -> None:
 def _begin(model: Model, state: State, time: float, value: FloatArray) -> None:
     """The first frame."""
     moments.begin(model, state, value)
-    state.fact[AT], state.fact[BEGAN] = time, time
+    state.fact[AT], state.fact[BEGAN], state.fact[LAST_S] = time, time, time
     bank.begin(model, state, value)
     clock.begin(model, state, value)
     state.fact[STAMP] = time

@@ -10,8 +10,17 @@ import numpy as np
 
 from fusion_core.kalman.event_time import EventTime
 from fusion_core.phone.orientation import heading_filter
+from fusion_core.phone.sightings import Sighting, sighted
 from fusion_core.samples import FloatArray, Sample
 from fusion_core.sensors import Sensor
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What is known: the filter's own state, and the tracker's newest sighting of the hand."""
+
+    moments: Any
+    sighting: Sighting | None = None
 
 
 @dataclass(frozen=True)
@@ -28,23 +37,27 @@ class HeadingFilter:
     def _steps(self) -> EventTime:
         return heading_filter(self.tracker, self.phone)
 
-    def start(self) -> Any:
+    def start(self) -> Heading:
         """The state before any reading."""
-        return self._steps.start()
+        return Heading(self._steps.start())
 
-    def position(self, state: Any, time: float, arrival: float, position_mm: FloatArray) -> Any:
-        """The state after a position (3,) in mm."""
-        return self._steps.update(state, "tracker", Sample(time, arrival, position_mm))
+    def position(self, state: Heading, time: float, arrival: float, position_mm: FloatArray) -> Heading:
+        """The state after a position (3,) in mm, if it is one of the hand."""
+        sighting, seen = sighted(state.sighting, time, position_mm, self.tracker.noise_sd)
+        if seen is None:
+            return Heading(state.moments, sighting)
+        return Heading(self._steps.update(state.moments, "tracker", Sample(time, arrival, seen)), sighting)
 
-    def acceleration(self, state: Any, time: float, arrival: float, acceleration_mm_s2: FloatArray) -> Any:
+    def acceleration(self, state: Heading, time: float, arrival: float, acceleration_mm_s2: FloatArray) -> Heading:
         """The state after an acceleration (3,) in mm/s²."""
         east, north, up = acceleration_mm_s2.tolist()
         coupling = np.array([[1.0, 0, 0, -east, north], [0, 1.0, 0, -north, -east], [0, 0, 1.0, 0, 0]])
-        return self._steps.update(state, "imu", Sample(time, arrival, np.array([0.0, 0.0, up]), coupling))
+        reading = Sample(time, arrival, np.array([0.0, 0.0, up]), coupling)
+        return Heading(self._steps.update(state.moments, "imu", reading), state.sighting)
 
-    def angle(self, state: Any) -> tuple[float, float]:
+    def angle(self, state: Heading) -> tuple[float, float]:
         """The angle and its SD in rad; NaN and infinity before the first position."""
-        constants = self._steps.newest_constants(state)
+        constants = self._steps.newest_constants(state.moments)
         if constants is None:
             return float("nan"), float("inf")
         mean, covariance = constants

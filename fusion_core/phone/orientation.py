@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fusion_core.kalman.event_time import EventTime
 from fusion_core.kalman.fusion import FusionKalman
+from fusion_core.phone.sightings import sightings
 from fusion_core.samples import FloatArray, Samples
 from fusion_core.sensors import Sensor
 
@@ -97,9 +98,10 @@ def heading(
 
     Both are in frames whose z points up: positions (m, 3) in mm, accelerations (n, 3) in mm/s² without gravity. Each
     angle is what is known when an acceleration arrives. The cosine and sine of the angle enter an acceleration
-    linearly, so they are constants of the fusion filter beside its bias. NaN before the first position; the SD is large
-    until the hand has moved.
+    linearly, so they are constants of the fusion filter beside its bias. Frames that did not see the hand say nothing.
+    NaN before the first position; the SD is large until the hand has moved.
     """
+    tracker = sightings(tracker, tracker_sensor.noise_sd)
     east, north = acceleration.value[:, 0], acceleration.value[:, 1]
     coupling = np.zeros((len(acceleration), 3, 5))
     coupling[:, :3, :3] = np.eye(3)

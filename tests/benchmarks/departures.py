@@ -119,6 +119,7 @@ DEPARTURES: Mapping[str, Departure] = {
     "yaw 120°": Departure(yaw_deg=120.0),
     "orientation withheld": Departure(withheld=True),
     "withheld, gyroscope 1.5°/s": Departure(withheld=True, gyroscope_deg_s=1.5),
+    "withheld, other body 1 s": Departure(withheld=True, spell="swap"),
 }
 
 
