@@ -140,10 +140,9 @@ def _names(people: Sequence[str]) -> str:
 
 def _disagreements(order_rows: pd.DataFrame) -> Iterator[Row]:
     """Participants for whom two sources give different orders."""
-    for first, second in combinations(orders.SOURCES, 2):
-        orders_of_first, orders_of_second = (
-            orders.orders_as_text(order_rows[order_rows["source"] == source]) for source in (first, second)
-        )
+    by_source = {source: orders.orders_as_text(rows) for source, rows in order_rows.groupby("source")}
+    for first, second in combinations([source for source in orders.SOURCES if source in by_source], 2):
+        orders_of_first, orders_of_second = by_source[first], by_source[second]
         differ = sorted(
             person
             for person in orders_of_first

@@ -41,6 +41,8 @@ def fitts_law(movements: pd.DataFrame, conditions: Sequence[str]) -> Fitts:
 
     `movements` is the table of the study.
     """
+    if movements.empty:
+        return Fitts([], [])
     each = _of_people(_in_blocks(movements))
     lines: list[Row] = []
     points: list[Row] = []

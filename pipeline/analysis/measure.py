@@ -22,6 +22,7 @@ from pipeline.analysis.values import (
     given_table,
     measures_table,
     movement_values,
+    no_values,
     rated_values,
     selection_values,
     tabled_values,
@@ -54,7 +55,7 @@ def run(work: Work) -> Outcome:
     values = _together(
         [
             *selection_values(study, trials, selections),
-            completion_values(work, exclusions),
+            *completion_values(work, exclusions),
             *movement_values(movements),
             *rated_values(work),
             *tabled_values(work, tabled),
@@ -111,11 +112,10 @@ def _together(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
     The parts are let go: they are as large as the result.
     """
-    columns = dict.fromkeys(name for part in parts for name in part)
-    together = pd.concat([part for part in parts if len(part)] or parts).reset_index(drop=True)
+    together = pd.concat([part for part in parts if len(part)] or [no_values()]).reset_index(drop=True)
     parts.clear()
     tables.give_back(len(together))
-    return together.assign(**{str(name): None for name in columns if name not in together})
+    return together if "target" in together else together.assign(target=None)
 
 
 def _listed(excluded: Exclusion) -> Row:
@@ -171,11 +171,17 @@ def _write_values(
     observed = [*CELL, "session", "period", "sequence"]
     tables.write("measures", measures, folder)
     tables.write("observations", _with_totals(study, _cells(values, observed), observed, scores), folder)
+    tables.write("target_observations", _cells_of_targets(values, observed), folder)
+
+
+def _cells_of_targets(values: pd.DataFrame, observed: list[str]) -> pd.DataFrame:
+    """The cells of values whose target is known, with the target as their one factor."""
     known = values["target"].notna()
     by_target = values if known.all() else values[known]
+    if by_target.empty:
+        return by_target
     factors = {place: json.dumps({"target": place}) for place in by_target["target"].unique()}
-    by_target = by_target.assign(factors=by_target["target"].map(factors))
-    tables.write("target_observations", _cells(by_target, observed), folder)
+    return _cells(by_target.assign(factors=by_target["target"].map(factors)), observed)
 
 
 def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -196,7 +202,7 @@ def _cells(values: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
     empty = {key: values[key].iloc[:1] for key in keys if len(values) and values[key].isna().all()}  # costs a key each
     by = [key for key in keys if key not in empty]
     grouped: Any = values.groupby(by, dropna=False, sort=False)["value"]
-    found = pd.DataFrame(grouped.agg(["mean", "size"]).reset_index())
+    found = pd.DataFrame({"mean": grouped.mean(), "size": grouped.size()}).reset_index()
     found = found.assign(**{key: one.repeat(len(found)).to_numpy() for key, one in empty.items()})
     return found[[*keys, "mean", "size"]].rename(columns={"mean": "value", "size": "n"})
 
@@ -216,10 +222,12 @@ def _totals(cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd
     Only instruments whose record says that a sum is reported have a total.
     """
     parts = [str(measure).partition("/") for measure in cells["measure"]]
+    keys = [*cell, "factors"]
+    rows: list[tuple[Any, ...]] = []
+    if not any(scale for _, _, scale in parts):
+        return pd.DataFrame(rows, columns=[*keys, "measure", "value", "n"])
     split = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
     ratings = split[(split["scale"] != "") & ~split["measure"].isin(list(scores))]
-    rows = []
-    keys = [*cell, "factors"]
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
         scales = set(answered["scale"])
         if "total" in scales or not has_total(str(questionnaire)):

@@ -136,7 +136,15 @@ def run_orders(orders: pd.DataFrame) -> pd.DataFrame:
 
 def with_periods(values: pd.DataFrame, orders: pd.DataFrame, sequences: pd.DataFrame) -> pd.DataFrame:
     """Values with their period (their own, their session's, or that of their condition) and their sequence."""
-    run = run_orders(orders)
+    labels = dict(zip(sequences["participant"], sequences["sequence"], strict=True))
+    if len(orders):
+        run = run_orders(orders)
+        values = values.assign(period=_periods(values, run))
+        labels = {**orders_as_text(run), **labels}
+    return values.assign(sequence=values["participant"].map(labels).astype("string"))
+
+
+def _periods(values: pd.DataFrame, run: pd.DataFrame) -> pd.Series:
     by_session = run.dropna(subset="session").drop_duplicates("session").set_index("session")["period"]
     once = run.drop_duplicates(["participant", "condition", "period"])
     once = once[~once.duplicated(["participant", "condition"], keep=False)]
@@ -144,9 +152,7 @@ def with_periods(values: pd.DataFrame, orders: pd.DataFrame, sequences: pd.DataF
     cells = pd.MultiIndex.from_frame(values[["participant", "condition"]])
     period = values["period"].astype("Int64")
     period = period.fillna(values["session"].map(by_session).astype("Int64"))
-    period = period.fillna(pd.Series(by_cell.reindex(cells).to_numpy(), index=values.index).astype("Int64"))
-    labels = {**orders_as_text(run), **dict(zip(sequences["participant"], sequences["sequence"], strict=True))}
-    return values.assign(period=period, sequence=values["participant"].map(labels).astype("string"))
+    return period.fillna(pd.Series(by_cell.reindex(cells).to_numpy(), index=values.index).astype("Int64"))
 
 
 def orders_as_text(run: pd.DataFrame) -> dict[str, str]:

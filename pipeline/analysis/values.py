@@ -126,22 +126,28 @@ def _with_widths(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:
     """Rows of one measure: participant, condition, session, trial, factors, period, measure, value, and source."""
+    none = pd.Series(pd.NA, index=rows.index, dtype="Int64")
     return pd.DataFrame(
         {
             "participant": rows["participant"],
             "condition": rows["condition"],
             "session": rows["session"],
-            "trial": rows.get("trial", pd.NA),
-            "factors": rows.get("factors"),
-            "period": pd.NA,
+            "trial": rows["trial"].astype("Int64") if "trial" in rows else none,
+            "factors": rows["factors"].astype("object") if "factors" in rows else _of_all(None, rows),
+            "period": none,
             "measure": _of_all(measure, rows),
             "value": rows[column].astype("float64"),
             "source": _of_all(source, rows),
         }
-    ).astype({"factors": "object", "period": "Int64", "trial": "Int64"})
+    )
 
 
-def _of_all(text: str, rows: pd.DataFrame) -> np.ndarray:
+def no_values() -> pd.DataFrame:
+    """What a study has that measured nothing."""
+    return _values(tables.frame("trials", ()), "", "squared_error_mm2", "").assign(target=None)
+
+
+def _of_all(text: str | None, rows: pd.DataFrame) -> np.ndarray:
     """A text for every row, of which there is one in memory."""
     return np.full(len(rows), text, dtype=object)
 
@@ -153,6 +159,8 @@ def selection_values(study: Study, trials: pd.DataFrame, selections: pd.DataFram
 
     A place in mm is what two trials have in common if they are of one target; None where the target is not known.
     """
+    if trials.empty:
+        return []
     recorded = _chosen(trials, trials["estimator"] == "recorded")
     recorded = recorded.assign(target=_targets(recorded, selections))
     selected = _chosen(recorded, recorded["squared_error_mm2"].notna())
@@ -199,6 +207,8 @@ def _labels(places: FloatArray) -> np.ndarray:
 
 def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """Throughput (bits/s), one row per sequence of a session, and measures of the hand's path, one row per trial."""
+    if moved.empty:
+        return
     figures = ("amplitude_mm", "moved_mm", "along_mm", "duration_s", "width_mm")
     cell = [*CELL, "session", *(["factors"] if "factors" in moved else [])]
     rows = [
@@ -218,7 +228,7 @@ def movement_values(moved: pd.DataFrame) -> Iterator[pd.DataFrame]:
         yield _values(for_measures[for_measures[column].notna()], measure, column, "the trials")
 
 
-def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
+def completion_values(work: Work, exclusions: list[Row]) -> list[pd.DataFrame]:
     """Seconds from session_start to the last selection, one row per session with both; `exclusions` lists the rest.
 
     Where a session's first trials are practice, from the start of the first trial after them.
@@ -246,7 +256,7 @@ def completion_values(work: Work, exclusions: list[Row]) -> pd.DataFrame:
             else:
                 rows.append((session.participant, session.condition, session.id, seconds))
     durations = pd.DataFrame(rows, columns=[*CELL, "session", "seconds"])
-    return _values(durations, "completion_time_s", "seconds", "the events")
+    return [_values(durations, "completion_time_s", "seconds", "the events")] if rows else []
 
 
 def rated_values(work: Work) -> Iterator[pd.DataFrame]:
