@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.analysis.audit.beside_computed import compare_printed
-from pipeline.analysis.comparisons import all_requests, compared, people_of
+from pipeline.analysis.comparisons import answered, compared, people_of
 from pipeline.analysis.complete_cases import People, read_values
 from pipeline.analysis.descriptives import descriptives, differences, intervals_within, means_of_measures
 from pipeline.analysis.design_check import findings
@@ -59,12 +59,13 @@ def run(work: Work) -> Outcome:
         "differences": tables.frame("differences", differences(means)),
     }
     refuse_undefined(study, list(measures["measure"].unique()), tables.read("exclusions", measured))
-    rows, left_out = compared(study, values)
+    answers = answered(study, values)
+    rows, left_out = compared(answers)
     frames["comparisons"] = tables.frame("comparisons", rows)
     rows, uncomparable = _comparisons_of_all_data(study, measured / ALL_DATA, values.people)
     frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
     left_out += uncomparable
-    requests = [request for entry in all_requests(study, values) for request in entry]
+    requests = [answer.request for answer in answers]
     frames["group_members"] = tables.frame("group_members", group_members(requests))
     frames["normal_quantiles"] = tables.frame("normal_quantiles", normality_rows(requests))
     frames["descriptives_by_group"] = tables.frame("descriptives_by_group", by_group(requests))
@@ -135,7 +136,7 @@ def _comparisons_of_all_data(study: Study, folder: Path, people: People) -> tupl
     if not study.exclusions:
         return [], []
     try:
-        return compared(study, read_values(folder, people))[0], []
+        return compared(answered(study, read_values(folder, people)))[0], []
     except PipelineError as error:
         return [], [{"what": "no comparison without the exclusions", "reason": str(error)}]
 

@@ -41,12 +41,8 @@ def people_of(study: Study, folder: Path, pseudonyms: Pseudonyms | None = None) 
     return {str(column): {str(person): str(value) for person, value in table[column].items()} for column in table}
 
 
-def compared(study: Study, values: Values) -> Answer:
-    """Every row of `comparisons`, and every exclusion that results from them, once each.
-
-    Raises PipelineError where an entry names no measure of the data or does not fit the design.
-    """
-    answers = answered(study, values)
+def compared(answers: Sequence[Answered]) -> Answer:
+    """Every row of `comparisons`, and every exclusion that results from them, once each."""
     rows = [row for one in answers for row in one.rows]
     for row in rows:
         row["details"] = json.dumps(row["details"]) if row["details"] else None
@@ -65,7 +61,10 @@ class Answered:
 
 
 def answered(study: Study, values: Values) -> list[Answered]:
-    """Every request and its rows, in the order of study.yaml, with p values adjusted; raises as `compared` does."""
+    """Every request and its rows, in the order of study.yaml, with p values adjusted.
+
+    Raises PipelineError where an entry names no measure of the data or does not fit the design.
+    """
     if study.comparisons and len(study.conditions) < 2:
         raise PipelineError("study.yaml: comparisons need at least two conditions; `conditions` lists only one")
     answers: list[Answered] = []

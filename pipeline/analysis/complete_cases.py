@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,11 @@ class Request(Values):
     entry: Comparison
     measure: str
 
+    @cached_property
+    def cases(self) -> CompleteCases:
+        """`by_condition`, which both the test and the check of its assumptions ask for."""
+        return _by_condition(self)
+
 
 @dataclass(frozen=True)
 class CompleteCases:
@@ -66,6 +72,10 @@ def by_condition(request: Request) -> CompleteCases:
 
     With `missing: available` also of those who lack a cell of a further factor: their mean is over the cells they have.
     """
+    return request.cases
+
+
+def _by_condition(request: Request) -> CompleteCases:
     rows, factors = rows_and_factors(request, request.measures)
     wide = tables.participant_means(rows, request.measure, request.study.conditions)
     levels = [list(request.study.conditions)]

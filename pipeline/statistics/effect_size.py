@@ -27,6 +27,7 @@ def dz_interval(dz: float, n: int, level: float = 0.95) -> tuple[float | None, f
     return standardized_interval(float(dz * np.sqrt(n)), n - 1, float(n**-0.5), level)
 
 
+@lru_cache(maxsize=1024)  # several tests of the same values share it, also those without the exclusions
 def standardized_interval(t: float, df: float, error: float, level: float = 0.95) -> tuple[float | None, float | None]:
     """Interval of a standardized difference, which is t times `error`: from the noncentralities that fit t."""
     tail = (1 - level) / 2

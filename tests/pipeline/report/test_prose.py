@@ -13,6 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pypdf import PdfReader
 
+from pipeline.analysis.comparisons import answered
 from pipeline.analysis.comparisons import compared as rows_of
 from pipeline.analysis.complete_cases import Values
 from pipeline.analysis.descriptives import descriptives, means_of_measures
@@ -143,7 +144,8 @@ def a_study(
     ]
     measures = tables.frame("measures", cells)
     observations = tables.frame("observations", [{**cell, "n": 1} for cell in cells])
-    rows, _ = rows_of(study, Values(measures, observations, tables.frame("target_observations", []), {}))
+    tabled = Values(measures, observations, tables.frame("target_observations", []), {})
+    rows, _ = rows_of(answered(study, tabled))
     for row in rows:
         row["details"] = json.loads(row["details"]) if row["details"] else None
     complete = list(
