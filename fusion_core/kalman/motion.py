@@ -7,7 +7,6 @@ from math import factorial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
 
 from fusion_core.checks import require_positive
 from fusion_core.compilation import compiled
@@ -84,6 +83,8 @@ class Matern72:
 
     def _stationary(self) -> FloatArray:
         """Covariance (4, 4) of the process and its first three derivatives."""
+        from scipy.linalg import solve_continuous_lyapunov
+
         density = self.signal_sd_mm**2 * 32 * self._rate**7 / 5
         noise = np.zeros((4, 4))
         noise[3, 3] = density

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.errors import PipelineError, WorkerLostError, did_you_mean
 from pipeline.simulation.session import Outcome, Setting, simulate
 from pipeline.simulation.study_files import participants, with_other_people
-from pipeline.simulation.what_pays import Tracker
+from pipeline.simulation.tracker import Tracker
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 
+from pipeline.simulation.tracker import Tracker
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.descriptive import summarize
 from pipeline.statistics.paired import t_paired
@@ -23,19 +24,6 @@ MOST = 1000
 """Participants, beyond which a difference counts as not to be shown."""
 _CORRELATION = 0.5  # any: d_z alone decides a paired test
 _COUNTS = ("selections", "misses", "not_selected")
-
-
-class Tracker(NamedTuple):
-    """A tracker by what is swept of it."""
-
-    latency_s: float
-    noise_sd_mm: float
-    rate_hz: float
-
-    def at_least(self, other: Tracker) -> bool:
-        """Is it no worse in anything?"""
-        late, noisy = self.latency_s <= other.latency_s, self.noise_sd_mm <= other.noise_sd_mm
-        return late and noisy and self.rate_hz >= other.rate_hz
 
 
 _POINT = [*Tracker._fields, "estimator"]

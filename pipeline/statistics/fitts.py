@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics import NO_VARIATION, OK, TOO_FEW_VALUES
 from pipeline.statistics.arrays import FloatArray
@@ -96,6 +95,8 @@ def fitted(blocks: Blocks) -> Fitted:
         return Fitted(m, throughput_bits_s=throughput, status=TOO_FEW_VALUES)
     if negligible(float(np.sum((x - x.mean()) ** 2)), x):
         return Fitted(m, throughput_bits_s=throughput, status=NO_VARIATION)
+    from scipy import stats  # a third of what a process imports that only reads and fuses logs, which has no lines
+
     line = stats.linregress(x, y)
     t = float(stats.t.ppf(0.975, m - 2))
     slope, intercept = float(line.slope), float(line.intercept)

@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.style import WIDTH, styled
 from pipeline.report.glyphs import showable
-from pipeline.simulation.what_pays import MEASURES, MOST, Tracker
+from pipeline.simulation.tracker import Tracker
+from pipeline.simulation.what_pays import MEASURES, MOST
 from pipeline.statistics.arrays import FloatArray
 from pipeline.words.numbers import NO_VALUE, number
 

@@ -13,7 +13,8 @@ from pipeline.report.document.model import Block, Document, Notice, Paragraph, S
 from pipeline.report.figures.exploration import ERROR, NAMES, TIME, outcome, participants
 from pipeline.report.sections.material import draw_now
 from pipeline.report.sections.provenance import program
-from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Tracker, Way
+from pipeline.simulation.tracker import Tracker
+from pipeline.simulation.what_pays import MEASURES, MOST, POWER, Pays, Way
 from pipeline.study.settings import Study
 from pipeline.tables.table import Row, records
 from pipeline.words.change import reduction_phrase

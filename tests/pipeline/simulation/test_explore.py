@@ -19,7 +19,8 @@ from pipeline.engine.processes import InThisProcess
 from pipeline.errors import WorkerLostError
 from pipeline.simulation.exploration import Grid, explore, stated, with_tracker
 from pipeline.simulation.session import Setting
-from pipeline.simulation.what_pays import MEASURES, Tracker, differences, means, what_pays
+from pipeline.simulation.tracker import Tracker
+from pipeline.simulation.what_pays import MEASURES, differences, means, what_pays
 from pipeline.study.folder import load_study
 from pipeline.tables import table as tables
 from pipeline.tables.catalogue import TABLES
