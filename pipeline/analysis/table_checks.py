@@ -131,8 +131,8 @@ def missing_code(name: str, source: str, value: FloatArray, participants: pd.Ser
 
 def _by_questionnaire(values: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """The rows of each questionnaire: of what stands before the slash in a measure's name."""
-    of_each = values["measure"].map({name: str(name).partition("/")[0] for name in values["measure"].unique()})
-    for questionnaire, rows in values.groupby(of_each, sort=False):
+    names = {name: str(name).partition("/")[0] for name in values["measure"].unique() if "/" in name}
+    for questionnaire, rows in values.groupby(values["measure"].map(names), sort=False) if names else ():
         yield str(questionnaire), rows
 
 
