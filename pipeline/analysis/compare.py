@@ -190,7 +190,7 @@ def _session_exclusions(work: Work) -> list[Row]:
 def _without_excluded(study: Study, work: Work, table: pd.DataFrame) -> pd.DataFrame:
     """The rows of a table without those of sessions that study.yaml excludes as a whole, which the exclusions list."""
     excluded = {session.id for session in work.sessions if study.exclusion_of(session)}
-    return table[~table["session"].isin(excluded)]
+    return table[~table["session"].isin(excluded)] if excluded else table
 
 
 def accuracy_means(accuracy: pd.DataFrame) -> list[Row]:

@@ -129,6 +129,8 @@ def _of_measures(measures: pd.DataFrame | None) -> list[Row]:
 
 def run_orders(orders: pd.DataFrame) -> pd.DataFrame:
     """Each participant's rows from the source that comes first in SOURCES."""
+    if orders.empty:
+        return orders
     ranked = orders.assign(rank=orders["source"].map({source: at for at, source in enumerate(SOURCES)}).astype(int))
     kept: pd.DataFrame = ranked[ranked["rank"] == ranked.groupby("participant")["rank"].transform("min")]
     return kept.drop(columns="rank")
@@ -137,8 +139,8 @@ def run_orders(orders: pd.DataFrame) -> pd.DataFrame:
 def with_periods(values: pd.DataFrame, orders: pd.DataFrame, sequences: pd.DataFrame) -> pd.DataFrame:
     """Values with their period (their own, their session's, or that of their condition) and their sequence."""
     labels = dict(zip(sequences["participant"], sequences["sequence"], strict=True))
-    if len(orders):
-        run = run_orders(orders)
+    run = run_orders(orders)
+    if len(run):
         values = values.assign(period=_periods(values, run))
         labels = {**orders_as_text(run), **labels}
     return values.assign(sequence=values["participant"].map(labels).astype("string"))

@@ -170,6 +170,13 @@ def _empty_file(name: str) -> bytes:
     return content
 
 
+def _has_none(name: str, path: Path) -> bool:
+    """Whether a file is that of a table without rows, as most are; to open one takes four times as long."""
+    with suppress(OSError):  # which reading it as any other will meet again
+        return path.stat().st_size == len(_empty_file(name)) and path.read_bytes() == _empty_file(name)
+    return False
+
+
 def write_parts(name: str, parts: Iterable[pa.Table], folder: Path) -> None:
     """Write a table that is given part by part: of a large one no more than some parts are in memory."""
     waiting, rows, coming = [TABLES[name].schema.empty_table()], 0, iter(parts)
@@ -263,7 +270,8 @@ def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
     merged, parts = [], []
     for folder in [folders] if isinstance(folders, Path) else folders:
         with suppress(FileNotFoundError):
-            parts.append(_read_file(name, folder / f"{name}.parquet"))
+            path = folder / f"{name}.parquet"
+            parts.append(TABLES[name].schema.empty_table() if _has_none(name, path) else _read_file(name, path))
         if len(parts) == _PARTS:
             merged.append(pa.concat_tables(parts).combine_chunks())
             parts = []
@@ -377,7 +385,7 @@ def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Rows as plain objects for JSON, None for what does not apply; `details` and `factors` stay text."""
     if len(data) == 0:
         return
-    for row in as_table(name, data).itertuples(index=False):
+    for row in as_table(name, data).itertuples(index=False, name=None):
         yield {key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)}
 
 
