@@ -35,9 +35,10 @@ def _covered() -> frozenset[int]:
 
 def showable(text: str) -> str:
     """Text with □ for each character that has no glyph; line breaks become spaces."""
-    return "".join(_shown(c) for c in text)
+    return "".join(map(_shown, text))
 
 
+@cache
 def _shown(character: str) -> str:
     if character in "\n\r\t":
         return " "

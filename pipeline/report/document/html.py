@@ -58,7 +58,9 @@ def write_page(template: str, scripts: Sequence[str], path: Path, origin: str, *
     page = (
         _environment().get_template(template).render(style=style, script=code, policy=policy, origin=origin, **values)
     )
-    path.write_text(page.translate(_CONTROLS | _UNBROKEN), encoding="utf-8")
+    before, _, after = page.partition(style)  # nearly all of a page, and all of it our own
+    changed = (part.translate(_CONTROLS | _UNBROKEN) for part in (before, after))
+    path.write_text(style.join(changed), encoding="utf-8")
 
 
 @cache

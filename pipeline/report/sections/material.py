@@ -51,6 +51,7 @@ class Material:
     inputs: Mapping[str, str]
     jobs: Jobs = field(default_factory=Jobs)
     own_pictures: tuple[Figure, ...] = ()
+    _means: dict[str, pd.DataFrame] = field(default_factory=dict, init=False)
 
     @cached_property
     def measures(self) -> pd.DataFrame:
@@ -87,8 +88,10 @@ class Material:
         return list(dict.fromkeys(row["measure"] for row in self.rows("descriptives")))
 
     def participant_means(self, measure: str) -> pd.DataFrame:
-        """One row per participant and one column per condition, as the descriptives count them."""
-        return person_means(self.study, self.measures, measure)
+        """One row per participant and one column per condition, as the descriptives count them; made once."""
+        if measure not in self._means:
+            self._means[measure] = person_means(self.study, self.measures, measure)
+        return self._means[measure]
 
     def of_shares(self, measure: str) -> bool:
         """Is each value of a measure a participant's share of answers 0 or 1?"""
