@@ -41,9 +41,8 @@ def descriptives(means: PersonMeans, observations: pd.DataFrame) -> list[Row]:
 
 def described_values(name: str, wide: pd.DataFrame, observations: pd.DataFrame) -> Callable[[FloatArray], Row]:
     """What describes some of a measure's values; `wide`, all participants' means by condition, tells their kind."""
-    everything = _all_of(wide)
     method = _interval_method(name, wide, observations)
-    within_unit = not measure(name).unit and bool(((everything >= 0) & (everything <= 1)).all())
+    within_unit = not measure(name).unit and _within_unit(_all_of(wide))
     return lambda values: described(values, method, within_unit)
 
 
@@ -83,8 +82,13 @@ def differences(means: PersonMeans) -> list[Row]:
 
 
 def _interval_method(name: str, wide: pd.DataFrame, observations: pd.DataFrame) -> str:
-    shares = are_answers(observations[observations["measure"] == name])
-    return interval_method(_all_of(wide), shares, measure(name).unit != "")
+    values = _all_of(wide)
+    shares = _within_unit(values) and are_answers(observations[observations["measure"] == name])
+    return interval_method(values, shares, measure(name).unit != "")
+
+
+def _within_unit(values: FloatArray) -> bool:
+    return bool(((values >= 0) & (values <= 1)).all())
 
 
 def _all_of(wide: pd.DataFrame) -> FloatArray:
