@@ -171,7 +171,7 @@ def _empty_file(name: str) -> bytes:
 
 
 def _has_none(name: str, path: Path) -> bool:
-    """Whether a file is that of a table without rows, as most are; to open one takes four times as long."""
+    """Whether a file is that of a table without rows, as most are; opening it takes most of the time to read it."""
     with suppress(OSError):  # which reading it as any other will meet again
         return path.stat().st_size == len(_empty_file(name)) and path.read_bytes() == _empty_file(name)
     return False
@@ -401,7 +401,7 @@ def participant_means(measures: pd.DataFrame, measure: str, conditions: Sequence
     """One row per participant and one column per condition, in the given order: means over all else, or NaN."""
     rows = measures[measures["measure"] == measure]
     rows = rows[rows["value"].notna()]
-    # By the numbers of cells: to group by two texts and to pivot takes three times as long.
+    # By the numbers of cells: to group by two texts and to pivot takes half as long again.
     people, names = pd.factorize(rows["participant"], sort=True)
     places, met = pd.factorize(rows["condition"], sort=True)
     means = rows["value"].groupby(people * len(met) + places).mean()
