@@ -9,7 +9,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
 
 from fusion_core.adaptive import layout, steps
 from fusion_core.adaptive.found import Found, found
@@ -88,6 +87,8 @@ class FusionAdaptive:
     @cached_property
     def model(self) -> Records:
         """Priors and members, by what the sensors state: a record of `layout.MODEL`."""
+        from scipy.special import chdtri  # two fifths of what importing this package would cost
+
         noise_sd, dimension = self.sensors[self.tracker].noise_sd, self.dimension
         prior, walk = np.zeros(layout.SIZE), np.zeros(layout.SIZE)
         prior[layout.POSITION : layout.POSITION + dimension] = noise_sd**2
