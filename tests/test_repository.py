@@ -12,15 +12,15 @@ import yaml
 
 from fusion_core import ESTIMATORS
 from pipeline.study.comparison import Comparison
-from pipeline.study.csv_tables import (
+from pipeline.study.fields import Frozen
+from pipeline.study.folder import load_study
+from pipeline.study.given_tables import (
     MEASURE_REQUIRED,
     MEASURE_RESERVED,
     RATING_REQUIRED,
     TRIAL_OPTIONAL,
     TRIAL_REQUIRED,
 )
-from pipeline.study.fields import Frozen
-from pipeline.study.folder import load_study
 from pipeline.study.settings import Display, QualityLimits, Study
 from pipeline.study.streams import OperatorTerm, Stream
 from pipeline.study.yaml_text import parse

@@ -27,7 +27,7 @@ from pipeline.analysis.simulated_reductions import reductions
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
 from pipeline.sessions.estimators import build_estimator
-from pipeline.study import csv_tables as study_tables
+from pipeline.study import given_tables
 from pipeline.study.measures import measure_order
 from pipeline.study.preregistration import read_preregistered
 from pipeline.study.pseudonyms import exclusions_under
@@ -98,7 +98,7 @@ def run(work: Work) -> Outcome:
         )
     if isinstance(study.simulation, SelectionSimulation) and study.repeats is not None:
         file = TableFile(work.folder / study.repeats, "repeats", study.conditions)
-        repeats = study_tables.read_repeats(file)
+        repeats = given_tables.read_repeats(file)
         rows = list(reductions(study.simulation, study.conditions, repeats))
         frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
     facts = _participant_facts(work, measures, tables.read("exclusions", measured))
@@ -176,7 +176,7 @@ def _participant_facts(work: Work, measures: pd.DataFrame, exclusions: pd.DataFr
         unscored = exclusions.loc[exclusions["what"] == UNDEFINED, "participant"].dropna()
         everybody = people | set(unscored)
         return {"n": len(people)} if everybody == people else {"n": len(people), "listed": len(everybody)}
-    return study_tables.participant_facts(study_tables.read_participants(file), people)
+    return given_tables.participant_facts(given_tables.read_participants(file), people)
 
 
 def _session_exclusions(work: Work) -> list[Row]:

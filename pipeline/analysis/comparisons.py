@@ -23,7 +23,7 @@ from pipeline.statistics.tukey import tukey_kramer
 from pipeline.statistics.welch import anova_welch, games_howell
 from pipeline.statistics.wilcoxon import wilcoxon
 from pipeline.study.comparison import Comparison, matching_measures
-from pipeline.study.csv_tables import read_participants
+from pipeline.study.given_tables import read_participants
 from pipeline.study.measures import has_total, measure_order
 from pipeline.study.pseudonyms import Pseudonyms
 from pipeline.study.settings import Study

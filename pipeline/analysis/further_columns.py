@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.analysis.practice_trials import MARKS
 from pipeline.analysis.values import CELL
 from pipeline.sessions.checks.finding import Finding, of, rows_of
-from pipeline.study.csv_tables import own_columns_of_trials
+from pipeline.study.given_tables import own_columns_of_trials
 from pipeline.study.guessing.headers import meaning
 from pipeline.study.settings import Study
 from pipeline.study.yaml_text import flow

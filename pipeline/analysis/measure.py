@@ -30,7 +30,7 @@ from pipeline.analysis.values import (
 )
 from pipeline.engine.stage import Outcome, Work
 from pipeline.errors import PipelineError
-from pipeline.study import csv_tables as study_tables
+from pipeline.study import given_tables
 from pipeline.study.measures import has_total, reported_scales
 from pipeline.study.settings import Exclusion, Study
 from pipeline.tables import table as tables
@@ -192,7 +192,7 @@ def _orders(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> tuple[
         work.sessions,
         tables.read("session_orders", work.entries["ingest"]),
         None if tabled is None else tabled[0],
-        None if file is None else study_tables.read_participants(file),
+        None if file is None else given_tables.read_participants(file),
     )
 
 

@@ -14,7 +14,7 @@ from pipeline.analysis.groups import one_condition_each
 from pipeline.analysis.values import CELL, given_table
 from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study import csv_tables as study_tables
+from pipeline.study import given_tables
 from pipeline.study.settings import Exclusion, Study
 from pipeline.tables.table import Row
 
@@ -122,7 +122,7 @@ def gaps(work: Work, measures: pd.DataFrame) -> list[Row]:
     without: list[str] = []
     file = given_table(work, "participants")
     if file is not None:
-        named = study_tables.read_participants(file)["participant"]
+        named = given_tables.read_participants(file)["participant"]
         for participant in sorted(listed - set(named)):
             guess = len(named) and work.pseudonyms is None  # P03 is no misspelt P02
             hint = did_you_mean(participant, sorted(named)) if guess else ""

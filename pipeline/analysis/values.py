@@ -16,7 +16,7 @@ from pipeline.sessions import movements
 from pipeline.sessions.target_widths import widths_mm
 from pipeline.sessions.trials import coordinates, selections_by_trial, with_movements
 from pipeline.statistics.arrays import FloatArray
-from pipeline.study import csv_tables as study_tables
+from pipeline.study import given_tables
 from pipeline.study.settings import Study
 from pipeline.study.table_file import TableFile, table_file
 from pipeline.tables import table as tables
@@ -37,7 +37,7 @@ def given_table(work: Work, table: str) -> TableFile | None:
 def typed_trials(work: Work) -> pd.DataFrame | None:
     """The rows of trials.csv; None where study.yaml names none."""
     file = given_table(work, "trials")
-    return None if file is None else study_tables.read_trials(file)
+    return None if file is None else given_tables.read_trials(file)
 
 
 def all_trials(work: Work, table: pd.DataFrame | None) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -71,7 +71,7 @@ def all_trials(work: Work, table: pd.DataFrame | None) -> tuple[pd.DataFrame, pd
     selected = targets.assign(
         session=tabled["session"], **{f"{axis}_mm": table[f"selected_{axis}_mm"] for axis in "xyz"}
     )
-    own = table[study_tables.own_columns_of_trials(table)].assign(factors=factors_of_rows(work.study, table))
+    own = table[given_tables.own_columns_of_trials(table)].assign(factors=factors_of_rows(work.study, table))
     return pd.concat([tables.as_table("trials", tabled), own], axis=1), tables.as_table("selections", selected)
 
 
@@ -263,7 +263,7 @@ def rated_values(work: Work) -> Iterator[pd.DataFrame]:
     """Ratings from questionnaires."""
     file = given_table(work, "questionnaires")
     if file is not None:
-        ratings = study_tables.read_questionnaires(file)
+        ratings = given_tables.read_questionnaires(file)
         ratings["session"] = ratings.get("session")
         ratings["factors"] = factors_of_rows(work.study, ratings)
         names = ratings["questionnaire"] + "/" + ratings["scale"]
@@ -273,7 +273,7 @@ def rated_values(work: Work) -> Iterator[pd.DataFrame]:
 def measures_table(work: Work) -> tuple[pd.DataFrame, list[str]] | None:
     """The table of measures and its further factors, if the study has one."""
     file = given_table(work, "measures")
-    return None if file is None else study_tables.read_measures(file)
+    return None if file is None else given_tables.read_measures(file)
 
 
 def tabled_values(work: Work, tabled: tuple[pd.DataFrame, list[str]] | None) -> Iterator[pd.DataFrame]:

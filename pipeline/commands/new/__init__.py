@@ -14,7 +14,7 @@ from pipeline.commands.new.plan import plan
 from pipeline.commands.new.questions import Questions, of_terminal
 from pipeline.commands.new.templates import write_template
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.study import csv_tables
+from pipeline.study import given_tables
 from pipeline.study.folder import SETTINGS_FILE
 from pipeline.study.guessing.headers import EVERY, LENGTHS, plain
 from pipeline.study.session_files import find_sessions
@@ -160,10 +160,10 @@ def _checked(folder: Path, text: str) -> Study:
         draft_file.write_text(text, encoding="utf-8")
         study = parse(Study, read_yaml(draft_file), folder / SETTINGS_FILE)
     for table, read in (
-        ("participants", csv_tables.read_participants),
-        ("trials", csv_tables.read_trials),
-        ("questionnaires", csv_tables.read_questionnaires),
-        ("measures", csv_tables.read_measures),
+        ("participants", given_tables.read_participants),
+        ("trials", given_tables.read_trials),
+        ("questionnaires", given_tables.read_questionnaires),
+        ("measures", given_tables.read_measures),
     ):
         file = table_file(study, folder, table)
         if file is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.study.csv_tables import read_participants
+from pipeline.study.given_tables import read_participants
 from pipeline.study.table_file import TableFile
 from tests.pipeline.helpers import Ran, run
 

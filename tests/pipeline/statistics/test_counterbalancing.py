@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.statistics.counterbalancing import allocated, assigned, balance, nested, williams_design
-from pipeline.study.csv_tables import read_participants
+from pipeline.study.given_tables import read_participants
 from pipeline.study.table_file import TableFile
 from tests.pipeline.helpers import Ran, run
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import PipelineError
 from pipeline.study import large_tables, table_file
-from pipeline.study.csv_tables import read_trials
+from pipeline.study.given_tables import read_trials
 from pipeline.study.table_file import TableFile
 
 HEADER = "participant,condition,trial,target_x_mm,target_y_mm,selected_x_mm,selected_y_mm,start_ms,block"
