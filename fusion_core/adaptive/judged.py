@@ -27,8 +27,6 @@ from fusion_core.adaptive.layout import (
     SEEN,
     SEEN_S,
     SHOWN,
-    STEP_MM,
-    STEP_S,
     STRANGE,
     STRANGE_MM,
     STRANGE_SINCE,
@@ -59,6 +57,7 @@ def judge(
     of_phone: FloatArray,
 ) -> int:
     """What a frame is to be taken for; the phone's rotation and position by it are written on the way."""
+    step_mm, step_s = _since_last(model, state, value, time)
     if not _is_news(model, state, value, time):
         return NOTHING
     for axis in range(3):
@@ -68,14 +67,14 @@ def judge(
         for axis in range(model.dimension):
             for part in range(3):
                 of_phone[axis] -= turned[axis, part] * state.mean[ARM + part]
+    if _is_elsewhere(model, state, of_phone, time, step_mm, step_s):
+        return NOTHING
     return _verdict(model, state, time, value, of_phone)
 
 
 @compiled
 def _verdict(model: Model, state: State, time: float, value: FloatArray, of_phone: FloatArray) -> int:
-    """What a frame that is news is to be taken for."""
-    if _is_elsewhere(model, state, of_phone, time):
-        return NOTHING
+    """What a frame that is news, and goes on from no other body's, is to be taken for."""
     if state.count[STRANGE] == 0 and _is_astray(model, state, time, value, of_phone):
         state.count[ASTRAY] += 1
         if state.count[ASTRAY] < _ASTRAY_AFTER:
@@ -117,31 +116,39 @@ def _is_astray(model: Model, state: State, time: float, value: FloatArray, of_ph
 
 
 @compiled
+def _since_last(model: Model, state: State, value: FloatArray, time: float) -> tuple[float, float]:
+    """How far a frame is from the one before, in mm, and how much later it was measured."""
+    squared = 0.0
+    for axis in range(model.dimension):
+        squared += (value[axis] - state.fact[LAST + axis]) ** 2
+    return float(np.sqrt(squared)), float(time - state.fact[LAST_S])
+
+
+@compiled
 def _is_news(model: Model, state: State, value: FloatArray, time: float) -> bool:
     """A tracker that has lost its target repeats the last position or says zero: no noise does that on all axes.
 
     Unless it never said anything else.
     """
-    repeated, zero, squared = True, True, 0.0
+    repeated, zero = True, True
     for axis in range(model.dimension):
         repeated &= value[axis] == state.fact[LAST + axis]
         zero &= value[axis] == 0.0
-        squared += (value[axis] - state.fact[LAST + axis]) ** 2
         state.fact[LAST + axis] = value[axis]
-    state.fact[STEP_MM], state.fact[STEP_S], state.fact[LAST_S] = np.sqrt(squared), time - state.fact[LAST_S], time
+    state.fact[LAST_S] = time
     if not (repeated or zero):
         state.count[HAS_DIFFERED] = 1
     return not (repeated or zero) or state.count[HAS_DIFFERED] == 0
 
 
 @compiled
-def _is_elsewhere(model: Model, state: State, of_phone: FloatArray, time: float) -> bool:
-    """Does a frame go on from those of another body, rather than from where the hand was expected?"""
+def _is_elsewhere(model: Model, state: State, of_phone: FloatArray, time: float, step_mm: float, step_s: float) -> bool:
+    """Does a frame, so far from the one before, go on from another body's, and not from where the hand was expected?"""
     if state.count[STRANGE] == 0 or state.count[ELSEWHERE] == 0:
         return False
     squared, _ = _from_expected(model, state, of_phone)
-    step_mm, recent = state.fact[STEP_MM], time - state.fact[STRANGE_SINCE] < BELIEVED_AFTER_S
-    has_leapt_back = step_mm > _reach(state, state.fact[STEP_S])
+    recent = time - state.fact[STRANGE_SINCE] < BELIEVED_AFTER_S
+    has_leapt_back = step_mm > _reach(state, step_s)
     if recent and not has_leapt_back and step_mm * step_mm < squared:
         state.count[STRANGE] += 1
         return True

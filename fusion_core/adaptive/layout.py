@@ -61,9 +61,8 @@ SEEN, SEEN_S = 24, 27  # the newest frame that was a measurement (3), and when i
 TURNED_S, NEW_S = 28, 29  # when the newest orientation that is believed was logged, and when for the first time
 LOST_SINCE = 30  # when those began that are not
 UNSURE = 31  # what is not known of accelerations since the stamp, (mm/s)²: an integral of densities
-STEP_MM, STEP_S = 32, 33  # from the newest frame but one to the newest
-LAST_S = 34  # when the newest frame was measured
-FACTS = 35
+LAST_S = 32  # when the newest frame was measured
+FACTS = 33
 
 # A row of Phone.shown: what fusion, positions gone on with and positions held would have shown (3 each), the mixture's
 # position (3) and its variance as the filters state it.

@@ -25,7 +25,7 @@ from fusion_core import Estimator, FusionAdaptive, PositionKalman, Raw
 from fusion_core.samples import FloatArray, Samples
 from tests.benchmarks.departures import DEPARTURES, G_MM_S2, SENSORS, Departure, Recorded, Source, recorded
 from tests.benchmarks.stress import ESTIMATORS, Score, score
-from tests.benchmarks.told import rmse_mm
+from tests.benchmarks.told import interpolated, rmse_mm
 
 KINDS = {
     "phones held, texting, phoning": ("AR", "Texting", "Phoning"),
@@ -70,13 +70,13 @@ def _phone(folder: Path, name: str) -> Source | None:
     shift = _shift(middle, np.linalg.norm(turns, axis=1), turning[:, 0], np.linalg.norm(turning[:, 1:], axis=1))
     value = force[:, 1:] * (-G_MM_S2 if ios else 1000.0)
     late = _late_by_force(optics, every, force[:, 0] - shift, value)
-    gyroscope = _interpolated(turning[:, 0] - shift, turning[:, 1:], middle)
+    gyroscope = interpolated(turning[:, 0] - shift, turning[:, 1:], middle)
     turned, _ = Rotation.align_vectors(turns, gyroscope)
     if np.degrees(turned.magnitude()) > _MISALIGNED_DEG:
         print(f"  {name} left out: its clock could not be told from how it turned")
         return None
     time = force[:, 0] - shift - late
-    return _source(name, time, value, _interpolated(turning[:, 0] - shift, turning[:, 1:], time), optics, every)
+    return _source(name, time, value, interpolated(turning[:, 0] - shift, turning[:, 1:], time), optics, every)
 
 
 def _qualisys(path: Path) -> tuple[Optics, float]:
@@ -113,7 +113,7 @@ def _late_by_force(optics: Optics, every: float, time: FloatArray, force: FloatA
     at, position, _ = optics
     whole = np.arange(at[0], at[-1], every)
     width = int(0.12 / every) // 2 * 2 + 1
-    place = _interpolated(at, position, whole)
+    place = interpolated(at, position, whole)
     acceleration = savgol_filter(place, max(width, 7), 3, deriv=2, delta=every, axis=0)
     acceleration[:, 2] += G_MM_S2
     known = np.isin(np.round(whole / every), np.round(at / every))
@@ -155,10 +155,6 @@ def _source(
     gravity = np.array([0.0, 0.0, -G_MM_S2])
     heard = time[within], time[within] + 0.002, force[within], turning[within], quaternion[within]
     return Source(name, *heard, Samples(at, at, position), gravity)
-
-
-def _interpolated(time: FloatArray, value: FloatArray, wanted: FloatArray) -> FloatArray:
-    return np.column_stack([np.interp(wanted, time, column) for column in value.T])
 
 
 def _without_gaps(whole: Recorded, source: Source) -> Recorded:

@@ -48,10 +48,10 @@ def _fitted(source: Source, imu: Samples) -> tuple[FloatArray, FloatArray]:
     reference = source.reference
     first, last = max(imu.time[0], reference.time[0]), min(imu.time[-1], reference.time[-1])
     time = np.arange(first + 0.3, last - 0.3, _STEP_S)
-    true = _second_derivative(_interpolated(reference.time, reference.value, time))
-    heard, turned = _interpolated(imu.time, imu.value, time), _turned(imu, time)
+    true = _second_derivative(interpolated(reference.time, reference.value, time))
+    heard, turned = interpolated(imu.time, imu.value, time), _turned(imu, time)
     assert imu.force is not None
-    causes = _causes(turned, _interpolated(imu.time, imu.force, time), heard)
+    causes = _causes(turned, interpolated(imu.time, imu.force, time), heard)
     causes = _smoothed(causes)
     of_arm = -_second_derivative(turned.reshape(-1, 9)).reshape(-1, 3, 3)
     off = _smoothed(heard) - true
@@ -86,7 +86,8 @@ def _smoothed(value: FloatArray) -> FloatArray:
     return _second_derivative(place)
 
 
-def _interpolated(time: FloatArray, value: FloatArray, wanted: FloatArray) -> FloatArray:
+def interpolated(time: FloatArray, value: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Each column of `value` (n, d) at the times `wanted` (m,), by straight lines."""
     return np.column_stack([np.interp(wanted, time, column) for column in value.T])
 
 
