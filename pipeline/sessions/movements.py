@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -127,11 +128,9 @@ def smoothed(time_s: FloatArray, position_mm: FloatArray) -> list[Path]:
     By a second-order Butterworth filter at 100 Hz, applied forwards and backwards and so without phase, whose cut-off
     is corrected for the two passes (Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2).
     """
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     time_s, first = np.unique(time_s, return_index=True)
-    corrected_hz = CUTOFF_HZ / (2 ** (1 / _PASSES) - 1) ** 0.25
-    sections = butter(2, corrected_hz, fs=1 / _STEP_S, output="sos")
     found = []
     for rows in np.split(np.arange(len(time_s)), np.flatnonzero(np.diff(time_s) > GAP_S) + 1):
         if len(rows) < 2 or time_s[rows[-1]] - time_s[rows[0]] < 2 * _STEP_S:
@@ -139,8 +138,18 @@ def smoothed(time_s: FloatArray, position_mm: FloatArray) -> list[Path]:
         grid = np.arange(time_s[rows[0]], time_s[rows[-1]] + _STEP_S / 2, _STEP_S)
         values = position_mm[first[rows]]
         even = np.column_stack([np.interp(grid, time_s[rows], values[:, axis]) for axis in range(values.shape[1])])
-        found.append(Path(grid, sosfiltfilt(sections, even, axis=0, padlen=min(_SETTLING, len(grid) - 1))))
+        found.append(Path(grid, sosfiltfilt(_low_pass(), even, axis=0, padlen=min(_SETTLING, len(grid) - 1))))
     return found
+
+
+@cache
+def _low_pass() -> FloatArray:
+    """The filter's second-order sections, with the cut-off that leaves 5 Hz after two passes."""
+    from scipy.signal import butter
+
+    corrected_hz = CUTOFF_HZ / (2 ** (1 / _PASSES) - 1) ** 0.25
+    sections: FloatArray = butter(2, corrected_hz, fs=1 / _STEP_S, output="sos")
+    return sections
 
 
 def between(paths: list[Path], begin_s: float, end_s: float) -> Path | None:

@@ -14,6 +14,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 _STEP = np.array([-9.0, 9.0])  # where Φ is neither 0 nor 1
 _SMOOTH_FROM = 3  # degrees of freedom
 _WIDEST = 1e6  # times the estimate: no bound is searched for beyond it
+_SMALLEST, _ROUND_OFF = 1e-300, 2**-53  # probabilities this near to 0 and 1 have a normal score that is finite
 _LARGEST = 1e5  # noncentrality for which SciPy's noncentral F is used: beyond it gives NaN
 
 
@@ -33,16 +34,23 @@ def standardized_interval(t: float, df: float, error: float, level: float = 0.95
     tail = (1 - level) / 2
 
     def bound(target: float) -> float | None:
-        width = 10 + abs(t)
+        width, wanted = 10 + abs(t), _normal_score(target)
         # Of one degree of freedom t may be a small part of its noncentrality: the bracket grows until it holds it.
         while width < _WIDEST * (10 + abs(t)):
-            noncentrality = _solve(lambda shift: noncentral_t_cdf(t, df, shift) - target, t - width, t + width)
+            noncentrality = _solve(
+                lambda shift: _normal_score(noncentral_t_cdf(t, df, shift)) - wanted, t - width, t + width
+            )
             if noncentrality is not None:
                 return noncentrality * error
             width *= 4
         return None
 
     return bound(1 - tail), bound(tail)
+
+
+def _normal_score(probability: float) -> float:
+    """Of a noncentrality it is nearly a straight line, on which a root is found in half the steps."""
+    return float(special.ndtri(min(max(probability, _SMALLEST), 1 - _ROUND_OFF)))
 
 
 def noncentral_t_cdf(t: float, df: float, noncentrality: float) -> float:

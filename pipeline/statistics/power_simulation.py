@@ -11,7 +11,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg, stats
+from scipy import linalg, special, stats
 
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.power import Design
@@ -37,8 +37,10 @@ class Share:
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Of the power, exact (Clopper and Pearson 1934)."""
-        proportion = stats.binomtest(self.significant, self.studies).proportion_ci(level, method="exact")
-        return float(proportion.low), float(proportion.high)
+        k, n, tail = self.significant, self.studies, (1 - level) / 2
+        low = special.betaincinv(k, n - k + 1, tail) if k > 0 else 0.0
+        high = special.betaincinv(k + 1, n - k, 1 - tail) if k < n else 1.0
+        return float(low), float(high)
 
 
 @dataclass(frozen=True)

@@ -127,8 +127,9 @@ def spreads(groups: Sequence[FloatArray]) -> dict[str, float | None]:
     for name, center in _SPREADS.items():
         middle = np.mean if center == "mean" else np.median
         deviations = [np.abs(group - middle(group)) for group in groups]
-        defined = untestable(deviations) is None
-        f, p = with_pingouin.levene(groups, center) if defined else (None, None)
+        f = p = None
+        if untestable(deviations) is None:
+            f, p = map(float, stats.levene(*groups, center=center))
         tests |= {f"{name}_f": f, f"{name}_p": p}
     return tests
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -44,15 +44,6 @@ def kruskal(groups: Sequence[FloatArray]) -> tuple[float, float]:
 
         table = pingouin.kruskal(data=_table(groups), dv="value", between="group").iloc[0]
     return float(table["H"]), float(table["p_unc"])
-
-
-def levene(groups: Sequence[FloatArray], center: Literal["mean", "median"]) -> tuple[float, float]:
-    """F and p of the deviations from the groups' means (Levene 1960) or medians (Brown and Forsythe 1974)."""
-    with _quiet():
-        import pingouin
-
-        table = pingouin.homoscedasticity(list(groups), method="levene", center=center).iloc[0]
-    return float(table["W"]), float(table["pval"])
 
 
 @contextmanager

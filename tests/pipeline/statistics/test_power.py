@@ -213,6 +213,12 @@ def test_the_interval_of_a_simulated_power_is_exact() -> None:
     assert Share(500, 500).interval() == pytest.approx((0.025 ** (1 / 500), 1))
 
 
+@given(significant=st.integers(0, 300), level=st.floats(0.5, 0.999))
+def test_the_interval_of_a_simulated_power_is_scipys(significant: int, level: float) -> None:
+    wanted = stats.binomtest(significant, 300).proportion_ci(level, method="exact")
+    assert Share(significant, 300).interval(level) == pytest.approx((wanted.low, wanted.high), rel=1e-9, abs=1e-12)
+
+
 # The number of participants -------------------------------------------------------------------------------------
 
 
