@@ -1,6 +1,6 @@
 """Every command that README, docs and `make help` show runs: on copies of the bundled studies, in a folder of its own.
 
-A name in a page, such as path/to/study, stands for the bundled study that suits the command. What takes minutes is
+A name in a page, such as path/to/study, stands for the bundled study that suits the command, with two of its logs. What takes minutes is
 marked as slow.
 """
 
@@ -70,6 +70,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("place")
     for name in ("feng2016", "reach"):
         shutil.copytree(CLONE / "studies" / name, root / "studies" / name)
+    most = shutil.ignore_patterns("R0[3-8]_reach.mcap")
+    shutil.copytree(CLONE / "studies" / "reach", root / "two" / "reach", ignore=most)
     (root / "studies" / "peephole").mkdir()
     settings = (CLONE / "studies" / "peephole" / "study.yaml").read_text(encoding="utf-8")
     (root / "studies" / "peephole" / "study.yaml").write_text(briefer(settings), encoding="utf-8")
@@ -92,9 +94,8 @@ def briefer(settings: str) -> str:
 
 def in_place_of_names(command: str, place: Path) -> list[str]:
     """The words of a command with the bundled studies in the place of a page's examples."""
-    study = "reach" if command.split(maxsplit=1)[0] in _WITH_LOGS else "feng2016"
     copies = {
-        "path/to/study": f"studies/{study}",
+        "path/to/study": "two/reach" if command.split(maxsplit=1)[0] in _WITH_LOGS else "studies/feng2016",
         "path/to/another": "another/reach_again",
         "path/to/folder": "folder",
         "path/to/empty": "empty",
@@ -105,7 +106,9 @@ def in_place_of_names(command: str, place: Path) -> list[str]:
     words = [copies.get(word, word) for word in shlex.split(command)]
     if words[0] == "explore":  # the same options of fewer people and trackers: one figure of each list is enough
         words = [word.split(",")[0] if re.fullmatch(r"[\d.]+(,[\d.]+)+", word) else word for word in words]
-        words += ["--participants", "2", "--repeats", "1"]
+        words += ["--participants", "2", "--repeats", "1", *([] if "--rate" in words else ["--rate", "30"])]
+    if words[0] in _WITH_JOBS:  # what processes compute is for tests/pipeline/engine
+        words += ["--jobs", "1"]
     return words
 
 
@@ -121,7 +124,7 @@ def prepared(words: list[str], place: Path, monkeypatch: pytest.MonkeyPatch) -> 
     if words[0] == "new":
         shutil.copytree(CLONE / "studies" / "feng2016", place / "folder", ignore=shutil.ignore_patterns("*.yaml"))
     if "another/reach_again" in words and not (place / "another").exists():
-        shutil.copytree(place / "studies" / "reach", place / "another" / "reach_again")
+        shutil.copytree(place / "two" / "reach", place / "another" / "reach_again")
     for word in words[1:3] if words[0] == "diff" else ():
         if not (place / word).exists():
             run = ("compare", place / "studies" / "feng2016", "--out", place / word, "--jobs", "1")
@@ -137,8 +140,6 @@ def test_it_runs(
     monkeypatch.setattr(folders, "reports_folder", lambda: place / "reports")
     words = in_place_of_names(command, place)
     prepared(words, place, monkeypatch)
-    if words[0] in _WITH_JOBS and "--jobs" not in words:
-        words += ["--jobs", "1"]
     code = exit_code(monkeypatch, *words)
     assert code in _CODES.get(words[0], (0,)), capsys.readouterr().err
 
