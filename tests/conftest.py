@@ -74,7 +74,6 @@ def pytest_collection_finish() -> None:
 def pytest_sessionfinish() -> None:
     """What is garbage by now is found here, and what is not is not gone through five times more, as pytest does."""
     gc.collect()
-    gc.collect()
     gc.freeze()
 
 

@@ -206,5 +206,5 @@ _WORDS: Sequence[tuple[str, str, str]] = (
 
 def explained(texts: Sequence[str]) -> list[tuple[str, str]]:
     """The words that stand in any of the texts, and what they mean; each text is a paragraph or a cell."""
-    distinct = set(texts)
-    return [(word, meaning) for word, where, meaning in _WORDS if any(re.search(where, text) for text in distinct)]
+    lines = "\n".join({text.replace("\n", " ") for text in texts})  # searched once for each word, not once a text
+    return [(word, meaning) for word, where, meaning in _WORDS if re.search(where, lines, re.MULTILINE)]
