@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 from dataclasses import fields
@@ -129,6 +130,34 @@ def tracked() -> list[str]:
     if listed.returncode or not listed.stdout:
         pytest.skip("not a git checkout")
     return listed.stdout.splitlines()
+
+
+def private_names_in(text: str) -> list[str]:
+    """The private names of our modules that a test imports, changes or uses."""
+    tree, modules, found = ast.parse(text), set(), []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("pipeline", "fusion_core")):
+            modules |= {name.asname or name.name for name in node.names if name.name.islower()}
+            found += [name.name for name in node.names]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules:
+            found.append(node.attr)
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("setattr"):
+            words = [one.value for one in node.args[:2] if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+            found += [word.rpartition(".")[2] for word in words if "." not in word or word.startswith("pipeline.")]
+    return sorted(name for name in found if name.startswith("_") and not name.endswith("__"))
+
+
+def test_no_test_reaches_into_a_module() -> None:
+    """What a test must set or ask for has a public name; a private one is free to change."""
+    assert private_names_in('from pipeline.a import b\nmonkeypatch.setattr(b, "_c", 1)\nb._d()') == ["_c", "_d"]
+    found = {name: private_names_in((CLONE / name).read_text(encoding="utf-8")) for name in tracked_tests()}
+    assert {name: names for name, names in found.items() if names} == {}
+
+
+def tracked_tests() -> list[str]:
+    """The tests' own modules, but for those that time and count what is inside."""
+    return [name for name in tracked() if name.startswith("tests/") and name.endswith(".py") and "/bench" not in name]
 
 
 def test_no_file_holds_a_path_of_a_machine_or_a_download_address() -> None:

@@ -19,9 +19,9 @@ LAG_RANGE_S = 0.5
 _LAG_STEP_S = 0.005
 _BLOCK_S = 0.5  # of the bootstrap: longer than an estimator's errors are correlated
 _RESAMPLES = 1000
-_BLOCKS_MAX = 200_000  # to draw from: 2 kB each, and those a few ms apart are nearly the same
-_ROWS_AT_ONCE = 2**18  # of what is gone through part by part
-_TRANSFORMED = 2**22  # instants, of which the spectra of two signals take 0.5 GB
+BLOCKS_MAX = 200_000  # to draw from: 2 kB each, and those a few ms apart are nearly the same
+ROWS_AT_ONCE = 2**18  # of what is gone through part by part
+TRANSFORMED = 2**22  # instants, of which the spectra of two signals take 0.5 GB
 _FLAT = 1e-6  # costs that differ by less than this share say nothing: while the reference is still, any shift fits
 
 
@@ -106,14 +106,14 @@ def lag(time: FloatArray, estimate: FloatArray, reference: Samples, random: np.r
     estimate = np.ascontiguousarray(estimate, dtype=np.float64)
     block = min(max(1, round(_BLOCK_S / float(np.median(np.diff(time))))), len(time))
     shifts = np.arange(-LAG_RANGE_S, LAG_RANGE_S + _LAG_STEP_S / 2, _LAG_STEP_S)
-    every = -(-len(time) // _BLOCKS_MAX)
+    every = -(-len(time) // BLOCKS_MAX)
     blocks = lag_steps.block_costs(_segments(known, value), time, estimate, shifts, block, every)
     scale = float(blocks.total.max())
     whole = lag_steps.best(blocks.total, scale)
     if scale - blocks.total.min() <= _FLAT * scale or not 0 < whole < len(shifts) - 1:
         return NO_INTERVAL
     each, resampled = max(1, len(time) // block), np.empty(_RESAMPLES)
-    at_once = max(1, _ROWS_AT_ONCE // each)
+    at_once = max(1, ROWS_AT_ONCE // each)
     for begin in range(0, _RESAMPLES, at_once):
         own = resampled[begin : begin + at_once]
         own[:] = lag_steps.best_of_resamples(blocks, random.integers(len(blocks.still), size=(len(own), each)))
@@ -128,8 +128,8 @@ def _surrounded(known: FloatArray, time: FloatArray) -> BoolArray:
         return np.zeros(len(time), dtype=np.bool_)
     gaps = np.concatenate([[0], np.cumsum(np.diff(known) > GAP_S)])
     surrounded = np.empty(len(time), dtype=np.bool_)
-    for first in range(0, len(time), _ROWS_AT_ONCE):
-        part = slice(first, first + _ROWS_AT_ONCE)
+    for first in range(0, len(time), ROWS_AT_ONCE):
+        part = slice(first, first + ROWS_AT_ONCE)
         begin = np.searchsorted(known, time[part] - LAG_RANGE_S, side="right") - 1
         end = np.searchsorted(known, time[part] + LAG_RANGE_S, side="left")
         inside = (begin >= 0) & (end < len(known))
@@ -159,8 +159,8 @@ class _Signal(NamedTuple):
         if self.value.shape[1] == 1:  # NumPy adds a single column up in pairs
             return np.asarray(self.value[self.at].mean(axis=0))
         total = np.zeros(self.value.shape[1])
-        for begin in range(0, len(self.at), _ROWS_AT_ONCE):
-            rows = self.value[self.at[begin : begin + _ROWS_AT_ONCE]]
+        for begin in range(0, len(self.at), ROWS_AT_ONCE):
+            rows = self.value[self.at[begin : begin + ROWS_AT_ONCE]]
             total = np.add.reduce(np.vstack([total, rows]) if begin else rows, axis=0)
         return total / len(self.at)
 
@@ -169,8 +169,8 @@ class _Signal(NamedTuple):
         from scipy import fft
 
         padded = np.zeros(length)
-        for begin in range(0, len(self.at), _ROWS_AT_ONCE):
-            rows = self.at[begin : begin + _ROWS_AT_ONCE]
+        for begin in range(0, len(self.at), ROWS_AT_ONCE):
+            rows = self.at[begin : begin + ROWS_AT_ONCE]
             padded[begin : begin + len(rows)] = self.value[rows, axis] - mean
         return np.asarray(fft.rfft(padded, overwrite_x=True))
 
@@ -190,7 +190,7 @@ def cross_correlation(
 def _correlation(first: _Signal, second: _Signal, farthest: int | None) -> tuple[npt.NDArray[np.int64], FloatArray]:
     n, means = len(first.at), (first.means(), second.means())
     most = n - 1 if farthest is None else min(n - 1, farthest)
-    sums = _sums_of_parts if n > _TRANSFORMED and most < _ROWS_AT_ONCE else _sums
+    sums = _sums_of_parts if n > TRANSFORMED and most < ROWS_AT_ONCE else _sums
     shifts = np.arange(-most, most + 1)
     return shifts, np.asarray(sums(first, second, means, shifts) / (n - np.abs(shifts)), dtype=np.float64)
 
@@ -220,8 +220,8 @@ def _sums_of_parts(
     from scipy.signal import correlate
 
     n, most, total = len(first.at), int(shifts[-1]), np.zeros(len(shifts))
-    for begin in range(0, n, _ROWS_AT_ONCE):
-        end = min(begin + _ROWS_AT_ONCE, n)
+    for begin in range(0, n, ROWS_AT_ONCE):
+        end = min(begin + ROWS_AT_ONCE, n)
         low, high = max(begin - most, 0), min(end + most, n)
         around = np.zeros(end - begin + 2 * most)
         there = slice(low - begin + most, high - begin + most)
@@ -272,8 +272,8 @@ def lead_curve(time: FloatArray, estimate: FloatArray, tracker: Samples) -> tupl
 def _newest(time: FloatArray, wanted: FloatArray) -> npt.NDArray[np.int32]:
     """The row (n,) of the newest of rising `time` that is not after each of the times `wanted` (n,); −1 if none is."""
     found = np.empty(len(wanted), np.int32)
-    for begin in range(0, len(wanted), _ROWS_AT_ONCE):
-        part = slice(begin, begin + _ROWS_AT_ONCE)
+    for begin in range(0, len(wanted), ROWS_AT_ONCE):
+        part = slice(begin, begin + ROWS_AT_ONCE)
         found[part] = np.searchsorted(time, wanted[part], side="right") - 1
     return found
 

@@ -11,15 +11,15 @@ import numpy as np
 from pipeline.sessions.logs.log import IntArray
 from pipeline.statistics.arrays import FloatArray
 
-_AT_ONCE = 2**16
+AT_ONCE = 2**16
 
 Array = np.ndarray[Any, Any]
 
 
 def parts_of(count: int) -> Iterator[slice]:
     """Slices of so many rows, some at a time."""
-    for begin in range(0, count, _AT_ONCE):
-        yield slice(begin, begin + _AT_ONCE)
+    for begin in range(0, count, AT_ONCE):
+        yield slice(begin, begin + AT_ONCE)
 
 
 def let_go(rows: Array) -> None:

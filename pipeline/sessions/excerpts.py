@@ -31,7 +31,7 @@ def excerpt(study: Study, session: str, loaded: Recording, tracks: Mapping[str, 
     if name is None or len(loaded.samples[name]) == 0:
         return tables.frame("excerpts", [])
     tracker = loaded.samples[name]
-    axis, begin = _liveliest(tracker)
+    axis, begin = liveliest(tracker)
     letter = study.axes_of(name)[axis]
     parts = [_cut(begin, "tracker", name, tracker.arrival, tracker.value[:, axis])]
     if loaded.reference is not None:
@@ -64,7 +64,7 @@ def _cut(
     return pd.DataFrame(columns).assign(kind=kind, name=name)
 
 
-def _liveliest(tracker: Samples) -> tuple[int, float]:
+def liveliest(tracker: Samples) -> tuple[int, float]:
     """The axis and the begin (s) of the stretch in which the tracker goes furthest there and back.
 
     An estimator that lags is seen where the hand turns. Where even the largest turn is small beside the largest range,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 Array = np.ndarray[Any, Any]
 
-_SPILLED = 2**18  # rows that wait in memory to be written
+SPILLED = 2**18  # rows that wait in memory to be written
 _MORE = 16  # a full array grows by one in so many rows
 
 
@@ -61,7 +61,7 @@ class Spilling(Growing):
     def add(self, rows: Array) -> None:
         """Copy rows to the end."""
         super().add(rows)
-        if self._folder is not None and super().__len__() > _SPILLED:
+        if self._folder is not None and super().__len__() > SPILLED:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 - `whole` closes it
             self._file.write(self._rows[: self._count].data)

@@ -9,7 +9,7 @@ from pathlib import Path
 _MEMINFO = Path("/proc/meminfo")
 _GROUP = Path("/sys/fs/cgroup")  # a container's own limit
 _GB = 1e9
-_SMALL_BYTES = 20_000_000  # for these there is always room
+SMALL_BYTES = 20_000_000  # for these there is always room
 
 
 def free_bytes(meminfo: Path = _MEMINFO, group: Path = _GROUP) -> int | None:
@@ -31,7 +31,7 @@ def _stated(meminfo: Path, group: Path) -> Iterator[int]:
 def shortage(size_bytes: int, needed_per_byte: float, free: int | None, what: str = "it") -> str | None:
     """What is said of a file of this size that takes more memory than there is; None where it does not."""
     needed = size_bytes * needed_per_byte
-    if size_bytes < _SMALL_BYTES or free is None or needed <= free:
+    if size_bytes < SMALL_BYTES or free is None or needed <= free:
         return None
     return (
         f"refused: {what} is {size_bytes / 1e6:.0f} MB, for which a report needs about {needed / _GB:.1f} GB of memory,"

@@ -27,12 +27,12 @@ _PANDAS = {  # as a frame holds them
     COUNT: (pd.Int64Dtype(),),
     FLOAT: (np.dtype("float64"),),
 }
-_FEW_ROWS = 512
+FEW_ROWS = 512
 _SMALL = 512  # rows
 _SMALL_BYTES = 2**24
 ROWS_AT_ONCE = 2**18
 """Rows of a part of a large table: some tens of megabytes."""
-_LOOKED_AT = 2**19  # rows: a page or a figure shows far fewer
+LOOKED_AT = 2**19  # rows: a page or a figure shows far fewer
 _PARTS = 256  # tables that are read before they are merged: each takes far more memory than its few rows
 _LINES_AT_ONCE = 2**16
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins like this
@@ -262,7 +262,7 @@ def _text(rows: int) -> Any:
 
     Arrow's is a quarter as large.
     """
-    return pd.StringDtype() if rows <= _FEW_ROWS else _MANY
+    return pd.StringDtype() if rows <= FEW_ROWS else _MANY
 
 
 def read_arrow(name: str, folders: Path | Sequence[Path]) -> pa.Table:
@@ -299,7 +299,7 @@ def read_parts(name: str, folder: Path, columns: Sequence[str] | None = None) ->
 
 def read_thinned(name: str, folder: Path) -> pd.DataFrame:
     """As `read` of one folder, for what is looked at: of a table of millions of rows every n-th, some 500 000."""
-    every = -(-rows(name, folder) // _LOOKED_AT)
+    every = -(-rows(name, folder) // LOOKED_AT)
     if every <= 1:
         return read(name, folder)
     kept, begin = [], 0

@@ -99,13 +99,13 @@ def _packed_within(traces: Traces, budget: int) -> dict[str, Any]:
 
     Events get a quarter of the room; those that do not fit are left out, and counted.
     """
-    packed = _packed(traces, 0.0, budget // 4 // _EVENT_BYTES)
+    packed = pack(traces, 0.0, budget // 4 // _EVENT_BYTES)
     budget -= _EVENT_BYTES * len(packed["scene"]["events"]) if packed["scene"] else 0
     if len(packed["data"]) <= budget:
         return packed
     finer = _mean_interval_s(traces) * len(packed["data"]) / budget / 2  # finer steps would not fit, or barely
     for step_s in [step for step in _STEPS_S if step >= finer] or _STEPS_S[-1:]:
-        packed = {**_packed(traces, step_s), "scene": packed["scene"]}
+        packed = {**pack(traces, step_s), "scene": packed["scene"]}
         if len(packed["data"]) <= budget:
             break
     return packed
@@ -117,7 +117,7 @@ def _mean_interval_s(traces: Traces) -> float:
     return float(np.ptp(densest.time_s)) / len(densest.time_s)
 
 
-def _packed(traces: Traces, step_s: float, events: int = 0) -> dict[str, Any]:
+def pack(traces: Traces, step_s: float, events: int = 0) -> dict[str, Any]:
     """A session as an object for JSON.
 
     `data` is base64 of zlib of the series one after the other: first its times in 0.1 ms, then each axis in 0.1 mm.

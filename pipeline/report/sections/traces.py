@@ -70,7 +70,7 @@ def _scene(material: Material, place: int, ingested: Path, origin_ns: int) -> Sc
     plane = (axes[0], axes[1])
     displayed_by = material.study.shown.get(material.sessions[place].condition or "")
     compared = _compared(material, displayed_by)
-    events = _events(ingested, origin_ns, plane)
+    events = events_of(ingested, origin_ns, plane)
     scene = Scene(plane, paths.displayed(material, place), displayed_by, compared, events)
     if task is None or plane != XY:  # the task is stated in x and y
         return scene
@@ -91,7 +91,7 @@ def _compared(material: Material, displayed_by: str | None) -> str | None:
     return next((name for name in material.study.estimators if name not in (displayed_by, "raw")), None)
 
 
-def _events(ingested: Path, origin_ns: int, plane: Plane) -> tuple[Event, ...]:
+def events_of(ingested: Path, origin_ns: int, plane: Plane) -> tuple[Event, ...]:
     """The trials' starts and the selections in the order of time; a selection without a target has its trial's."""
     rows: list[Row] = tables.read_arrow("events", ingested).to_pylist()
     starts, selections = trials.selections_by_trial(rows)

@@ -251,7 +251,7 @@ def test_a_long_recording_has_fewer_blocks_to_draw_from_and_the_same_lag(monkeyp
     time = np.arange(0, 60, 1 / 90)
     track = moving(time - 0.07) + np.random.default_rng(3).normal(0, 5, (len(time), 2))
     whole = accuracy.lag(time, track, of(time, moving(time)), np.random.default_rng(1))
-    monkeypatch.setattr(accuracy, "_BLOCKS_MAX", 500)
+    monkeypatch.setattr(accuracy, "BLOCKS_MAX", 500)
     fewer = accuracy.lag(time, track, of(time, moving(time)), np.random.default_rng(1))
     assert fewer.value == whole.value
     # The SD of a 2.5 percentile of 1000 draws is √(.025·.975/1000)/φ(1.96) = 0.085 of theirs, a 46th of the interval.

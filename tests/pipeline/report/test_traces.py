@@ -59,7 +59,7 @@ def page_of(sessions: list[Traces], folder: Path) -> list[dict[str, Any]]:
 @given(arrays(np.float64, (12, 3), elements=st.floats(-2e8, 2e8)))
 def test_what_is_packed_comes_out_to_a_tenth(value_mm: np.ndarray) -> None:
     time_s = np.arange(12) / 90
-    session = traces._packed(Traces("s", None, None, (Series("a", "estimator", ("x", "y", "z"), time_s, value_mm),)), 0)
+    session = traces.pack(Traces("s", None, None, (Series("a", "estimator", ("x", "y", "z"), time_s, value_mm),)), 0)
     times, *axes = unpacked(session)
     assert session["left_out"] == 0
     np.testing.assert_allclose(times / 1e3, time_s, atol=0.00005 + 1e-12)
@@ -68,7 +68,7 @@ def test_what_is_packed_comes_out_to_a_tenth(value_mm: np.ndarray) -> None:
 
 def test_readings_that_cannot_be_drawn_are_left_out_and_counted() -> None:
     value_mm = np.array([[1.0], [np.nan], [np.inf], [1e12], [2.0]])
-    session = traces._packed(Traces("s", None, None, (Series("a", "tracker", ("x",), np.arange(5.0), value_mm),)), 0)
+    session = traces.pack(Traces("s", None, None, (Series("a", "tracker", ("x",), np.arange(5.0), value_mm),)), 0)
     assert session["left_out"] == 3
     times, values = unpacked(session)
     assert times.tolist() == [0, 4000]
@@ -179,7 +179,7 @@ def test_a_selection_that_names_no_target_has_that_of_its_trial(tmp_path: Path) 
         {**nowhere, "session": "s", "time_ns": 5 * 10**9, "type": "selection", "trial": None, "x_mm": 9.0, "y_mm": 9.0},
     ]
     tables.write("events", tables.frame("events", rows), tmp_path)
-    assert section._events(tmp_path, 0, ("x", "y")) == (
+    assert section.events_of(tmp_path, 0, ("x", "y")) == (
         Event("selection", 1.0, None, (1.0, 2.0)),
         Event("trial_start", 2.0, (10.0, 20.0), None),
         Event("selection", 3.0, (10.0, 20.0), (13.0, 24.0)),

@@ -50,14 +50,14 @@ def frames_of(x_mm: np.ndarray, time: np.ndarray) -> Samples:
 def test_an_excerpt_holds_a_turn_rather_than_a_longer_way() -> None:
     time = np.arange(0, 30, 1 / 30)
     there_and_back = 200 * np.clip(1 - np.abs(time - 22), 0, None)
-    axis, begin = excerpts._liveliest(frames_of(500 * np.clip(time - 5, 0, 1) + there_and_back, time))
+    axis, begin = excerpts.liveliest(frames_of(500 * np.clip(time - 5, 0, 1) + there_and_back, time))
     assert axis == 0
     assert begin < 22.1 < begin + excerpts.EXCERPT_S  # when the turn's frame arrives
 
 
 def test_where_nothing_but_noise_turns_the_longest_way_is_shown() -> None:
     time = np.arange(0, 30, 1 / 30)
-    axis, begin = excerpts._liveliest(frames_of(500 * np.clip(time - 15, 0, 1), time))
+    axis, begin = excerpts.liveliest(frames_of(500 * np.clip(time - 15, 0, 1), time))
     assert axis == 0
     assert begin < 15.1 and begin + excerpts.EXCERPT_S > 16.1
 

@@ -50,9 +50,9 @@ def test_a_long_session_has_the_tables_that_it_would_have_as_a_whole(
     write_session(root / "data" / "P1_a.mcap", session_messages(12.0))
     whole = _computed(root, tmp_path / "whole")
     monkeypatch.setattr(tables, "ROWS_AT_ONCE", 100)
-    monkeypatch.setattr(growing, "_SPILLED", 64)
-    monkeypatch.setattr(by_parts, "_AT_ONCE", 50)
-    monkeypatch.setattr(accuracy, "_ROWS_AT_ONCE", 50)
+    monkeypatch.setattr(growing, "SPILLED", 64)
+    monkeypatch.setattr(by_parts, "AT_ONCE", 50)
+    monkeypatch.setattr(accuracy, "ROWS_AT_ONCE", 50)
     parts = _computed(root, tmp_path / "parts")
     long = recording.load(load_study(root), tmp_path / "parts" / "ingest", may_be_long=True)
     assert long.long_phone is not None
@@ -72,8 +72,8 @@ def test_a_long_session_has_the_tables_that_it_would_have_as_a_whole(
 def test_the_correlation_of_a_long_signal_is_that_of_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     first, second = np.random.default_rng(2).normal(5.0, 1.0, (2, 1003, 3))
     shifts, whole = accuracy.cross_correlation(first, second, 40)
-    monkeypatch.setattr(accuracy, "_ROWS_AT_ONCE", 100)
-    monkeypatch.setattr(accuracy, "_TRANSFORMED", 1000)
+    monkeypatch.setattr(accuracy, "ROWS_AT_ONCE", 100)
+    monkeypatch.setattr(accuracy, "TRANSFORMED", 1000)
     same_shifts, parts = accuracy.cross_correlation(first, second, 40)
     np.testing.assert_array_equal(same_shifts, shifts)
     np.testing.assert_allclose(parts, whole, rtol=0, atol=1e-12)

@@ -39,7 +39,7 @@ def test_a_table_that_does_not_fit_is_refused_with_what_it_would_take(
     study = folder(
         "conditions: [a, b]\nmeasures: m.csv\n", **{"m.csv": "participant,condition,measure,value\nP1,a,m,1\n"}
     )
-    monkeypatch.setattr(memory, "_SMALL_BYTES", 10)
+    monkeypatch.setattr(memory, "SMALL_BYTES", 10)
     monkeypatch.setattr(table_file, "free_bytes", lambda: 100)
     ran = steadyhand("compare", study)
     assert ran.code == 2
@@ -54,7 +54,7 @@ def test_what_does_not_fit_of_a_session_stops_the_run_and_is_computed_once_there
     study = folder("conditions: [a]\nsessions: data/{participant}_{condition}.mcap\n" + whole + STREAMS)
     write_session(study / "data" / "P1_a.mcap", session_messages(2.5))
     with monkeypatch.context() as patch:
-        patch.setattr(memory, "_SMALL_BYTES", 10)
+        patch.setattr(memory, "SMALL_BYTES", 10)
         patch.setattr(tables, "ROWS_AT_ONCE", 100)
         patch.setattr(where, "free_bytes", lambda: 1000)
         ran = steadyhand("compare", study, "--jobs", "1")

@@ -18,7 +18,7 @@ def test_results_do_not_depend_on_how_text_is_held(
 ) -> None:
     few_rows_at_most = {"python": 1_000_000, "pyarrow": -1}
     for storage, rows in few_rows_at_most.items():
-        monkeypatch.setattr(tables, "_FEW_ROWS", rows)
+        monkeypatch.setattr(tables, "FEW_ROWS", rows)
         with pd.option_context("mode.string_storage", "python"):  # as while a stage runs
             assert tables.frame("orders", [{"participant": "P1"}])["participant"].dtype == f"string[{storage}]"
         words = ("--out", tmp_path / storage, "--cache", tmp_path / f"cache-{storage}", "--jobs", "1")

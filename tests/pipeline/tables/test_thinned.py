@@ -24,7 +24,7 @@ def _written(folder: Path, count: int, a_part: int) -> pd.DataFrame:
 @pytest.mark.parametrize("a_part", [3, 7, 100])
 def test_every_nth_row_is_left_of_a_long_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, a_part: int) -> None:
     whole = _written(tmp_path, 100, a_part)
-    monkeypatch.setattr(tables, "_LOOKED_AT", 30)
+    monkeypatch.setattr(tables, "LOOKED_AT", 30)
     pd.testing.assert_frame_equal(tables.read_thinned("tracks", tmp_path), whole.iloc[::4].reset_index(drop=True))
 
 

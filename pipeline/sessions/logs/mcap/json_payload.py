@@ -44,7 +44,7 @@ from pipeline.sessions.logs.mcap.messages import Messages
 from pipeline.sessions.logs.mcap.tree import Layouts, reading, with_numbers_for_iso_times
 from pipeline.statistics.arrays import FloatArray
 
-_BLOCK = 256  # messages: few enough that one unusual message does not cost much, and that objects do not pile up
+AT_ONCE = 256  # messages: few enough that one unusual message does not cost much, and that objects do not pile up
 _UNUSUAL = (ValueError, TypeError, LookupError, OverflowError)
 
 
@@ -70,8 +70,8 @@ def decoder(_: Channel, schema: Schema | None, content: str, source: Source) -> 
     def many(messages: Messages, which: IntArray, fields: Fields) -> None:
         if not usual:
             return
-        for begin in range(0, len(which), _BLOCK):
-            _decode_block(messages, which[begin : begin + _BLOCK], content, fields)
+        for begin in range(0, len(which), AT_ONCE):
+            _decode_block(messages, which[begin : begin + AT_ONCE], content, fields)
 
     return Decoder(one, many)
 

@@ -32,7 +32,7 @@ BROKEN = (McapError, struct.error, UnicodeDecodeError, ValueError, EOFError, Ove
 """What reading a damaged record raises."""
 
 RECORD_HEAD = struct.Struct("<BQ")
-_BLOCK = 2**20
+BLOCK_BYTES = 2**20
 DECODED_AT_ONCE = 2**22
 """Bytes of a topic's messages, so many that it is quick."""
 HOW_TO_LIFT = (
@@ -50,7 +50,7 @@ def take_record(walk: Walk, opcode: int, head: bytes, body: bytes) -> None:
     """
     if opcode in _IN_CHUNKS:
         walk.loose += head + body
-        if len(walk.loose) > _BLOCK:
+        if len(walk.loose) > BLOCK_BYTES:
             take_loose(walk)
         return
     take_loose(walk)
@@ -106,7 +106,7 @@ def _take_records(walk: Walk, data: bytes) -> bool:
         walk.note(damage.short_messages(too_short))
         walk.unknown_loss = True
     walk.unshared.append(messages)
-    if sum(len(part.data) for part in walk.unshared) > _BLOCK:
+    if sum(len(part.data) for part in walk.unshared) > BLOCK_BYTES:
         share_out(walk)
     return whole
 

@@ -20,7 +20,7 @@ Bytes = npt.NDArray[np.uint8]
 ReadAlike = Callable[[Bytes, IntArray], BoolArray]
 """Reads what is laid out like the first of some rows; says which these are, the first among them."""
 
-_TEMPLATES = 64  # tried for messages of one length
+TEMPLATES = 64  # tried for messages of one length
 _ROWS_AT_ONCE = 1024  # so that what is copied of them stays in the processor's cache
 
 
@@ -40,7 +40,7 @@ def read_by_templates(messages: Messages, which: IntArray, read_alike: ReadAlike
 
 def _read_rows(rows: Bytes, which: IntArray, read_alike: ReadAlike) -> None:
     """`rows` (n, length) are the payloads of the messages `which` (n,)."""
-    for _ in range(_TEMPLATES):
+    for _ in range(TEMPLATES):
         try:
             left = ~read_alike(rows, which)
         except (Declined, ValueError):

@@ -81,7 +81,7 @@ OURS: dict[str, Content] = {
 def test_the_tests_own_log_as_the_stock_decoder_reads_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_session(tmp_path / "a.mcap")
     assert_every_topic_same(path, OURS)
-    monkeypatch.setattr(templates, "_TEMPLATES", 0)
+    monkeypatch.setattr(templates, "TEMPLATES", 0)
     assert_every_topic_same(path, OURS)  # the way of what fits no template
 
 
@@ -163,7 +163,7 @@ def test_random_messages_as_the_stock_decoder_reads_them(
     path = write_log(tmp_path_factory.getbasetemp() / "random.mcap", content, drawn)
     fast = read_topic(path, content)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(templates, "_TEMPLATES", 0)
+        patch.setattr(templates, "TEMPLATES", 0)
         slow = read_topic(path, content)
     assert_same(fast, list(zip(slow.arrival_ns.tolist(), slow.stamp_ns.tolist(), slow.values.tolist(), strict=True)))
     assert (fast.lost, fast.notes) == (slow.lost, slow.notes)

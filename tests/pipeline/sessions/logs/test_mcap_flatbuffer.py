@@ -80,7 +80,7 @@ def test_random_messages_as_the_generated_accessors_read_them(
     path = write_log(tmp_path_factory.getbasetemp() / "random.mcap", "FrameTransform", sent)
     fast, expected = read_topic(path), [by_the_generated_accessors(payload) for payload in sent]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(templates, "_TEMPLATES", 0)
+        patch.setattr(templates, "TEMPLATES", 0)
         slow = read_topic(path)
     for readings in (fast, slow):
         assert readings.values.tolist() == [values for _, values, _ in expected]
@@ -100,7 +100,7 @@ def test_damaged_messages_are_read_or_named_and_nothing_else(
     path = write_log(tmp_path_factory.getbasetemp() / "damaged.mcap", name, [damaged] * 2)
     fast = read_topic(path, OF_SEVERAL.get(name))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(templates, "_TEMPLATES", 0)
+        patch.setattr(templates, "TEMPLATES", 0)
         slow = read_topic(path, OF_SEVERAL.get(name))
     np.testing.assert_array_equal(fast.values, slow.values)
     assert (fast.stamp_ns.tolist(), fast.lost, fast.notes) == (slow.stamp_ns.tolist(), slow.lost, slow.notes)

@@ -194,7 +194,7 @@ def test_the_standard_library_is_asked_for_what_is_unusual_only(
     wanted = expected(sent, content)
     monkeypatch.setattr(json, "loads", counted)
     assert_same(read_topic(path, content), wanted)
-    assert len(calls) == json_payload._BLOCK
+    assert len(calls) == json_payload.AT_ONCE
 
 
 @pytest.mark.parametrize(

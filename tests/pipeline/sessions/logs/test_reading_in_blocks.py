@@ -109,7 +109,7 @@ def accelerations(count: int) -> Iterator[Message]:
 def test_what_is_kept_of_a_message_is_its_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By how much more memory a log of more messages takes while it is read."""
     monkeypatch.setattr(records, "DECODED_AT_ONCE", 2**18)
-    monkeypatch.setattr(records, "_BLOCK", 2**17)
+    monkeypatch.setattr(records, "BLOCK_BYTES", 2**17)
     peaks = []
     for count in (4_000, 20_000):
         path = tmp_path / f"{count}.mcap"

@@ -225,7 +225,7 @@ def test_random_messages_as_the_stock_decoders_read_them(
     path = write_messages(tmp_path_factory.getbasetemp() / "random.mcap", sent, maker)
     fast = read_topic(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(templates, "_TEMPLATES", 0)
+        patch.setattr(templates, "TEMPLATES", 0)
         slow = read_topic(path)
     for readings in (fast, slow):
         assert readings.stamp_ns.tolist() == [stamp for stamp, _, _ in drawn]
@@ -267,7 +267,7 @@ def test_damaged_messages_are_read_or_named_and_nothing_else(
     )
     fast = read_topic(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(templates, "_TEMPLATES", 0)
+        patch.setattr(templates, "TEMPLATES", 0)
         slow = read_topic(path)
     np.testing.assert_array_equal(fast.values, slow.values)
     assert (fast.stamp_ns.tolist(), fast.lost, fast.notes) == (slow.stamp_ns.tolist(), slow.lost, slow.notes)
