@@ -6,7 +6,7 @@ import asyncio
 import json
 import socket
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pytest
 import websockets
 
 from pipeline.live import server
+from pipeline.live.record import listening
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand, exit_code
@@ -179,6 +180,24 @@ def test_a_task_over_sockets_from_start_to_questionnaire(tmp_path: Path) -> None
     assert log.faults == ()
     assert log.topics["/tracker/position"].values[5].tolist() == pytest.approx([-0.1, 0.5, 1.2])
     assert log.topics["/phone/imu"].values[5][:3].tolist() == pytest.approx([0, 9.80665, 0])
+
+
+def test_what_a_page_is_told_does_not_wait_until_it_has_acknowledged_what_came_before() -> None:
+    at_once: list[int] = []
+
+    async def told(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        at_once.append(writer.get_extra_info("socket").getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+        writer.close()
+
+    async def run() -> None:
+        with closing(listening("127.0.0.1", 0)) as door:
+            async with await asyncio.start_server(told, sock=door):
+                reader, writer = await asyncio.open_connection(*door.getsockname())
+                await reader.read()
+                writer.close()
+
+    asyncio.run(run())
+    assert at_once == [1]
 
 
 def test_pages_are_files_beside_the_server() -> None:
