@@ -23,14 +23,14 @@ from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import exit_code
 from tests.pipeline.live.frames import FACING, frame
-from tests.pipeline.live.running import Running, agreed, free_port, hears, press_through, says, served
+from tests.pipeline.live.running import Running, agreed, at_once, free_port, hears, press_through, says, served
 from tests.pipeline.live.studies import STUDY, study_in
 
 SIZE = (640, 360)
 CAMERA = "camera: {size: [640, 360], field_of_view_deg: 60, late_ms: 20}"
 SENDERS = "senders: {tracker: {demo: {}}, imu: {demo: {}}}"
 AT_MM = (-100.0, -60.0, 600.0)
-_S_PER_FRAME = 0.02
+_S_PER_FRAME = 0.006
 
 
 def picture(*numbers: int) -> np.ndarray:
@@ -261,10 +261,10 @@ def test_a_task_with_a_webcam_as_tracker_gives_a_log_that_replays(tmp_path: Path
                 pass
             await says(operator, type="do", what="start", text="nobody moves the marker", id="d1")
             await hears(operator, "done", id="d1")
-            await press_through(phone)
+            await press_through(phone, drawn=20)
             assert (await agreed(operator))["mm"] <= 1e-9
 
-    served(tmp_path, play, camera_alone())
+    served(tmp_path, play, at_once(camera_alone()))
     log = mcap.read(tmp_path / "data/P01_kinect.mcap", [Wanted("/tracker/position", "position")])
     assert log.faults == ()
     values = log.topics["/tracker/position"].values
