@@ -19,7 +19,7 @@ from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand, exit_code
 from tests.pipeline.live.running import SENDERS, Running, at_once, free_port, hears, press_through, says, served
-from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.studies import BRIEF, STUDY, study_in
 
 
 def test_a_key_is_exchanged_for_the_cookie_of_its_role(tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_what_stands_in_the_way_is_said_with_its_remedy(
 def test_a_demo_played_by_bots_is_a_study_with_a_report(
     told: Callable[..., tuple[int, str]], tmp_path: Path, steadyhand: Steadyhand
 ) -> None:
-    mounted = STUDY.replace("noise_sd_mm_s2: 100,", "noise_sd_mm_s2: 100, lever_arm_mm: [40, 0, 0],")
+    mounted = BRIEF.replace("noise_sd_mm_s2: 100,", "noise_sd_mm_s2: 100, lever_arm_mm: [40, 0, 0],")
     study_in(tmp_path / "study", mounted)
     code, text = told(tmp_path / "study", "--demo", "--bots", "--participants", "1", "--out", tmp_path / "demo")
     assert (code, text) == (0, "")
