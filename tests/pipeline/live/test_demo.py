@@ -24,14 +24,15 @@ from pipeline.report.sections import recorded_live
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.studies import STUDY, shown_alone, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
+TEXT = shown_alone(STUDY)
 
 
 def players(folder: Path, now_ns: int = EPOCH_NS) -> Players:
     """Simulated people in a study folder, which goes on where it stands."""
-    study, setup = study_in(folder)
+    study, setup = study_in(folder, TEXT)
     journal = Journal(folder, study)
     journal.hold()
     known = setup.empty_plan()
@@ -120,7 +121,7 @@ def test_the_report_says_how_sessions_were_recorded_and_that_settings_changed(
     first: Players, tmp_path: Path, steadyhand: Steadyhand
 ) -> None:
     shutil.copytree(first.clerk.journal.folder, tmp_path, dirs_exist_ok=True)
-    study, setup = study_in(tmp_path, STUDY.replace("noise_sd_mm: 8", "noise_sd_mm: 9"))
+    study, setup = study_in(tmp_path, TEXT.replace("noise_sd_mm: 8", "noise_sd_mm: 9"))
     journal = Journal(tmp_path, study)
     journal.hold()
     with pytest.raises(PipelineError, match="has changed since P01"):

@@ -24,7 +24,7 @@ from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from pipeline.study.settings import Study
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.live.studies import BRIEF, STUDY, study_in
+from tests.pipeline.live.studies import BRIEF, STUDY, shown_alone, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 _EVERY_NS = 20_000_000
@@ -179,7 +179,8 @@ def test_so_it_would_be_at_every_one_of_many_moments(seed: int, tmp_path: Path) 
 def test_what_is_left_of_a_cut_session_is_read_by_the_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
     with playing(tmp_path) as player:
         player.plays(3.0, 0.0)
-    study, _ = study_in(tmp_path, STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", ""))
+    text = STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", "")
+    study, _ = study_in(tmp_path, shown_alone(text))
     journal = Journal(tmp_path, study)
     journal.hold()
     (found,) = [log for log in journal.found_logs() if not log.whole]
