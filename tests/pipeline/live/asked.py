@@ -70,23 +70,24 @@ def readings(found: Sequence[Any]) -> list[Reading]:
 
 
 @cache
-def _of_this_process_alone() -> None:
-    """LSL finds no outlet of another process of the tests, and measures a clock in 0.2 s instead of 0.6 s."""
-    import pylsl
+def loaded_lsl() -> Any:
+    """pylsl, which finds no outlet of another process, and measures a clock in 0.2 s instead of 0.6 s.
 
+    To be asked for before anything else is done with it. Skips where it cannot be loaded: it needs glibc 2.35.
+    """
+    try:
+        import pylsl
+    except (ImportError, OSError, RuntimeError) as error:
+        pytest.skip(f"LSL cannot be loaded here ({platform.libc_ver()}): {error}")
     probing = "[tuning]\nTimeProbeInterval = 0.008\n"  # s between the eight questions after the time, else 0.064
     pylsl.set_config_content(f"[lab]\nSessionID = steadyhand {os.getpid()}\n{probing}")
+    return pylsl
 
 
 @contextmanager
 def outlet(name: str, channels: int, values: Sequence[float], rate_hz: float) -> Iterator[None]:
-    """An outlet that sends the same steadily. Skipped where the library cannot be loaded (it needs glibc 2.35)."""
-    try:
-        import pylsl
-
-        _of_this_process_alone()
-    except (ImportError, OSError, RuntimeError) as error:
-        pytest.skip(f"LSL cannot be loaded here ({platform.libc_ver()}): {error}")
+    """An outlet that sends the same steadily."""
+    pylsl = loaded_lsl()
     made = pylsl.StreamOutlet(pylsl.StreamInfo(name, "Test", channels, rate_hz, "double64", f"{name}-{time.time_ns()}"))
     if not any(one.name() == name for one in pylsl.resolve_byprop("name", name, 1, timeout=3.0)):
         pytest.skip("no LSL stream of this computer's own can be found here: its network passes no multicast")
