@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
 import websockets
 
+from pipeline.live import loop, study_run
 from pipeline.live.access import Access
 from pipeline.live.certificates import Certificates
 from pipeline.live.journal import Journal
@@ -79,7 +81,10 @@ def served(
     access: Access | None = None,
     certificates: Certificates | None = None,
 ) -> None:
-    """Serve a study while `play` is played; on this computer alone unless `access` says otherwise."""
+    """Serve a study while `play` is played; on this computer alone unless `access` says otherwise.
+
+    Lights, and what is refused, are told ten times as often as to people, so that nothing waits for them.
+    """
     udp_port = free_port(socket.SOCK_DGRAM)
     access = access or Access("http", "127.0.0.1", free_port())
     port = access.port
@@ -100,7 +105,10 @@ def served(
                     await serving
 
     try:
-        asyncio.run(run())
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(study_run, "_LIGHTS_NS", 20_000_000)
+            patch.setattr(loop, "_COUNT_NS", 100_000_000)
+            asyncio.run(run())
     finally:
         journal.release()
 

@@ -30,7 +30,7 @@ SIZE = (640, 360)
 CAMERA = "camera: {size: [640, 360], field_of_view_deg: 60, late_ms: 20}"
 SENDERS = "senders: {tracker: {demo: {}}, imu: {demo: {}}}"
 AT_MM = (-100.0, -60.0, 600.0)
-_S_PER_FRAME = 0.006
+_S_PER_FRAME = 0.005
 
 
 def picture(*numbers: int) -> np.ndarray:
@@ -145,6 +145,7 @@ def test_a_marker_s_place_is_a_reading_in_metres_stamped_before_it_arrived(tmp_p
 def test_a_marker_that_is_not_seen_is_counted_and_said_until_it_is_seen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("pipeline.live.adapters.camera._UNSEEN_NS", 100_000_000)
     shown_then(monkeypatch, (EMPTY, 60), (SEEN, 1))
     said, refused = watched(tmp_path, lambda said: bool(readings(said)))
     assert links(said)[-2:] == ["tracker: camera 0 does not see marker 7; hold it flat, in view, in the light.", ""]

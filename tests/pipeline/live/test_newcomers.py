@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from pipeline.live import desk, loop, offers
+from pipeline.live import desk, offers
 from pipeline.live.adapters import osc, udp
 from pipeline.live.adapters.newcomers import NOT_ACCEPTED, Newcomers
 from pipeline.live.events import Accept, Closed, Joined, Offer, Offered, Open, Reading, Said, Save
@@ -186,9 +186,7 @@ def test_a_sender_is_not_accepted_where_that_would_mix_two_or_none_sends(lab: La
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs addresses 127.0.0.2 and 127.0.0.3")
-def test_over_real_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "_COUNT_NS", 100_000_000)  # who is not heard is said each 0.1 s and not each second
-
+def test_over_real_sockets(tmp_path: Path) -> None:
     async def send(running: Running, source: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.bind((source, 0))
