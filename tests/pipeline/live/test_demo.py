@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,23 +13,22 @@ import pytest
 
 from pipeline.errors import PipelineError
 from pipeline.live import plan, run_state
-from pipeline.live.adapters.demo import Participant
 from pipeline.live.bots import FORMS, PHONE, Players, as_simulated
 from pipeline.live.events import Joined, Left, Said, Tick
 from pipeline.live.journal import PART, Journal, known_plan
 from pipeline.live.messages import Answer, Do, Drawn, Select, Submit
-from pipeline.live.outgoing import AnswerSaved, Form, FormState, Outgoing, Refused, to_json
+from pipeline.live.outgoing import AnswerSaved, Form, FormState, Refused, to_json
 from pipeline.report.sections import recorded_live
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.live.studies import STUDY, shown_alone, study_in
+from tests.pipeline.live.studies import BRIEF, STUDY, shown_alone, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 TEXT = shown_alone(STUDY)
 
 
-def players(folder: Path, now_ns: int = EPOCH_NS) -> Players:
+def players(folder: Path) -> Players:
     """Simulated people in a study folder, which goes on where it stands."""
     study, setup = study_in(folder, TEXT)
     journal = Journal(folder, study)
@@ -38,43 +36,24 @@ def players(folder: Path, now_ns: int = EPOCH_NS) -> Players:
     known = setup.empty_plan()
     for record in journal.records():
         known = plan.after(known, record)
-    return Players(as_simulated(setup), folder, journal, plan.with_logs(known, journal.found_logs()), now_ns)
+    return Players(as_simulated(setup), folder, journal, plan.with_logs(known, journal.found_logs()), EPOCH_NS)
 
 
 @dataclass
 class Demo:
-    """A study that was played, and who played it, one participant after the other."""
+    """A study that was played, and who played it."""
 
     folder: Path
-    first: Players
-    second: Players
-
-    @property
-    def played(self) -> dict[tuple[str, str], Participant]:
-        return self.first.played | self.second.played
-
-    @property
-    def told(self) -> list[tuple[int, Outgoing]]:
-        return self.first.told + self.second.told
+    players: Players
 
 
 @pytest.fixture(scope="module")
-def first(tmp_path_factory: pytest.TempPathFactory) -> Players:
-    """Who has played a study with one participant, in a folder that is to stay as it is."""
-    playing = players(tmp_path_factory.mktemp("first"))
-    playing.play(1)
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
+    folder = tmp_path_factory.mktemp("demo")
+    playing = players(folder)
+    playing.play(2)
     playing.clerk.journal.release()
-    return playing
-
-
-@pytest.fixture(scope="module")
-def demo(first: Players, tmp_path_factory: pytest.TempPathFactory) -> Demo:
-    """The study goes on with a second participant, in a copy."""
-    folder = shutil.copytree(first.clerk.journal.folder, tmp_path_factory.mktemp("demo"), dirs_exist_ok=True)
-    second = players(folder, first.now_ns)
-    second.play(2)
-    second.clerk.journal.release()
-    return Demo(folder, first, second)
+    return Demo(folder, playing)
 
 
 def test_the_report_says_what_the_participants_did(demo: Demo, steadyhand: Steadyhand) -> None:
@@ -86,14 +65,14 @@ def test_the_report_says_what_the_participants_did(demo: Demo, steadyhand: Stead
     for row in results["replay_agreement"]:
         assert row["max_mm"] <= 1e-9
         assert row["n"] > 500
-    targets = demo.second.run.setup.targets_mm
+    targets = demo.players.run.setup.targets_mm
     for condition in ("kinect", "fusion"):
         errors, seconds = [], []
         for participant in ("P01", "P02"):
-            taps = demo.played[participant, condition].taps
+            taps = demo.players.played[participant, condition].taps
             errors.append(float(np.mean(np.sum((taps[:, 1:3] - np.array(targets)) ** 2, axis=1))))
             start = next(one["at"] for one in _events(demo, participant, condition) if one["type"] == "session_start")
-            begins = demo.played[participant, condition].begins_ns
+            begins = demo.players.played[participant, condition].begins_ns
             seconds.append(float(taps[-1, 0]) - (start - begins) / 1e9)
         means = {row["measure"]: row["mean"] for row in results["descriptives"] if row["condition"] == condition}
         assert means["selection_mse_mm2"] == pytest.approx(np.mean(errors), rel=1e-6)
@@ -118,17 +97,18 @@ def test_a_log_says_how_it_was_recorded(demo: Demo) -> None:
 
 
 def test_the_report_says_how_sessions_were_recorded_and_that_settings_changed(
-    first: Players, tmp_path: Path, steadyhand: Steadyhand
+    tmp_path: Path, steadyhand: Steadyhand
 ) -> None:
-    shutil.copytree(first.clerk.journal.folder, tmp_path, dirs_exist_ok=True)
-    study, setup = study_in(tmp_path, TEXT.replace("noise_sd_mm: 8", "noise_sd_mm: 9"))
-    journal = Journal(tmp_path, study)
-    journal.hold()
-    with pytest.raises(PipelineError, match="has changed since P01"):
-        known_plan(setup.empty_plan(), journal, setup.digest, goes_on=False)
-    known = known_plan(setup.empty_plan(), journal, setup.digest, goes_on=True)
-    Players(as_simulated(setup), tmp_path, journal, known, first.now_ns + 10**13).play(2)
-    journal.release()
+    for count, sd in ((1, "8"), (2, "9")):  # noise_sd_mm is changed after the first participant
+        study, setup = study_in(tmp_path, BRIEF.replace("noise_sd_mm: 8", f"noise_sd_mm: {sd}"))
+        journal = Journal(tmp_path, study)
+        journal.hold()
+        if count == 2:
+            with pytest.raises(PipelineError, match="has changed since P01"):
+                known_plan(setup.empty_plan(), journal, setup.digest, goes_on=False)
+        known = known_plan(setup.empty_plan(), journal, setup.digest, goes_on=True)
+        Players(as_simulated(setup), tmp_path, journal, known, EPOCH_NS + count * 10**13).play(count)
+        journal.release()
     ran = steadyhand("compare", tmp_path)
     assert ran.code == 0, ran.err
     rows = steadyhand.results()["recorders"]
@@ -148,7 +128,7 @@ def test_the_report_says_how_sessions_were_recorded_and_that_settings_changed(
 
 
 def test_no_message_to_phone_or_questionnaire_names_a_condition(demo: Demo) -> None:
-    sent = b"\n".join(to_json(message) for client, message in demo.told if client in (PHONE, FORMS))
+    sent = b"\n".join(to_json(message) for client, message in demo.players.told if client in (PHONE, FORMS))
     assert len(sent) > 1000
     for word in (b"kinect", b"fusion", b"kalman", b"Two systems"):
         assert word not in sent
@@ -164,7 +144,7 @@ def test_orders_and_ratings_are_in_the_tables(demo: Demo) -> None:
 
 
 def test_who_has_done_everything_is_thanked(demo: Demo, tmp_path: Path) -> None:
-    assert run_state.form(demo.second.run) == FormState("thanks")
+    assert run_state.form(demo.players.run) == FormState("thanks")
     assert run_state.form(players(tmp_path).run) == FormState("waiting")  # nobody has begun
 
 
@@ -177,7 +157,7 @@ def test_a_study_goes_on_where_it_stands(demo: Demo, tmp_path: Path) -> None:
 
 
 def test_another_recorder_keeps_out(demo: Demo) -> None:
-    journal = Journal(demo.folder, demo.second.clerk.journal.study)
+    journal = Journal(demo.folder, demo.players.clerk.journal.study)
     (journal.own / "lock").write_text("1", encoding="ascii")  # process 1 is always there
     with pytest.raises(PipelineError, match="another recorder"):
         journal.hold()
