@@ -5,7 +5,7 @@ the gradients around it meet lies a quarter of a pixel further in, so that a 50 
 seems smaller and 20 mm further than it is. The middle of a blurred edge stays where it was. So each side is found anew:
 grey values are read along short lines across it, from the black inside to the white border, and on each line the edge
 is where a sharp step would hold as much white. A straight line is laid through the places of a side, and the corners
-are where these lines meet. In the 200 pictures of the test errors are a seventh of those with OpenCV's corners.
+are where these lines meet. In 200 views of the test errors are below a seventh of those with OpenCV's corners.
 
 The position is that of the marker's middle in the camera's frame: x to the right, y down, z away from it. Four corners
 in a plane have two poses that fit (Collins and Bartoli 2014, IPPE); the better one is taken. Their middles hardly

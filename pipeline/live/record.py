@@ -98,8 +98,13 @@ def secured(options: Serving, folder: Path, now: datetime) -> tuple[Access, Cert
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """A socket that listens. Raises PipelineError where it cannot."""
-    made = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+    """A socket that listens. Raises PipelineError where it cannot.
+
+    It says that it speaks TCP: only then does asyncio send at once what a page is told, and does not let it wait until
+    the page has acknowledged what came before: 40 ms later from Linux, and more from others (RFC 896, RFC 1122).
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    made = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind((host, port))
@@ -136,14 +141,17 @@ def examiners() -> Iterator[Executor]:
 def nothing_to_search() -> Iterator[None]:
     """What is in memory by now is no garbage. Searched for it, as happens now and then, the loop stops for 70 ms.
 
-    That is long enough for a port under a flood to overflow. What is made from here on is searched as always.
+    That is long enough for a port under a flood to overflow. What is made from here on is searched as always. What the
+    caller has taken out of the search already stays out of it: it cannot be told from what is taken out here.
     """
     gc.collect()
+    had_its_own = gc.get_freeze_count() > 0
     gc.freeze()
     try:
         yield
     finally:
-        gc.unfreeze()
+        if not had_its_own:
+            gc.unfreeze()
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,9 @@ class Outlet:
 
         failures = 0
         while not self._closed.is_set():
-            streams = pylsl.resolve_streams(wait_time=_LOOK_S)
+            streams = self._found(pylsl)
+            if self._closed.is_set():
+                return
             problem = unfit(self._settings, [Found.of(one) for one in streams])
             if not problem:
                 failures = 0
@@ -90,6 +92,13 @@ class Outlet:
                 self._post(self._say, problem)
             self._closed.wait(BACK_OFF_S[min(failures, len(BACK_OFF_S) - 1)])
             failures += 1
+
+    def _found(self, pylsl: Any) -> list[Any]:
+        """What is there within a second; at the end of the study that second is not waited out."""
+        looking = pylsl.ContinuousResolver()
+        self._closed.wait(_LOOK_S)
+        streams: list[Any] = looking.results()
+        return streams
 
     def _listen(self, pylsl: Any, info: Any) -> str:
         """Until it is closed or lost; what is wrong then."""

@@ -16,7 +16,8 @@ FACING = Rotation.from_rotvec([np.pi, 0.0, 0.0])
 """The attitude of a marker that faces the camera upright."""
 _FINE = 3  # as many rays across a pixel
 _WALL = 120
-_NOISE = np.random.default_rng(0).standard_normal(1280 * 720, dtype=np.float32)
+_DIM = np.arange(256, dtype=np.float32) * 0.7 + 20
+_NOISE = np.tile(np.random.default_rng(0).standard_normal(1280 * 720, dtype=np.float32), 2)  # from anywhere in it
 
 
 def drawn(number: int) -> np.ndarray:
@@ -49,10 +50,10 @@ def frame(
     picture = np.full((height, width), _WALL, np.uint8)
     for number, (place_mm, attitude) in markers.items():
         _paint(picture, number, place_mm, attitude, lens, size_mm)
-    dim = cv2.GaussianBlur(picture, (0, 0), blur_px).astype(np.float32) * 0.7 + 20
-    along = random.integers(_NOISE.size)  # noise takes longer than all the rest, so it is drawn once and shifted
-    grain = np.resize(np.roll(_NOISE, along)[: picture.size], picture.shape)
-    return np.clip(dim + noise * grain, 0, 255).astype(np.uint8)
+    dim = np.asarray(cv2.LUT(cv2.GaussianBlur(picture, (0, 0), blur_px), _DIM), dtype=np.float32)
+    along = len(_NOISE) // 2 - random.integers(len(_NOISE) // 2)  # noise takes longest, so it is drawn once and shifted
+    dim += noise * _NOISE[along : along + picture.size].reshape(picture.shape)
+    return np.clip(dim, 0, 255, out=dim).astype(np.uint8)
 
 
 def _paint(

@@ -5,14 +5,17 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
 import websockets
 
+from pipeline.live import loop, study_run
 from pipeline.live.access import Access
 from pipeline.live.certificates import Certificates
 from pipeline.live.journal import Journal
@@ -78,7 +81,10 @@ def served(
     access: Access | None = None,
     certificates: Certificates | None = None,
 ) -> None:
-    """Serve a study while `play` is played; on this computer alone unless `access` says otherwise."""
+    """Serve a study while `play` is played; on this computer alone unless `access` says otherwise.
+
+    Lights, and what is refused, are told ten times as often as to people, so that nothing waits for them.
+    """
     udp_port = free_port(socket.SOCK_DGRAM)
     access = access or Access("http", "127.0.0.1", free_port())
     port = access.port
@@ -99,7 +105,10 @@ def served(
                     await serving
 
     try:
-        asyncio.run(run())
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(study_run, "_LIGHTS_NS", 20_000_000)
+            patch.setattr(loop, "_COUNT_NS", 100_000_000)
+            asyncio.run(run())
     finally:
         journal.release()
 
@@ -110,7 +119,7 @@ async def _answers(port: int) -> None:
         try:
             _, writer = await asyncio.open_connection("127.0.0.1", port)
         except OSError:
-            await asyncio.sleep(0.02)
+            await asyncio.sleep(0.002)
             continue
         writer.close()
         return
@@ -137,16 +146,21 @@ async def agreed(operator: Page) -> dict[str, Any]:
     return agreement
 
 
-async def press_through(phone: Page) -> None:
-    """Draw whatever comes, and press once a trial, until the task is done."""
-    pressed, state = 0, ""
+def at_once(study: str, countdown_s: float = 0.0) -> str:
+    """A study whose tasks begin soon, and where one press may follow another at once: nobody's finger presses twice."""
+    return study.replace("countdown_s: 1", f"countdown_s: {countdown_s}\n  selection: {{confirm_ms: 0}}")
+
+
+async def press_through(phone: Page, drawn: int) -> None:
+    """Draw whatever comes, and press once a trial, when so many estimates of it are drawn, until the task is done."""
+    of_trial, state = Counter[int](), ""
     while state != "done":
         message = json.loads(await phone.recv())
         if message["type"] == "state":
             state = message["state"]
         if message["type"] == "show":
             await says(phone, type="drawn", n=message["n"], t=0)
-            if state == "running" and message["trial"] > pressed:
-                pressed = message["trial"]
-                await asyncio.sleep(0.2)
-                await says(phone, type="select", n=message["n"], t=1)
+            if state == "running":
+                of_trial[message["trial"]] += 1
+                if of_trial[message["trial"]] == drawn:
+                    await says(phone, type="select", n=message["n"], t=1)

@@ -82,7 +82,7 @@ async def _steadily(topic: str, send: Callable[[int], Any]) -> None:
     with suppress(ConnectionClosed):
         while True:
             await send(time.time_ns())
-            await asyncio.sleep(0.03 if topic == POSITION else 0.011)
+            await asyncio.sleep(0.01 if topic == POSITION else 0.004)
 
 
 async def rosbridge(socket: ServerConnection) -> None:

@@ -6,8 +6,8 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import pytest
 from websockets.asyncio.server import ServerConnection
 
 from pipeline.live import desk, panel
-from pipeline.live.adapters import client
+from pipeline.live.adapters import client, lsl
 from pipeline.live.adapters.client import Client
 from pipeline.live.events import ClockOffset, Link
 from pipeline.sessions.logs import mcap
@@ -23,7 +23,7 @@ from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.live import servers
 from tests.pipeline.live.asked import SUBPROTOCOLS, heard, outlet, problems, readings, talk
 from tests.pipeline.live.lab import Lab, notes
-from tests.pipeline.live.running import Running, agreed, free_port, hears, press_through, says, served
+from tests.pipeline.live.running import Running, agreed, at_once, free_port, hears, press_through, says, served
 from tests.pipeline.live.servers import IMU, POSITION, point_stamped, published, serving
 from tests.pipeline.live.studies import STUDY
 
@@ -37,17 +37,26 @@ def test_a_connection_that_is_lost_is_said_and_there_again_after_a_while(monkeyp
         await socket.recv()
         await socket.send(published(POSITION, point_stamped(time.time_ns())))
 
-    async def beside() -> None:
+    async def begins_late() -> None:
         while not problems(found):
             await asyncio.sleep(0.005)
         async with serving(brief, port):
             await asyncio.sleep(60)
 
+    @asynccontextmanager
+    async def beside() -> AsyncIterator[None]:
+        server = asyncio.create_task(begins_late())
+        try:
+            yield
+        finally:
+            server.cancel()
+            await asyncio.gather(server, return_exceptions=True)
+
     def until(said: list[Any]) -> bool:
         found[:] = said
         return len(readings(said)) >= 2
 
-    heard(talk(port), until, beside)
+    heard(talk(port), until, beside())
     said = problems(found)
     begin = f"tracker: ws://127.0.0.1:{port}"
     assert said[0].startswith(f"{begin} cannot be connected to (Connection refused); ")
@@ -105,15 +114,12 @@ def test_what_no_server_of_readings_says_is_told_apart(monkeypatch: pytest.Monke
         writer.close()
 
     def over(handle: Any, subprotocols: Sequence[str] = ()) -> Any:
-        async def beside() -> None:
-            async with serving(handle, port, subprotocols):
-                await asyncio.sleep(60)
+        return serving(handle, port, subprotocols)
 
-        return beside
-
-    async def web() -> None:
-        async with await asyncio.start_server(plain, "127.0.0.1", port) as server:
-            await server.serve_forever()
+    @asynccontextmanager
+    async def web() -> AsyncIterator[None]:
+        async with await asyncio.start_server(plain, "127.0.0.1", port):
+            yield
 
     beside: Any
     for beside, kind, said in (
@@ -121,7 +127,7 @@ def test_what_no_server_of_readings_says_is_told_apart(monkeypatch: pytest.Monke
         (over(other), "rosbridge", "is connected, and nothing comes on /hand. See whether it is sent: `ros2 topic hz"),
         (over(other), "foxglove", "does not speak foxglove.websocket.v1; start foxglove_bridge there, or correct"),
         (over(advertises, SUBPROTOCOLS), "foxglove", "has no topic /hand; it has /phone. Correct the topic, or start"),
-        (web, "rosbridge", "answers with HTTP 404 and no WebSocket; correct the url. Trying again."),
+        (web(), "rosbridge", "answers with HTTP 404 and no WebSocket; correct the url. Trying again."),
     ):
         expected = f"tracker: ws://127.0.0.1:{port} {said}"
 
@@ -168,12 +174,13 @@ def test_how_bytes_are_cut_makes_no_difference(kind: str) -> None:
 
             await asyncio.gather(pump(reader, inner_writer, 4096), pump(inner_reader, writer, piece))
 
-        async def beside() -> None:
+        @asynccontextmanager
+        async def beside() -> AsyncIterator[None]:
             spoken = SUBPROTOCOLS if kind == "foxglove" else ()
             async with serving(fragments, back, spoken), await asyncio.start_server(relay, "127.0.0.1", front):
-                await asyncio.sleep(60)
+                yield
 
-        found, refused = heard(talk(front, kind), lambda found: len(readings(found)) == len(places), beside)
+        found, refused = heard(talk(front, kind), lambda found: len(readings(found)) == len(places), beside())
         assert not refused
         return [(one.values, one.sent_ms) for one in readings(found)]
 
@@ -211,8 +218,8 @@ def sent_by(kind: str) -> Iterator[str]:
     """Tracker and phone that send by that kind, and what study.yaml says of them."""
     if kind == "lsl":
         with (
-            outlet("SteadyhandHand", 5, (0.0, 0.0, *(part * 1e3 for part in servers.PLACE_M)), 30),
-            outlet("SteadyhandPhone", 10, (*servers.FORCE_M_S2, 0.0, 0.0, 0.0, *servers.UPRIGHT), 90),
+            outlet("SteadyhandHand", 5, (0.0, 0.0, *(part * 1e3 for part in servers.PLACE_M)), 100),
+            outlet("SteadyhandPhone", 10, (*servers.FORCE_M_S2, 0.0, 0.0, 0.0, *servers.UPRIGHT), 250),
         ):
             yield (
                 "tracker: {lsl: {name: SteadyhandHand, channels: [2, 3, 4]}},"
@@ -247,7 +254,11 @@ def sent_by(kind: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("kind", ["rosbridge", "foxglove", "lsl"])
-def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(tmp_path: Path, kind: str) -> None:
+def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lsl, "_LOOK_S", 0.1)
+
     async def play(running: Running) -> None:
         async with running.page("operator") as operator, running.page("phone") as phone:
             await says(phone, type="hello", page="phone", version=1, agent="a test", wake_lock=True)
@@ -256,15 +267,13 @@ def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(tmp_pat
                 lights = (await hears(operator, "lights"))["lights"]
             await says(operator, type="do", what="start", text="a test", id="d1")
             await hears(operator, "done", id="d1")
-            await press_through(phone)
+            await press_through(phone, drawn=20)
             agreement = await agreed(operator)
             assert agreement["mm"] <= 1e-9
             assert agreement["n"] >= 3  # something was shown in each trial
 
     with sent_by(kind) as senders:
-        text = STUDY.replace("tracker: {demo: {}}, imu: {demo: {}}", senders).replace(
-            "countdown_s: 1", "countdown_s: 0"
-        )
+        text = at_once(STUDY.replace("tracker: {demo: {}}, imu: {demo: {}}", senders))
         text = text.replace("shown: {kinect: kinect, fusion: fusion}", "shown: {kinect: fusion, fusion: fusion}")
         served(tmp_path, play, text)
     topics = [Wanted("/tracker/position", "position"), Wanted("/phone/imu", "acceleration")]

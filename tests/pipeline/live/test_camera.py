@@ -23,14 +23,14 @@ from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import exit_code
 from tests.pipeline.live.frames import FACING, frame
-from tests.pipeline.live.running import Running, agreed, free_port, hears, press_through, says, served
+from tests.pipeline.live.running import Running, agreed, at_once, free_port, hears, press_through, says, served
 from tests.pipeline.live.studies import STUDY, study_in
 
 SIZE = (640, 360)
 CAMERA = "camera: {size: [640, 360], field_of_view_deg: 60, late_ms: 20}"
 SENDERS = "senders: {tracker: {demo: {}}, imu: {demo: {}}}"
 AT_MM = (-100.0, -60.0, 600.0)
-_S_PER_FRAME = 0.02
+_S_PER_FRAME = 0.005
 
 
 def picture(*numbers: int) -> np.ndarray:
@@ -145,6 +145,7 @@ def test_a_marker_s_place_is_a_reading_in_metres_stamped_before_it_arrived(tmp_p
 def test_a_marker_that_is_not_seen_is_counted_and_said_until_it_is_seen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("pipeline.live.adapters.camera._UNSEEN_NS", 100_000_000)
     shown_then(monkeypatch, (EMPTY, 60), (SEEN, 1))
     said, refused = watched(tmp_path, lambda said: bool(readings(said)))
     assert links(said)[-2:] == ["tracker: camera 0 does not see marker 7; hold it flat, in view, in the light.", ""]
@@ -261,10 +262,10 @@ def test_a_task_with_a_webcam_as_tracker_gives_a_log_that_replays(tmp_path: Path
                 pass
             await says(operator, type="do", what="start", text="nobody moves the marker", id="d1")
             await hears(operator, "done", id="d1")
-            await press_through(phone)
+            await press_through(phone, drawn=20)
             assert (await agreed(operator))["mm"] <= 1e-9
 
-    served(tmp_path, play, camera_alone())
+    served(tmp_path, play, at_once(camera_alone()))
     log = mcap.read(tmp_path / "data/P01_kinect.mcap", [Wanted("/tracker/position", "position")])
     assert log.faults == ()
     values = log.topics["/tracker/position"].values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -194,15 +195,30 @@ class Lab:
         return {one.id: one.light for one in self.run.checks}
 
 
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    lab = Lab(tmp_path_factory.mktemp("played"))
+    lab.plays()
+    return lab
+
+
+@pytest.fixture
+def checked(played: Lab) -> Lab:
+    """A study in which all checks but the press were seen; what it goes on to changes nobody else's state."""
+    lab = copy(played)
+    lab.actions = list(played.actions)
+    return lab
+
+
 def phases(actions: list[Action]) -> list[str]:
     return [one.message.state for one in actions if isinstance(one, Tell) and isinstance(one.message, PhaseOfTask)]
 
 
-def test_the_phone_asks_for_the_checks_until_all_have_been_seen(tmp_path: Path) -> None:
-    lab = Lab(tmp_path)
+def test_the_phone_asks_for_the_checks_until_all_have_been_seen(tmp_path: Path, checked: Lab) -> None:
+    begun, lab = Lab(tmp_path), checked
+    assert phases(begun.actions) == ["checks"]
+    assert begun.lights == dict.fromkeys(["still", "turn", "sweep", "reach", "tap"], "off")
     assert phases(lab.actions) == ["checks"]
-    assert lab.lights == dict.fromkeys(["still", "turn", "sweep", "reach", "tap"], "off")
-    lab.plays()
     assert lab.lights == {
         "still": "green",
         "turn": "green",
@@ -255,9 +271,8 @@ def starts(lab: Lab, reason: str = "") -> tuple[list[Refused], list[Open]]:
     return told, [one for one in actions if isinstance(one, Open)]
 
 
-def test_a_first_task_wants_every_check_or_a_reason_which_the_log_gives(tmp_path: Path) -> None:
-    lab = Lab(tmp_path)
-    lab.plays()
+def test_a_first_task_wants_every_check_or_a_reason_which_the_log_gives(checked: Lab) -> None:
+    lab = checked
     (refused,), opened = starts(lab)
     assert opened == []
     assert refused.reason_overrules
@@ -268,18 +283,16 @@ def test_a_first_task_wants_every_check_or_a_reason_which_the_log_gives(tmp_path
     assert log.facts["overruled"] == "tap: not done."
 
 
-def test_a_first_task_begins_without_a_reason_once_every_check_is_done(tmp_path: Path) -> None:
-    lab = Lab(tmp_path)
-    lab.plays()
+def test_a_first_task_begins_without_a_reason_once_every_check_is_done(checked: Lab) -> None:
+    lab = checked
     lab.taps()
     refusals, (log,) = starts(lab)
     assert refusals == []
     assert "started_although" not in log.facts and "overruled" not in log.facts
 
 
-def test_later_tasks_and_attempts_want_no_checks_again(tmp_path: Path) -> None:
-    lab = Lab(tmp_path)
-    lab.plays()
+def test_later_tasks_and_attempts_want_no_checks_again(checked: Lab) -> None:
+    lab = checked
     starts(lab, "the button is out of reach")
     lab.says("operator", OPERATOR, Do("abort", "the light went out", "d"))
     lab.happens(Closed("data/set-aside/P01_kinect.1.mcap", lab.at_ns))
@@ -298,9 +311,8 @@ def test_without_a_phone_no_reason_helps(tmp_path: Path) -> None:
     assert not refused.reason_overrules
 
 
-def test_a_light_that_turns_red_during_a_task_is_noted_in_the_log(tmp_path: Path) -> None:
-    lab = Lab(tmp_path)
-    lab.plays()
+def test_a_light_that_turns_red_during_a_task_is_noted_in_the_log(checked: Lab) -> None:
+    lab = checked
     lab.taps()
     lab.says("operator", OPERATOR, Do("start", "", "d"))
     red = Light("held positions: tracker", "red", "It holds.")

@@ -22,14 +22,15 @@ from pipeline.report.sections import recorded_live
 from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.studies import BRIEF, STUDY, shown_alone, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
+TEXT = shown_alone(STUDY)
 
 
 def players(folder: Path) -> Players:
     """Simulated people in a study folder, which goes on where it stands."""
-    study, setup = study_in(folder)
+    study, setup = study_in(folder, TEXT)
     journal = Journal(folder, study)
     journal.hold()
     known = setup.empty_plan()
@@ -99,7 +100,7 @@ def test_the_report_says_how_sessions_were_recorded_and_that_settings_changed(
     tmp_path: Path, steadyhand: Steadyhand
 ) -> None:
     for count, sd in ((1, "8"), (2, "9")):  # noise_sd_mm is changed after the first participant
-        study, setup = study_in(tmp_path, STUDY.replace("noise_sd_mm: 8", f"noise_sd_mm: {sd}"))
+        study, setup = study_in(tmp_path, BRIEF.replace("noise_sd_mm: 8", f"noise_sd_mm: {sd}"))
         journal = Journal(tmp_path, study)
         journal.hold()
         if count == 2:

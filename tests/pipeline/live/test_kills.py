@@ -24,17 +24,18 @@ from pipeline.sessions.logs import mcap
 from pipeline.sessions.logs.log import Wanted
 from pipeline.study.settings import Study
 from tests.pipeline.helpers import Steadyhand
-from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.studies import BRIEF, STUDY, shown_alone, study_in
 
 EPOCH_NS = 1_764_350_000_000_000_000
 _EVERY_NS = 20_000_000
-_MOST_S = 15.0  # of a study of 22 s: in it the first task ends and the second begins
+_FIRST_TASK_S = {STUDY: 11.9, BRIEF: 4.1}  # and a little longer
+_MOST_S = {STUDY: 15.0, BRIEF: 6.0}  # in it the first task ends and the second begins
 _A_MOMENT_S = 0.005  # of the wall clock, in which some tens of readings are played
 
 
-def play_and_say(folder: Path, ready: int, said: int) -> None:
+def play_and_say(folder: Path, text: str, ready: int, said: int) -> None:
     """Play a study, and write the time that it is in the study to `said` again and again."""
-    study, setup = study_in(folder)
+    study, setup = study_in(folder, text)
     journal = Journal(folder, study)
     journal.hold()
     players = Players(as_simulated(setup), folder, journal, setup.empty_plan(), EPOCH_NS)
@@ -57,7 +58,7 @@ def play_and_say(folder: Path, ready: int, said: int) -> None:
 def warm(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Everything is compiled and loaded before processes are forked that are killed within a second."""
     folder = tmp_path_factory.mktemp("warm")
-    study, setup = study_in(folder)
+    study, setup = study_in(folder, BRIEF)
     journal = Journal(folder, study)
     journal.hold()
     Players(as_simulated(setup), folder, journal, setup.empty_plan(), EPOCH_NS).play(1)
@@ -99,13 +100,13 @@ class Player:
 
 
 @contextmanager
-def playing(folder: Path) -> Iterator[Player]:
+def playing(folder: Path, text: str = STUDY) -> Iterator[Player]:
     """Play in a process, which is killed at the end."""
     (ready_in, ready), (said_in, said) = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:
         try:
-            play_and_say(folder, ready, said)
+            play_and_say(folder, text, ready, said)
         finally:
             os._exit(0)
     os.close(ready)
@@ -121,7 +122,7 @@ def playing(folder: Path) -> Iterator[Player]:
         os.close(said_in)
 
 
-def state_after(folder: Path, study: Study, setup: Setup, came_to_ns: int) -> str:
+def state_after(folder: Path, study: Study, setup: Setup, first_task_s: float, came_to_ns: int) -> str:
     """What a recorder finds that begins after another was killed; returns the state of the first task."""
     journal = Journal(folder, study)
     journal.hold()  # the lock of a process that is dead holds nobody
@@ -138,7 +139,10 @@ def state_after(folder: Path, study: Study, setup: Setup, came_to_ns: int) -> st
         newest = max(int(one.arrival_ns.max()) for one in log.topics.values())
         assert came_to_ns - newest <= 1_000_000_000
     assert not list((folder / "data").glob("*.new"))
-    return known.persons[0].tasks[0].state if known.persons else "todo"
+    state = known.persons[0].tasks[0].state if known.persons else "todo"
+    if 1.0 < (came_to_ns - EPOCH_NS) / 1e9 < first_task_s:  # else a log that holds nothing would be no loss
+        assert state == "cut"
+    return state
 
 
 def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(tmp_path: Path) -> None:
@@ -146,9 +150,9 @@ def test_a_recorder_killed_at_any_moment_loses_a_second_at_most(tmp_path: Path) 
     for number in range(4):
         folder = tmp_path / str(number)
         with playing(folder) as player:
-            player.plays(chance.uniform(0, _MOST_S), chance.uniform(0, _A_MOMENT_S))
+            player.plays(chance.uniform(0, _MOST_S[STUDY]), chance.uniform(0, _A_MOMENT_S))
             player.stops(signal.SIGKILL)
-        states.append(state_after(folder, *study_in(folder), player.now_ns))
+        states.append(state_after(folder, *study_in(folder), _FIRST_TASK_S[STUDY], player.now_ns))
     assert "cut" in states
     assert set(states) <= {"todo", "cut", "done"}
 
@@ -159,15 +163,15 @@ def test_so_it_would_be_at_every_one_of_many_moments(seed: int, tmp_path: Path) 
     """Each time the player is halted and its files are copied: a kill would have left these, for it writes no more."""
     chance, found = random.Random(seed), []  # noqa: S311
     folder = tmp_path / "played"
-    with playing(folder) as player:
-        for number, seconds in enumerate(sorted(chance.uniform(0, _MOST_S) for _ in range(28))):
+    with playing(folder, BRIEF) as player:
+        for number, seconds in enumerate(sorted(chance.uniform(0, _MOST_S[BRIEF]) for _ in range(28))):
             player.plays(seconds, chance.uniform(0, _A_MOMENT_S))
             player.stops(signal.SIGSTOP)
             left = shutil.copytree(folder, tmp_path / str(number))
             found.append((left, player.now_ns))
             player.goes_on()
-    study, setup = study_in(folder)
-    states = [state_after(left, study, setup, came_to_ns) for left, came_to_ns in found]
+    study, setup = study_in(folder, BRIEF)
+    states = [state_after(left, study, setup, _FIRST_TASK_S[BRIEF], came_to_ns) for left, came_to_ns in found]
     assert "cut" in states
     assert set(states) <= {"todo", "cut", "done"}
 
@@ -175,7 +179,8 @@ def test_so_it_would_be_at_every_one_of_many_moments(seed: int, tmp_path: Path) 
 def test_what_is_left_of_a_cut_session_is_read_by_the_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
     with playing(tmp_path) as player:
         player.plays(3.0, 0.0)
-    study, _ = study_in(tmp_path, STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", ""))
+    text = STUDY.replace("comparisons: [{measure: completion_time_s, test: t_paired}]\n", "")
+    study, _ = study_in(tmp_path, shown_alone(text))
     journal = Journal(tmp_path, study)
     journal.hold()
     (found,) = [log for log in journal.found_logs() if not log.whole]

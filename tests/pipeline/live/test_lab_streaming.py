@@ -17,7 +17,7 @@ from pipeline.live.events import ClockOffset, Reading
 from pipeline.live.units import units
 from pipeline.study.recording import Lsl, Sender
 from tests.pipeline.helpers import exit_code
-from tests.pipeline.live.asked import outlet, problems, readings
+from tests.pipeline.live.asked import loaded_lsl, outlet, problems, readings
 from tests.pipeline.live.studies import STUDY, study_in
 
 
@@ -39,7 +39,9 @@ def test_how_lsl_hands_samples_over_makes_no_difference(cuts: list[int]) -> None
 
 
 def test_an_outlet_that_is_not_there_comes_and_goes_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lsl, "_LOOK_S", 0.3)
+    loaded_lsl()
+    monkeypatch.setattr(lsl, "_LOOK_S", 0.1)
+    monkeypatch.setattr(lsl, "BACK_OFF_S", (0.02,))
     found: list[Any] = []
 
     async def listen() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.live import desk, orientation, panel, run_state, study_run
 from pipeline.live.clerk import agreement
-from pipeline.live.events import Joined, Reading, Said, Show, Tick, Write
+from pipeline.live.events import Joined, Reading, Said, Show, Tick, Values, Write
 from pipeline.live.messages import Do, Drawn, Exchange, Motion, Orientation, Ping
 from pipeline.live.orientation import Aligner, PhoneMotion
 from pipeline.live.setup import Setup
@@ -41,13 +42,31 @@ def held_still(seconds: float, rate_hz: float) -> tuple[np.ndarray, np.ndarray, 
     return time, np.zeros((len(time), 3)), force
 
 
+@dataclass
+class Found:
+    """Orientations that were found of the swaying hand, and when."""
+
+    at: list[float] = field(default_factory=list)
+    xyzw: list[Values] = field(default_factory=list)
+
+    def add(self, at: float, values: Values) -> None:
+        self.at.append(at)
+        self.xyzw.append(values[6:])
+
+    def rms_deg_after(self, since: float) -> float:
+        """How far they are from the true ones, from a time on."""
+        off = Rotation.from_quat(self.xyzw) * turns(np.maximum(self.at, 0.0)).inv()
+        return float(np.sqrt(np.mean(np.degrees(np.asarray(off.magnitude())[np.array(self.at) > since]) ** 2)))
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("heading_deg", [0.0, 130.0])
 def test_with_the_browser_s_orientation_sign_and_heading_are_found(sign: float, heading_deg: float) -> None:
     earth = Rotation.from_euler("z", heading_deg, degrees=True) * LEVEL  # from the tracker's frame to the browser's
     still, moving = held_still(2.0, 60.0), swaying(20.0, 60.0, np.random.default_rng(1))
     time, turning, force = (np.concatenate(both) for both in zip(still, moving, strict=True))
-    state, frames, errors = PhoneMotion(), np.arange(-2.0, 20.0, 1 / 30), []
+    state, frames, found = PhoneMotion(), np.arange(-2.0, 20.0, 1 / 30), Found()
+    said = (earth * turns(np.maximum(time - 0.004, 0.0))).as_quat()  # of the browser
     upcoming = 0
     for row, at in enumerate(time.tolist()):
         while upcoming < len(frames) and frames[upcoming] + 0.1 <= at:
@@ -56,24 +75,23 @@ def test_with_the_browser_s_orientation_sign_and_heading_are_found(sign: float, 
             state = orientation.seen(ALIGNER, state, ns(seen_at), ns(seen_at + 0.1), where)
             upcoming += 1
         if row % 2 == 0:  # orientations come half as often, and a little earlier
-            turned = (earth * turns(np.array([max(at - 0.004, 0.0)]))[0]).as_quat()
-            state = orientation.oriented(state, Orientation(row, 0.0, tuple(turned.tolist()), False), ns(at - 0.004))
+            q = tuple(said[row].tolist())
+            state = orientation.oriented(state, Orientation(row, 0.0, q, False), ns(at - 0.004))
         a = tuple((sign * force[row] / 1000).tolist())
         r = tuple(np.degrees(turning[row]).tolist())
         state, values = orientation.moved(ALIGNER, state, Motion(row, 0.0, a, None, r, 16.0), ns(at), ns(at + 0.003))
         assert values is not None
         if np.isfinite(values[6:]).all():
             assert values[:3] == pytest.approx(tuple((force[row] / 1000).tolist()))
-            true = turns(np.array([max(at, 0.0)]))[0]
-            errors.append((at, float(np.degrees((Rotation.from_quat(values[6:]) * true.inv()).magnitude()))))
+            found.add(at, values)
     assert state.sign == sign
-    assert errors[0][0] < 5.0
-    assert np.sqrt(np.mean([error**2 for at, error in errors if at > 10])) < 5.0
+    assert found.at[0] < 5.0
+    assert found.rms_deg_after(10) < 5.0
 
 
 def test_without_one_tilt_comes_from_the_gyroscope() -> None:
     time, turning, force = swaying(40.0, 60.0, np.random.default_rng(2))
-    state, frames, errors, upcoming = PhoneMotion(), np.arange(0.0, 40.0, 1 / 30), [], 0
+    state, frames, found, upcoming = PhoneMotion(), np.arange(0.0, 40.0, 1 / 30), Found(), 0
     for row, at in enumerate(time.tolist()):
         while upcoming < len(frames) and frames[upcoming] + 0.1 <= at:
             seen_at = float(frames[upcoming])
@@ -82,10 +100,9 @@ def test_without_one_tilt_comes_from_the_gyroscope() -> None:
         a, r = tuple((force[row] / 1000).tolist()), tuple(np.degrees(turning[row]).tolist())
         state, values = orientation.moved(ALIGNER, state, Motion(row, 0.0, a, None, r, 16.0), ns(at), ns(at))
         if values is not None and np.isfinite(values[6:]).all():
-            true = turns(np.array([at]))[0]
-            errors.append((at, float(np.degrees((Rotation.from_quat(values[6:]) * true.inv()).magnitude()))))
+            found.add(at, values)
     assert state.source == "gyroscope"
-    assert np.sqrt(np.mean([error**2 for at, error in errors if at > 20])) < 5.0
+    assert found.rms_deg_after(20) < 5.0
 
 
 def test_a_reading_that_lacks_something_or_comes_late_is_none() -> None:

@@ -20,7 +20,7 @@ from pipeline.live.plan import Plan, rating_rows
 from pipeline.live.setup import warm_up
 from tests.pipeline.helpers import Steadyhand, exit_code
 from tests.pipeline.live.running import Running, hears, says, served
-from tests.pipeline.live.studies import STUDY, study_in
+from tests.pipeline.live.studies import STUDY, brief, study_in
 
 AT_NS = 1_764_350_000_000_000_000
 WEIGHTED = STUDY.replace("questionnaires: [nasa_tlx]", "questionnaires: [weighted_tlx]").replace(
@@ -185,7 +185,7 @@ def test_a_weighted_study_needs_the_rule_that_its_report_applies(tmp_path: Path)
 def test_a_report_scores_what_the_pairs_said(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, steadyhand: Steadyhand
 ) -> None:
-    study_in(tmp_path / "study", WEIGHTED.replace("completion_time_s", "nasa_tlx/weighted_tlx"))
+    study_in(tmp_path / "study", brief(WEIGHTED).replace("completion_time_s", "nasa_tlx/weighted_tlx"))
     demo = ("--demo", "--bots", "--participants", "2", "--out", tmp_path / "demo")
     assert exit_code(monkeypatch, "record", tmp_path / "study", *demo) == 0
     ran = steadyhand("compare", tmp_path / "demo")

@@ -113,18 +113,21 @@ def test_the_log_replays_to_what_was_shown_whatever_happens(
     replays(name, happenings, setup, tmp_path_factory.mktemp("replay"))
 
 
+@pytest.fixture(scope="module", params=MOUNTINGS)
+def with_mounting(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Setup:
+    return study_in(tmp_path_factory.mktemp("mounted"), mounted(request.param))[1]
+
+
 @pytest.mark.parametrize("name", ["kinect", "fusion", "adaptive"])
-@pytest.mark.parametrize("mounting", MOUNTINGS)
 @settings(max_examples=8)
 @given(happenings=HAPPENINGS)
 def test_so_it_does_with_a_phone_s_mounting(
     name: str,
-    mounting: str,
     happenings: list[tuple[str, int, int, int, float]],
+    with_mounting: Setup,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
-    folder = tmp_path_factory.mktemp("replay")
-    replays(name, happenings, study_in(folder, mounted(mounting))[1], folder)
+    replays(name, happenings, with_mounting, tmp_path_factory.mktemp("replay"))
 
 
 def test_what_is_shown_moves_with_the_phone_s_lever_arm(tmp_path: Path) -> None:
