@@ -1,7 +1,7 @@
 """Every command that README, docs and `make help` show runs: on copies of the bundled studies, in a folder of its own.
 
-A name in a page, such as path/to/study, stands for the bundled study that suits the command, with two of its logs. What takes minutes is
-marked as slow.
+A name in a page, such as path/to/study, stands for the bundled study that suits the command, with two of its logs. What
+takes minutes is marked as slow.
 """
 
 from __future__ import annotations

@@ -53,11 +53,12 @@ def record(folder: Path, options: Options, out: Path | None, bots: int | None) -
     from pipeline.live.record import record as serve
 
     serving = Serving(**vars(options))
-    serve(folder, study, serving, _ready(folder), lambda: console.say("Warming up the estimators …"))
+    serve(folder, study, serving, say_where(folder), lambda: console.say("Warming up the estimators …"))
     console.say(f"Recorded into {console.short_path(folder)}. Report: steadyhand report {console.short_path(folder)}")
 
 
-def _ready(folder: Path) -> Any:
+def say_where(folder: Path) -> Any:
+    """What prints where the operator and the phone find their pages, once they are served."""
     from pipeline.live.lens import USUAL_FIELD_OF_VIEW_DEG
 
     def say(setup: Setup, access: Access, certificates: Certificates | None) -> None:

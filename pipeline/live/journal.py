@@ -107,7 +107,7 @@ class Journal:
         if self._log is not None:
             part, file, writer = self._log
             writer.flush()
-            _sync(file)
+            to_disk(file)
             if not part.exists():
                 raise FileNotFoundError(f"{part.name} is not there any more")
             self.written_ns = time.monotonic_ns()
@@ -123,7 +123,7 @@ class Journal:
             return None
         part, file, writer = self._log
         writer.finish()
-        _sync(file)
+        to_disk(file)
         file.close()
         self._log = None
         return self._rename(part, set_aside)
@@ -199,7 +199,7 @@ class Journal:
         with (self.own / _ANSWERS).open("ab") as file:
             for record in records:
                 file.write(json.dumps(record, ensure_ascii=False, allow_nan=False).encode() + b"\n")
-            _sync(file)
+            to_disk(file)
 
     def records(self) -> list[Record]:
         """All records so far. A last line that was cut, or one that is no record, is passed over."""
@@ -294,7 +294,8 @@ def _read(path: Path, wanted: list[Wanted]) -> Any:
     return mcap.read(path, wanted) if path.suffix == PART else read_log(path, wanted)
 
 
-def _sync(file: BinaryIO) -> None:
+def to_disk(file: BinaryIO) -> None:
+    """Return once the disk has what was written."""
     file.flush()
     os.fsync(file.fileno())
 

@@ -59,7 +59,7 @@ _FLUSH_NS = 500_000_000
 _FILES_S = 0.1
 _STOOD_STILL_S = 2.0
 _WALL_CLOCK_NS = 10_000_000_000
-_COUNT_NS = 1_000_000_000
+COUNT_NS = 1_000_000_000
 _SET_NS = 100_000_000  # by which a wall clock jumps when it is set; it drifts by 1 ms in 10 s
 _MOST_WAITING = 256  # messages of one page: one that does not read is closed
 
@@ -267,7 +267,7 @@ class Loop:
 
     def _count_refused(self, now: int) -> None:
         """Say that adapters have dropped more than before, and who is not heard, once a second."""
-        if now - self._counted_ns < _COUNT_NS:
+        if now - self._counted_ns < COUNT_NS:
             return
         offers = self.newcomers.waiting((now - self._counted_ns) * S_PER_NS)
         self._counted_ns = now

@@ -31,7 +31,7 @@ from pipeline.live.server import app
 from pipeline.live.setup import Setup
 from pipeline.study.settings import Study
 
-_SOMEWHERE = "203.0.113.1"  # an address for examples (RFC 5737): only the way to it is looked up
+SOMEWHERE = "203.0.113.1"  # an address for examples (RFC 5737): only the way to it is looked up
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def lan_address() -> str:
     """The address of this computer in its network; nothing is sent. Raises PipelineError where it has none."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
         try:
-            made.connect((_SOMEWHERE, 9))
+            made.connect((SOMEWHERE, 9))
             found = str(made.getsockname()[0])
         except OSError:
             found = LOOPBACK[0]

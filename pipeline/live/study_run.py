@@ -58,7 +58,7 @@ from pipeline.sessions.logs.mcap import Message
 
 LEAST_FREE_BYTES = 200_000_000
 RAW = "/phone/raw"
-_LIGHTS_NS = 200_000_000
+LIGHTS_NS = 200_000_000
 _TRACE_NS = 100_000_000
 _TRACES = 60
 _NS_PER_MS = 1e6
@@ -124,7 +124,7 @@ def _tick(run: StudyRun, tick: Tick) -> Stepped:
     actions = (*missed, *actions, *examine)
     if not run.traces or tick.at_ns - run.traces[-1][0] >= _TRACE_NS:
         run = changed(run, traces=(*run.traces[1 - _TRACES :], panel.trace(run, tick.at_ns)))
-    if tick.at_ns - run.lights_ns < _LIGHTS_NS:
+    if tick.at_ns - run.lights_ns < LIGHTS_NS:
         return run, actions
     run = changed(run, lights_ns=tick.at_ns, drawn=tuple(at for at in run.drawn if tick.at_ns - at < 10**9))
     lights = panel.lights(run, tick.at_ns) if run.operators else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,9 @@ def p_two_sided(symbol: Symbol, statistic: float, df: Sequence[float | FloatArra
     """p of both tails for t, z and Pearson's r (df = n − 2), of the upper tail for F, χ² and H; one for each df."""
     from scipy import special  # the functions behind `stats`, which takes ten times as long to look at its arguments
 
+    p: Any
     if symbol == "F":
-        p = special.fdtrc(*df, max(statistic, 0.0))
+        p = special.fdtrc(df[0], df[1], max(statistic, 0.0))
     elif symbol in ("chi2", "H"):
         p = special.chdtrc(*df, max(statistic, 0.0))
     elif symbol == "z":

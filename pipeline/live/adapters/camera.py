@@ -22,9 +22,9 @@ from pipeline.live.adapters.camera_device import Capture, Device
 from pipeline.live.adapters.feeds import Feed, figures_of, three
 from pipeline.live.events import Link, Reading
 
-_AGAIN_S = 1.0
+AGAIN_S = 1.0
 _CLOSES_S = 2.0
-_UNSEEN_NS = 300_000_000
+UNSEEN_NS = 300_000_000
 TWICE, UNSEEN, BENT = "marker seen twice", "marker not seen", "marker not flat"
 
 
@@ -78,7 +78,7 @@ class Webcam:
             self.refused[f"{stream}: {place}"] += 1
             if place == TWICE:
                 self._say(stream, f"sees marker {one.number} twice; cover one, or print another --id.")
-            elif now - self._seen_ns[stream] > _UNSEEN_NS:
+            elif now - self._seen_ns[stream] > UNSEEN_NS:
                 self._say(stream, f"does not see marker {one.number}; hold it flat, in view, in the light.")
 
     def _say(self, stream: str, problem: str) -> None:
@@ -106,7 +106,7 @@ class Webcam:
                     self._capture.release()
                     self._capture = None
                 self._post(self._fail, problem)
-                self._closed.wait(_AGAIN_S)
+                self._closed.wait(AGAIN_S)
         if self._capture is not None:
             self._capture.release()
 

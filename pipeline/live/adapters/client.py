@@ -17,7 +17,7 @@ from pipeline.live.events import Link, Reading
 from pipeline.live.limits import Flow, admit
 
 BACK_OFF_S = (0.25, 0.5, 1.0, 2.0)
-_NOTHING_YET_S = 3.0
+NOTHING_YET_S = 3.0
 _OPENING_S, _PING_S = 5.0, 2.0
 
 
@@ -59,7 +59,7 @@ class Client:
         await self._act(socket, begun)
         while True:
             try:
-                frame = await asyncio.wait_for(socket.recv(), _NOTHING_YET_S if waits else None)
+                frame = await asyncio.wait_for(socket.recv(), NOTHING_YET_S if waits else None)
             except TimeoutError:
                 waits = False
                 self._say(self._talk.nothing_yet())

@@ -21,7 +21,7 @@ from pipeline.live.events import ClockOffset, Link, Reading
 from pipeline.live.limits import Flow, admit
 from pipeline.study.recording import Lsl
 
-_LOOK_S, _WAIT_S, _CORRECT_S = 1.0, 0.2, 2.0
+LOOK_S, _WAIT_S, _CORRECT_S = 1.0, 0.2, 2.0
 _CORRECT_NS = 2_000_000_000
 _MOST = 1024  # samples at once
 _NS_PER_S, _MS_PER_NS = 1e9, 1e-6
@@ -49,7 +49,7 @@ class Outlet:
     def close(self) -> None:
         """Listen no more."""
         self._closed.set()
-        self._thread.join(_LOOK_S + _WAIT_S)
+        self._thread.join(LOOK_S + _WAIT_S)
 
     def take(self, samples: Sequence[Sample]) -> None:
         """What was pulled at once; how it is cut makes no difference."""
@@ -96,7 +96,7 @@ class Outlet:
     def _found(self, pylsl: Any) -> list[Any]:
         """What is there within a second; at the end of the study that second is not waited out."""
         looking = pylsl.ContinuousResolver()
-        self._closed.wait(_LOOK_S)
+        self._closed.wait(LOOK_S)
         streams: list[Any] = looking.results()
         return streams
 

@@ -28,7 +28,7 @@ async def serve(socket: WebSocket, role: Role, loop: Loop, refused: Counter[str]
         await socket.close(CROWDED)
         return
     client, outbox = loop.join(role)
-    sending = asyncio.create_task(_send(socket, outbox))
+    sending = asyncio.create_task(send_waiting(socket, outbox))
     receiving = asyncio.create_task(_receive(socket, role, client, loop, refused))
     try:
         await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
@@ -41,7 +41,8 @@ async def serve(socket: WebSocket, role: Role, loop: Loop, refused: Counter[str]
             await socket.close(REPLACED if outbox.replaced else TOO_MUCH)
 
 
-async def _send(socket: WebSocket, outbox: Outbox) -> None:
+async def send_waiting(socket: WebSocket, outbox: Outbox) -> None:
+    """Send what waits in the outbox until it is ended or full; while nothing waits, a message may be sent at once."""
     under_way = False
 
     def at_once(message: Outgoing) -> bool:
@@ -67,7 +68,7 @@ def _sent_at_once(sending: Coroutine[Any, Any, None]) -> bool:
         sending.send(None)
     except StopIteration:
         return True
-    except (WebSocketDisconnect, RuntimeError):  # it has gone: `_send` finds out in its own time
+    except (WebSocketDisconnect, RuntimeError):  # it has gone: `send_waiting` finds out in its own time
         return False
     sending.close()
     return False

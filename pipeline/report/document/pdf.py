@@ -32,7 +32,7 @@ from pipeline.report.glyphs import showable
 
 _HERE = Path(__file__).parent
 _UNBROKEN = 24  # characters: a longer word in a table may break after punctuation
-_LINE = 148  # digits of the smallest type in a table's line
+LINE_DIGITS = 148  # digits of the smallest type in a table's line
 _TEXT_MAX = 100  # characters that a column of text is wide: else its neighbours are left a word a line
 _PADDING = 2.5  # characters between columns
 _NARROW = frozenset(" .,;:'|!ijl[]()\u00a0\u2009\u202f_")
@@ -143,7 +143,7 @@ def _table(table: Table) -> dict[str, Any]:
         "again": list(repeats(table)),
         "note": _typeset(table.note),
         "anchors": list(table.anchors),
-        "shares": _shares(table),
+        "shares": shares_of(table),
     }
 
 
@@ -156,35 +156,35 @@ def _as_data(runs: Iterable[Run]) -> list[list[str]]:
     return [[run.text, run.style] for run in runs]
 
 
-def _shares(table: Table) -> list[float]:
+def shares_of(table: Table) -> list[float]:
     """Relative widths of the columns, about the characters they hold: text may wrap, but not within numbers or words.
 
     Where all columns are wider than a line of the smallest type, text wraps sooner, so that numbers keep their width.
     """
     widest = [_widest(table, index) for index in range(len(table.columns))]
-    least = [_least(table, index) for index in range(len(table.columns))]
+    least = [least_width(table, index) for index in range(len(table.columns))]
     slack = sum(widest) - sum(least)
-    too_wide = max(sum(widest) - _LINE, 0.0)
+    too_wide = max(sum(widest) - LINE_DIGITS, 0.0)
     given_up = min(too_wide / slack, 1.0) if slack else 0.0
     return [wide - given_up * (wide - narrow) for wide, narrow in zip(widest, least, strict=True)]
 
 
 def _widest(table: Table, index: int) -> float:
     """A column's width where there is room: numbers whole, text in few lines."""
-    cells = [_width(row[index]) for row in table.rows]
+    cells = [width_in_digits(row[index]) for row in table.rows]
     longest, typical = max(cells, default=1), sum(cells) / max(len(cells), 1)
     width = longest if table.columns[index].numeric else min(longest, max(12, 1.6 * typical), _TEXT_MAX)
-    return max(float(width + _PADDING), _least(table, index))
+    return max(float(width + _PADDING), least_width(table, index))
 
 
-def _least(table: Table, index: int) -> float:
+def least_width(table: Table, index: int) -> float:
     """The width below which a number or a word would be broken, or a heading, which is bold, overprint the next."""
     texts, column = [row[index] for row in table.rows], table.columns[index]
-    whole = max(map(_width, texts), default=1) if column.numeric else min(_longest_word(texts), _UNBROKEN)
+    whole = max(map(width_in_digits, texts), default=1) if column.numeric else min(_longest_word(texts), _UNBROKEN)
     return max(whole, _BOLD * _longest_word([column.title])) + _PADDING
 
 
-def _width(text: str) -> float:
+def width_in_digits(text: str) -> float:
     """A text's width in that of a digit: spaces and marks are narrower."""
     return sum(0.55 if character in _NARROW else 1.0 for character in text)
 
@@ -192,4 +192,4 @@ def _width(text: str) -> float:
 def _longest_word(texts: Sequence[str]) -> float:
     """The widest of what typesetting keeps on one line."""
     lines = ("".join(run.text for run in typeset(text)) for text in texts)
-    return max((_width(word) for line in lines for word in line.split(" ")), default=1.0)
+    return max((width_in_digits(word) for line in lines for word in line.split(" ")), default=1.0)

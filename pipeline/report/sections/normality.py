@@ -14,7 +14,7 @@ from pipeline.study.statistical_tests import TESTS
 from pipeline.words.names import measure_label
 from pipeline.words.phrases import counted, listing
 
-_PANELS_MAX = 12  # tables/normal_quantiles.csv has all values
+PANELS_MAX = 12  # tables/normal_quantiles.csv has all values
 
 
 def plots(material: Material) -> Iterator[Block]:
@@ -26,9 +26,9 @@ def plots(material: Material) -> Iterator[Block]:
     leaving = int((outside["sum"] > 0).sum())
     shown = _furthest(table, outside["mean"])
     more = " Rows: tables/normal_quantiles.csv."
-    if len(outside) > _PANELS_MAX:
+    if len(outside) > PANELS_MAX:
         more = (
-            f" Of {len(outside)} samples {_PANELS_MAX} are drawn, {_which(leaving)}; all are in"
+            f" Of {len(outside)} samples {PANELS_MAX} are drawn, {which_are_drawn(leaving)}; all are in"
             " tables/normal_quantiles.csv."
         )
     more += _lacking(material, table)
@@ -40,16 +40,16 @@ def plots(material: Material) -> Iterator[Block]:
     yield Folded(summary, (figure,), figures_in_annex=True)
 
 
-def _which(leaving: int) -> str:
+def which_are_drawn(leaving: int) -> str:
     """Which of many samples have a panel, if so many have values outside their band."""
-    if leaving >= _PANELS_MAX:
+    if leaving >= PANELS_MAX:
         return "those with the largest share of values outside"
     return "all that have values outside and the first of the others" if leaving else "the first ones"
 
 
 def _furthest(table: pd.DataFrame, shares: pd.Series) -> pd.DataFrame:
     """The rows of as many samples as there are panels for, in the table's order."""
-    chosen = set(shares.sort_values(ascending=False, kind="stable").index[:_PANELS_MAX])
+    chosen = set(shares.sort_values(ascending=False, kind="stable").index[:PANELS_MAX])
     kept = [sample in chosen for sample in zip(*(table[name] for name in SAMPLE), strict=True)]
     return table[kept]
 

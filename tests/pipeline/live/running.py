@@ -106,8 +106,8 @@ def served(
 
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(study_run, "_LIGHTS_NS", 20_000_000)
-            patch.setattr(loop, "_COUNT_NS", 100_000_000)
+            patch.setattr(study_run, "LIGHTS_NS", 20_000_000)
+            patch.setattr(loop, "COUNT_NS", 100_000_000)
             asyncio.run(run())
     finally:
         journal.release()

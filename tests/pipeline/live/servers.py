@@ -15,7 +15,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from pipeline.sessions.logs.mcap import Message
-from pipeline.sessions.logs.mcap.writer import _IMU, _POINT_STAMPED, encoded
+from pipeline.sessions.logs.mcap.writer import IMU as IMU_SCHEMA
+from pipeline.sessions.logs.mcap.writer import POINT_STAMPED, encoded
 
 POSITION, IMU = "/hand", "/phone"
 PLACE_M = (-0.1, 0.5, 1.2)
@@ -66,8 +67,8 @@ def advertised(*channels: dict[str, Any]) -> str:
 
 
 CDR = {"encoding": "cdr", "schemaEncoding": "ros2msg"}
-CDR_POSITION = {"topic": POSITION, **CDR, "schemaName": "geometry_msgs/msg/PointStamped", "schema": _POINT_STAMPED}
-CDR_IMU = {"topic": IMU, **CDR, "schemaName": "sensor_msgs/msg/Imu", "schema": _IMU}
+CDR_POSITION = {"topic": POSITION, **CDR, "schemaName": "geometry_msgs/msg/PointStamped", "schema": POINT_STAMPED}
+CDR_IMU = {"topic": IMU, **CDR, "schemaName": "sensor_msgs/msg/Imu", "schema": IMU_SCHEMA}
 
 
 def cdr(topic: str, time_ns: int) -> bytes:

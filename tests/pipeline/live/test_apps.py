@@ -157,7 +157,7 @@ def test_the_start_says_where_to_send_to_and_what_is_in_the_clear(
 ) -> None:
     text = "senders: {tracker: {udp_json: {port: 9700}}, imu: {app: {name: zig_sim, port: 9000}}}"
     _, setup = study_in(tmp_path, STUDY.replace(_DEMO, text))
-    record._ready(tmp_path)(setup, Access("http", "192.168.1.5", 8443), None)
+    record.say_where(tmp_path)(setup, Access("http", "192.168.1.5", 8443), None)
     said = capsys.readouterr().out
     assert "tracker: by UDP to 192.168.1.5, port 9700" in said
     assert "imu: by UDP to 192.168.1.5, port 9000" in said

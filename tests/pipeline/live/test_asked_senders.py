@@ -91,7 +91,7 @@ def test_waiting_for_a_server_takes_longer_each_time_up_to_two_seconds(monkeypat
 
 
 def test_what_no_server_of_readings_says_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "_NOTHING_YET_S", 0.05)
+    monkeypatch.setattr(client, "NOTHING_YET_S", 0.05)
     port = free_port()
 
     async def huge(socket: ServerConnection) -> None:
@@ -257,7 +257,7 @@ def sent_by(kind: str) -> Iterator[str]:
 def test_a_task_whose_tracker_and_phone_come_by_it_is_logged_and_replays(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lsl, "_LOOK_S", 0.1)
+    monkeypatch.setattr(lsl, "LOOK_S", 0.1)
 
     async def play(running: Running) -> None:
         async with running.page("operator") as operator, running.page("phone") as phone:

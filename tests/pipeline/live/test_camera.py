@@ -78,7 +78,7 @@ def video(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cv2, "VideoCapture", Video)
     monkeypatch.setattr(Video, "shows", staticmethod(lambda: SEEN))
     monkeypatch.setattr(Video, "there", True)
-    monkeypatch.setattr("pipeline.live.adapters.camera._AGAIN_S", 0.02)
+    monkeypatch.setattr("pipeline.live.adapters.camera.AGAIN_S", 0.02)
 
 
 def with_camera(camera: str = CAMERA, more: str = "") -> str:
@@ -145,7 +145,7 @@ def test_a_marker_s_place_is_a_reading_in_metres_stamped_before_it_arrived(tmp_p
 def test_a_marker_that_is_not_seen_is_counted_and_said_until_it_is_seen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pipeline.live.adapters.camera._UNSEEN_NS", 100_000_000)
+    monkeypatch.setattr("pipeline.live.adapters.camera.UNSEEN_NS", 100_000_000)
     shown_then(monkeypatch, (EMPTY, 60), (SEEN, 1))
     said, refused = watched(tmp_path, lambda said: bool(readings(said)))
     assert links(said)[-2:] == ["tracker: camera 0 does not see marker 7; hold it flat, in view, in the light.", ""]

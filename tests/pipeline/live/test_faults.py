@@ -241,7 +241,7 @@ def test_a_full_disk_ends_the_attempt_and_keeps_what_is_on_it(tmp_path: Path, mo
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("pipeline.live.journal._sync", full)
+    monkeypatch.setattr("pipeline.live.journal.to_disk", full)
     told = clerk.flush(lambda: 2)
     assert told.fault is not None
     assert told.fault.startswith("No space left on device")
@@ -330,7 +330,7 @@ def test_an_estimate_is_sent_at_once_unless_the_page_does_not_read_and_never_ove
     async def run() -> None:
         socket, outbox = Socket(), Outbox()
         outbox.put(Say(""))
-        sending = asyncio.create_task(websocket._send(cast(WebSocket, socket), outbox))
+        sending = asyncio.create_task(websocket.send_waiting(cast(WebSocket, socket), outbox))
         await asyncio.sleep(0)  # the first message waits for the page now
         outbox.put(Shown(1, 0.0, 0.0, 1))
         socket.reads.set()

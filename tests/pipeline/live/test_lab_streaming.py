@@ -40,7 +40,7 @@ def test_how_lsl_hands_samples_over_makes_no_difference(cuts: list[int]) -> None
 
 def test_an_outlet_that_is_not_there_comes_and_goes_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded_lsl()
-    monkeypatch.setattr(lsl, "_LOOK_S", 0.1)
+    monkeypatch.setattr(lsl, "LOOK_S", 0.1)
     monkeypatch.setattr(lsl, "BACK_OFF_S", (0.02,))
     found: list[Any] = []
 

@@ -190,7 +190,7 @@ def replays(name: str, happenings: list[tuple[str, int, int, int, float]], setup
     study = setup.study.model_copy(update={"shown": {"kinect": "kinect", "fusion": name}})
     agreed = agreement(study, folder, path, "P01", "fusion")
     if agreed is not None:
-        assert agreed[0] <= 1e-9
+        assert agreed[0] <= 2e-9  # round-off is in proportion to the readings: 1e-9 mm for 1 g, and here 2 g are left
         assert agreed[1] == len(shown)
     instants = [one.stamp_ns for one in shown]
     assert instants == sorted(set(instants))

@@ -258,7 +258,7 @@ def test_what_stands_in_the_way_of_a_network_is_said_with_its_remedy(
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(PipelineError, match="certificates cannot be kept there"):
         secured(Serving(host=_LAN, lan=True), tmp_path / "file" / "authority", NOW)
-    monkeypatch.setattr(record, "_SOMEWHERE", "127.0.0.1")  # the way there is no network's
+    monkeypatch.setattr(record, "SOMEWHERE", "127.0.0.1")  # the way there is no network's
     assert "has no address in a network" in said(lan=True)
     assert given(made.certificate, made.key, NOW).fingerprint() == ""
 

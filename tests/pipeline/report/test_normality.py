@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.report.sections.normality import _PANELS_MAX, _which
+from pipeline.report.sections.normality import PANELS_MAX, which_are_drawn
 from tests.pipeline.analysis.test_options import TIMES, Values, read, study
 from tests.pipeline.helpers import Steadyhand
 
@@ -116,10 +116,10 @@ def test_of_many_samples_those_with_most_outside_are_drawn(steadyhand: Steadyhan
     entries = [f"measure: [{', '.join(values)}], test: t_paired"]
     page, rows = shown(steadyhand, study(tmp_path / "s", values, entries))
     assert len(kinds(rows)) == 15
-    assert f"Of 15 samples {_PANELS_MAX} are drawn, all that have values outside and the first of" in page
+    assert f"Of 15 samples {PANELS_MAX} are drawn, all that have values outside and the first of" in page
     assert "Skewed, A − B (" in page
 
 
-@pytest.mark.parametrize(("leaving", "which"), [(0, "the first ones"), (_PANELS_MAX, "those with the largest share")])
+@pytest.mark.parametrize(("leaving", "which"), [(0, "the first ones"), (PANELS_MAX, "those with the largest share")])
 def test_which_of_many_samples_are_drawn_is_said_as_it_is(leaving: int, which: str) -> None:
-    assert _which(leaving).startswith(which)
+    assert which_are_drawn(leaving).startswith(which)

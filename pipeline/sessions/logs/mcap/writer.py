@@ -30,7 +30,7 @@ int32 sec
 uint32 nanosec
 """
 _THREE = "=" * 80 + "\nMSG: {name}\nfloat64 x\nfloat64 y\nfloat64 z\n"
-_POINT_STAMPED = _HEADER.format(body="geometry_msgs/Point point") + _THREE.format(name="geometry_msgs/Point")
+POINT_STAMPED = _HEADER.format(body="geometry_msgs/Point point") + _THREE.format(name="geometry_msgs/Point")
 _POSE_STAMPED = (
     _HEADER.format(body="geometry_msgs/Pose pose")
     + "=" * 80
@@ -39,7 +39,7 @@ _POSE_STAMPED = (
     + _THREE.format(name="geometry_msgs/Quaternion")
     + "float64 w\n"
 )
-_IMU = (
+IMU = (
     _HEADER.format(
         body="geometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
         "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
@@ -92,8 +92,8 @@ class LogWriter:
         self._writer.start(profile="ros2", library="steadyhand")
         self._writer.add_metadata("session", dict(facts))
         self._schemas = {
-            "position": self._schema(SCHEMAS["position"], "ros2msg", _POINT_STAMPED),
-            "acceleration": self._schema(SCHEMAS["acceleration"], "ros2msg", _IMU),
+            "position": self._schema(SCHEMAS["position"], "ros2msg", POINT_STAMPED),
+            "acceleration": self._schema(SCHEMAS["acceleration"], "ros2msg", IMU),
             "events": self._schema("steadyhand.Event", "jsonschema", json.dumps(_EVENT_SCHEMA)),
         }
         self._channels: dict[str, int] = {}

@@ -18,7 +18,7 @@ from pipeline.errors import SessionError
 from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Log, Wanted
 from pipeline.sessions.logs.mcap import MAGIC
-from pipeline.sessions.logs.mcap.writer import _POINT_STAMPED
+from pipeline.sessions.logs.mcap.writer import POINT_STAMPED
 from tests.conftest import CLONE, session_messages, write_session
 
 WANTED = [
@@ -166,7 +166,7 @@ def test_bytes_of_another_type_under_the_right_schema_are_not_decoded_to_zeros(t
     with path.open("wb") as file, imu.open("rb") as source:
         writer = Writer(file)
         writer.start()
-        schema = writer.register_schema("geometry_msgs/msg/PointStamped", "ros2msg", _POINT_STAMPED.encode())
+        schema = writer.register_schema("geometry_msgs/msg/PointStamped", "ros2msg", POINT_STAMPED.encode())
         channel = writer.register_channel("/t", "cdr", schema)
         for _, _, message in make_reader(source).iter_messages(topics=["/phone/imu"]):
             writer.add_message(channel, message.log_time, message.data, message.publish_time)

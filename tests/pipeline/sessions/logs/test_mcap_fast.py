@@ -22,11 +22,11 @@ from pipeline.sessions.logs import read_log
 from pipeline.sessions.logs.log import Content, Readings, Wanted
 from pipeline.sessions.logs.mcap import ros2, templates, wire
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
-from pipeline.sessions.logs.mcap.writer import _IMU, _POINT_STAMPED
+from pipeline.sessions.logs.mcap.writer import IMU, POINT_STAMPED
 from tests.conftest import CLONE, write_session
 from tests.pipeline.sessions.logs.test_mcap import faulty
 
-TEXTS = {"position": _POINT_STAMPED, "acceleration": _IMU}
+TEXTS = {"position": POINT_STAMPED, "acceleration": IMU}
 CONTENTS: dict[str, Content] = {"geometry_msgs/msg/PointStamped": "position", "sensor_msgs/msg/Imu": "acceleration"}
 
 
@@ -226,14 +226,14 @@ def test_messages_are_not_walked_through_one_by_one(tmp_path: Path, monkeypatch:
 
 def test_a_definition_in_another_order_is_followed(tmp_path: Path) -> None:
     """Its messages are as long; only the log's own definition tells which figure is which."""
-    turned = _POINT_STAMPED.replace("float64 x\nfloat64 y\nfloat64 z", "float64 z\nfloat64 y\nfloat64 x")
+    turned = POINT_STAMPED.replace("float64 x\nfloat64 y\nfloat64 z", "float64 z\nfloat64 y\nfloat64 x")
     sent = [encoded("<", 5, 6, b"tracker", [1.0, 2.0, 3.0])] * 3
     readings = read_topic(write_log(tmp_path / "a.mcap", "position", sent, turned), "position")
     assert readings.values.tolist() == [[3.0, 2.0, 1.0]] * 3
 
 
 def test_a_stamp_without_a_sign_is_followed(tmp_path: Path) -> None:
-    unsigned = _POINT_STAMPED.replace("int32 sec", "uint32 sec")
+    unsigned = POINT_STAMPED.replace("int32 sec", "uint32 sec")
     sent = [encoded("<", -1, 0, b"tracker", [1.0, 2.0, 3.0])]
     readings = read_topic(write_log(tmp_path / "a.mcap", "position", sent, unsigned), "position")
     assert readings.stamp_ns.tolist() == [(2**32 - 1) * 10**9]
@@ -242,13 +242,13 @@ def test_a_stamp_without_a_sign_is_followed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("B[4000000000] b\n" + _POINT_STAMPED + "=====\nMSG: geometry_msgs/B\nuint8[1] c", "the bytes do not fit"),
-        ("B[] b\n" + _POINT_STAMPED + "=====\nMSG: geometry_msgs/B\nuint8[0] c", "the bytes do not fit"),
+        ("B[4000000000] b\n" + POINT_STAMPED + "=====\nMSG: geometry_msgs/B\nuint8[1] c", "the bytes do not fit"),
+        ("B[] b\n" + POINT_STAMPED + "=====\nMSG: geometry_msgs/B\nuint8[0] c", "the bytes do not fit"),
         ("A a\n===\nMSG: geometry_msgs/A\nA a", "messages within messages"),
         ("float64 x\n" * 100_000, "KiB long"),
         ("!!", "its schema cannot be read"),
         ("float64 X", "it holds geometry_msgs/msg/PointStamped, and a stream of kind position needs"),
-        ("wstring x\n" + _POINT_STAMPED, "its schema has a field of type wstring, which is not read"),
+        ("wstring x\n" + POINT_STAMPED, "its schema has a field of type wstring, which is not read"),
     ],
 )
 def test_a_definition_that_cannot_be_followed_costs_its_topic(tmp_path: Path, text: str, message: str) -> None:

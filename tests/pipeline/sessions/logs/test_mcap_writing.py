@@ -9,10 +9,10 @@ from mcap_ros2._dynamic import serialize_dynamic
 
 from pipeline.sessions.logs.mcap import Message
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
-from pipeline.sessions.logs.mcap.writer import _IMU, _POINT_STAMPED, encoded
+from pipeline.sessions.logs.mcap.writer import IMU, POINT_STAMPED, encoded
 
-POSITION = serialize_dynamic(SCHEMAS["position"], _POINT_STAMPED)[SCHEMAS["position"]]
-PHONE = serialize_dynamic(SCHEMAS["acceleration"], _IMU)[SCHEMAS["acceleration"]]
+POSITION = serialize_dynamic(SCHEMAS["position"], POINT_STAMPED)[SCHEMAS["position"]]
+PHONE = serialize_dynamic(SCHEMAS["acceleration"], IMU)[SCHEMAS["acceleration"]]
 STAMPS_NS = st.integers(0, (2**31 - 1) * 10**9)
 NUMBERS = st.floats(width=64)
 

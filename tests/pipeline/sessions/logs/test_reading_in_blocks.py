@@ -23,7 +23,7 @@ from pipeline.sessions.logs.mcap.decoding import Decoding
 from pipeline.sessions.logs.mcap.messages import Messages, joined
 from pipeline.sessions.logs.mcap.schemas import SCHEMAS
 from pipeline.sessions.logs.mcap.walk import Walk
-from pipeline.sessions.logs.mcap.writer import _IMU
+from pipeline.sessions.logs.mcap.writer import IMU
 
 COUNT = 200
 EXPECTED_BYTES_PER_MESSAGE = 8 * 13  # stamp, arrival, ten values, the orientation's length
@@ -53,7 +53,7 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Walk, Messages]:
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
-        in_cdr = writer.register_schema(SCHEMAS["acceleration"], "ros2msg", _IMU.encode())
+        in_cdr = writer.register_schema(SCHEMAS["acceleration"], "ros2msg", IMU.encode())
         in_json = writer.register_schema("Imu", "jsonschema", b"{}")
         cdr, other = writer.register_channel("/t", "cdr", in_cdr), writer.register_channel("/t", "json", in_json)
         for time in range(COUNT):
