@@ -27,7 +27,7 @@ def p_two_sided(symbol: Symbol, statistic: float, df: Sequence[float | FloatArra
     if symbol == "F":
         p = special.fdtrc(df[0], df[1], max(statistic, 0.0))
     elif symbol in ("chi2", "H"):
-        p = special.chdtrc(*df, max(statistic, 0.0))
+        p = special.chdtrc(df[0], max(statistic, 0.0))
     elif symbol == "z":
         p = 2 * special.ndtr(-abs(statistic))
     elif symbol == "r":
