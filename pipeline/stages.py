@@ -114,3 +114,6 @@ REPLAY = Stage(
     unit="sessions by variants",
 )
 """What `steadyhand replay` runs for each session and variant, by a study that holds the one estimator alone."""
+
+MODULES_OF_SESSIONS = tuple(stage.module for stage in (*STAGES, REPLAY) if stage.scope == "session")
+"""What a process imports that computes sessions."""

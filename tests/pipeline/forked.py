@@ -20,3 +20,6 @@ FORKED.set_forkserver_preload(
         "tests.pipeline.engine.test_cache",
     ]
 )
+if multiprocessing.parent_process() is None:
+    # A command names fewer. Which of them comes first decides for the whole run of the tests: it shall be these.
+    FORKED.set_forkserver_preload = lambda _modules: None  # type: ignore[assignment, method-assign]
