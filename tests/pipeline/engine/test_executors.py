@@ -238,10 +238,10 @@ def test_a_scheduler_that_does_not_answer_is_said() -> None:
     pytest.importorskip("distributed")
     from pipeline.engine.dask_cluster import on_dask
 
-    answers = on_dask("tcp://127.0.0.1:1", 1, print, connect_s=0.5)
+    answers = on_dask("tcp://127.0.0.1:1", 1, print, connect_s=0.1)
     with pytest.raises(PipelineError, match=r"dask://127.0.0.1:1: no Dask scheduler answers there"), answers:
         pass
-    answers = on_dask("tls://127.0.0.1:1", 1, print, connect_s=0.5)
+    answers = on_dask("tls://127.0.0.1:1", 1, print, connect_s=0.1)
     with pytest.raises(PipelineError, match=r"with the certificates of distributed.comm.tls"), answers:
         pass
 
