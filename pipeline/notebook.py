@@ -20,7 +20,7 @@ from pipeline.engine.resources import Resources
 from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date
 from pipeline.errors import PipelineError, did_you_mean
-from pipeline.stages import COMPARE
+from pipeline.stages import COMPARE, MODULES_OF_SESSIONS
 from pipeline.study.session import Session
 from pipeline.study.settings import Study
 from pipeline.tables import table as tables
@@ -106,7 +106,7 @@ def load(folder: Path, cache: Path | None = None, jobs: int = 1, executor: str =
             "a script that loads with several jobs is run by each; put it under: if __name__ == '__main__'"
         )
     threads.limit_to_one_thread()
-    with executor_of(jobs, executor) as opened, show_progress() as progress:
+    with executor_of(jobs, executor, modules=MODULES_OF_SESSIONS) as opened, show_progress() as progress:
         result = bring_up_to_date(folder, COMPARE, Resources(cache_in(cache), opened, progress))
     for line in (*damage_messages(result), *session_messages(result)):
         warnings.warn(line, stacklevel=3)

@@ -114,3 +114,9 @@ REPLAY = Stage(
     unit="sessions by variants",
 )
 """What `steadyhand replay` runs for each session and variant, by a study that holds the one estimator alone."""
+
+MODULES_OF_SESSIONS = (
+    *(stage.module for stage in (*STAGES, REPLAY) if stage.scope == "session"),
+    "scipy.signal",  # imported where there are movements: two thirds of a second
+)
+"""What a process imports that computes sessions."""

@@ -9,6 +9,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import shutil
+import sys
 import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -69,6 +70,8 @@ def pytest_collection_finish() -> None:
     gc.freeze()
     gc.set_threshold(100_000, 20, 20)
     gc.enable()
+    if "tests.pipeline.forked" in sys.modules:  # here, so that it holds in this process alone
+        sys.modules["tests.pipeline.forked"].keep_these()
 
 
 def pytest_sessionfinish() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import CLONE, STREAMS, session_messages, write_session
+from tests.conftest import CLONE, EMPTY_FIGURE, STREAMS, session_messages, write_session
 
 PAGE = (CLONE / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
@@ -170,7 +170,15 @@ sessions: data/{participant}_{condition}.mcap
 estimators: {mine: {type: halfway}}
 comparisons: [{measure: pause_s, test: count_signs}]
 """
-RUN = "import sys; from pipeline.__main__ import main; sys.argv[0] = 'steadyhand'; main()"
+RUN = f"""
+import sys
+sys.argv[0] = "steadyhand"
+if "report" in sys.argv:  # as the fixture `no_figures`, in another process
+    from pipeline.report import figures
+    figures.draw = lambda _figure, path, *_: path.write_text({EMPTY_FIGURE!r})
+from pipeline.__main__ import main
+main()
+"""
 
 
 @pytest.fixture(scope="module")

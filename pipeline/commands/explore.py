@@ -53,7 +53,10 @@ def explore(folder: Path, options: Options, out: Path | None, jobs: int | None, 
     setting = Setting(study, str(folder / "study.yaml"))
     grid = _grid(setting, options)
     try:
-        with executor_of(jobs, executor_name, console.warn) as executor, show_progress() as progress:
+        with (
+            executor_of(jobs, executor_name, console.warn, [exploration.__name__]) as executor,
+            show_progress() as progress,
+        ):
             begin = partial(progress.begin, "exploring", unit="small studies")
             rows = exploration.explore(setting, grid, executor, begin, progress.advance)
             progress.end()

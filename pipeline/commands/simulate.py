@@ -53,7 +53,7 @@ def _selection(folder: Path, study: Study, jobs: int | None, if_needed: bool) ->
         return
     from pipeline.simulation.study_files import simulate_study
 
-    with executor_of(jobs, PROCESS) as executor, show_progress() as progress:
+    with executor_of(jobs, PROCESS, modules=[simulate_study.__module__]) as executor, show_progress() as progress:
         files = simulate_study(folder, study, executor, partial(progress.begin, "simulating"), progress.advance)
         progress.end()
     console.say(f"{folder}: wrote {len(files)} logs, {Path(files[0]).name} to {Path(files[-1]).name}, and tables")

@@ -17,6 +17,7 @@ from pipeline.engine.result import Result
 from pipeline.engine.run import bring_up_to_date
 from pipeline.engine.stage import Stage
 from pipeline.errors import PipelineError
+from pipeline.stages import MODULES_OF_SESSIONS
 
 ANONYMISED = "-anonymised"
 """What the name of a folder ends with that holds nobody's id, so that it is never one that holds them."""
@@ -41,7 +42,7 @@ def for_each_study(
     code = 0
     bring = bring or partial(bring_up_to_date, anonymise=anonymise)
     keep_machine_code_in(cache_in(cache).root)
-    with executor_of(jobs, executor_name, console.warn) as executor:
+    with executor_of(jobs, executor_name, console.warn, MODULES_OF_SESSIONS) as executor:
         for folder in studies:
             try:
                 with show_progress() as progress:

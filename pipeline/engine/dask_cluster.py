@@ -6,7 +6,7 @@ import logging
 import re
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from pipeline.errors import RUN_AGAIN, PipelineError, WorkerLostError
 
 _STAGES = "pipeline.stages"  # the digest of this module's code follows the code of every stage
 _IGNORE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # only the command handles it
+_REPLACED_WITHIN_S = 10
 
 
 class OneThread(WorkerPlugin):
@@ -114,6 +115,12 @@ def _different_code(difference: str) -> PipelineError:
     )
 
 
+def _await_replacements(client: Client, count: int) -> None:
+    """Wait for a worker that replaces one that died: Dask cannot close a cluster that is just starting one."""
+    with suppress(OSError, TimeoutError):
+        client.wait_for_workers(count, timeout=_REPLACED_WITHIN_S)
+
+
 @contextmanager
 def on_dask(address: str | None, count: int, say: Callable[[str], None], connect_s: float = 10.0) -> Iterator[Executor]:
     """The executor for the scheduler at an address; without one, for a cluster of `count` processes of this machine.
@@ -154,6 +161,8 @@ def on_dask(address: str | None, count: int, say: Callable[[str], None], connect
                     f" scheduler{with_certificates}"
                 ) from None
         open_until_done.enter_context(client)
+        if address is None:
+            open_until_done.callback(_await_replacements, client, count)
         client.register_plugin(OneThread())
         say(f"Dask dashboard: {client.dashboard_link}")
         yield OnDask(client)

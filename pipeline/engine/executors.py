@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 
-from pipeline.engine.processes import InThisProcess, Processes
+from pipeline.engine.processes import InThisProcess, Processes, starting_with
 from pipeline.errors import PipelineError, did_you_mean
 
 PROCESS, INLINE, DASK = "process", "inline", "dask"
@@ -20,18 +20,20 @@ def _print(text: str) -> None:
 
 
 @contextmanager
-def executor_of(jobs: int | None, name: str = PROCESS, say: Callable[[str], None] = _print) -> Iterator[Executor]:
+def executor_of(
+    jobs: int | None, name: str = PROCESS, say: Callable[[str], None] = _print, modules: Sequence[str] = ()
+) -> Iterator[Executor]:
     """The executor of that name, with `jobs` processes (None: as many as there are processors).
 
-    No process starts before there is work for it; with one job, everything is computed in this process. `say` is called
-    with the address of a Dask cluster's dashboard. Raises PipelineError where no executor has that name, or where Dask
-    is not installed or does not answer.
+    No process starts before there is work for it; with one job, everything is computed in this process. Processes of
+    this machine have `modules` imported when they start. `say` is called with the address of a Dask cluster's
+    dashboard. Raises PipelineError where no executor has that name, or where Dask is not installed or does not answer.
     """
     count = jobs or os.cpu_count() or 1
     if name == INLINE or (name == PROCESS and count == 1):
         yield InThisProcess()
     elif name == PROCESS:
-        with Processes(count) as processes:
+        with Processes(count, starting_with(modules)) as processes:
             yield processes
     elif name == DASK or (name.startswith(_SCHEDULERS) and name not in _SCHEDULERS):
         _require_dask(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
@@ -16,6 +16,19 @@ from pipeline.errors import WorkerLostError
 
 # Spawned, not forked: a fork would copy the locks of this process's threads in whatever state they are.
 SPAWN = multiprocessing.get_context("spawn")
+
+
+def starting_with(modules: Sequence[str]) -> ForkServerContext | SpawnContext:
+    """How processes start that have `modules` imported: forked from one process that has, which does nothing else.
+
+    So however many there are, libraries are imported once, a second of work. That process has no threads but one of
+    Arrow's allocator, which halts it for a fork. Spawned where the system's own libraries bear no fork, as on macOS.
+    """
+    if sys.platform != "linux":
+        return SPAWN
+    forked = multiprocessing.get_context("forkserver")
+    forked.set_forkserver_preload(list(modules))
+    return forked
 
 
 class InThisProcess(Executor):

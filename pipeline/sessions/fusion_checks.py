@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from fusion_core import FusionAdaptive, Raw, Samples
 from fusion_core.accuracy import squared_distances
@@ -151,5 +150,7 @@ def _above_zero(difference: FloatArray, time: FloatArray) -> bool:
     means = np.bincount(block, difference)[there] / count[there]
     if len(means) < _BLOCKS_MIN:
         return False
+    from scipy.special import stdtrit  # a tenth of what a process imports that computes sessions
+
     half = float(stdtrit(len(means) - 1, 0.975) * np.std(means, ddof=1) / np.sqrt(len(means)))
     return float(np.mean(means)) - half > 0

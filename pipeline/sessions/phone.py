@@ -153,8 +153,6 @@ def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
 
 def _with_mounting(found: Phone, stream: AccelerationStream, sensor: Sensor, tracker: Tracker | None) -> Phone:
     """The phone with its mounting, as stated in study.yaml or as learned in the session's first `calibrate_s`."""
-    from scipy.spatial.transform import Rotation
-
     body = found.body
     if not len(body.time):
         return found
@@ -169,6 +167,8 @@ def _with_mounting(found: Phone, stream: AccelerationStream, sensor: Sensor, tra
         )
     if stream.mounting_xyzw == (0.0, 0.0, 0.0, 1.0) and stream.lever_arm_mm == (0.0, 0.0, 0.0):
         return found
+    from scipy.spatial.transform import Rotation
+
     turned = replace(body, rotation=body.rotation @ Rotation.from_quat(stream.mounting_xyzw).as_matrix())
     return replace(found, calibrated=turned, lever_arm_mm=np.array(stream.lever_arm_mm))
 

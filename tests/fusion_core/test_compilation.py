@@ -7,7 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numba
@@ -16,13 +17,34 @@ import pytest
 import fusion_core
 from tests.conftest import CLONE
 
-# The position filter's step is in one file and calls the process noise, in another. What it prints: the noise that a
-# second adds to the position, and how often the step was taken from kept machine code.
-RUN = """
-import numpy as np
-from fusion_core.kalman.position_steps import predict
-_, covariance = predict(np.zeros((3, 1)), np.zeros((3, 3)), 1.0, 1.0)
-print(covariance[0, 0], sum(predict.stats.cache_hits.values()))
+# A function in a file of its own calls the process noise, in another: the least there is to compile.
+SECOND = """
+from fusion_core.compilation import compiled
+from fusion_core.kalman.motion import add_wiener_noise
+
+@compiled
+def add_a_second(covariance):
+    add_wiener_noise(1.0, 1.0, covariance, 1, 0)
+"""
+# For each line a fork runs that prints the noise that a second adds to the position, and how often the function was
+# taken from kept machine code. Before it Numba has begun its work, half a second of it, and seen nothing of ours.
+RUNS = """
+import os, sys
+import numba, numpy as np
+
+numba.njit(lambda numbers: numbers[0])(np.zeros(1))
+for _ in sys.stdin:
+    assert not any(name.startswith("fusion_core") for name in sys.modules)
+    child = os.fork()
+    if not child:
+        from fusion_core.kalman.second import add_a_second
+
+        covariance = np.zeros((3, 3))
+        add_a_second(covariance)
+        print(covariance[0, 0], sum(add_a_second.stats.cache_hits.values()), flush=True)
+        os._exit(0)
+    if os.waitpid(child, 0)[1]:
+        sys.exit("the run failed")
 """
 NOISE = "squared * squared * dt / 20.0"
 
@@ -33,17 +55,30 @@ def package(tmp_path: Path) -> Path:
     source = Path(fusion_core.__file__).parent
     copy = tmp_path / "sources" / "fusion_core"
     shutil.copytree(source, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "kalman" / "second.py").write_text(SECOND)
     return copy
 
 
-def noise_and_hits(package: Path, **environment: str) -> tuple[float, int]:
-    """What another process prints that uses the package, which Python finds first where it is started."""
+@contextmanager
+def running(package: Path, **environment: str) -> Iterator[Callable[[], tuple[float, int]]]:
+    """Runs of the package in processes of their own, each of which gives the noise and the number of hits."""
     others = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     environment = {**others, "HOME": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
-    command = [sys.executable, "-c", RUN]
-    ran = subprocess.run(command, cwd=package.parent, env=environment, capture_output=True, text=True, check=True)
-    noise, hits = ran.stdout.split()
-    return float(noise), int(hits)
+    command = [sys.executable, "-c", RUNS]  # Python finds the package first, since it is started beside it
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=package.parent, env=environment, stdin=pipe, stdout=pipe, text=True) as process:
+        assert process.stdin is not None and process.stdout is not None
+        asked, answers = process.stdin, process.stdout
+
+        def noise_and_hits() -> tuple[float, int]:
+            asked.write("once more\n")
+            asked.flush()
+            noise, hits = answers.readline().split()
+            return float(noise), int(hits)
+
+        yield noise_and_hits
+        asked.close()
+    assert process.returncode == 0
 
 
 def edit(file: Path, old: str, new: str) -> None:
@@ -60,10 +95,11 @@ def edit(file: Path, old: str, new: str) -> None:
 def test_an_edit_of_a_nested_file_is_never_answered_by_code_compiled_before(package: Path, users_folder: bool) -> None:
     """And code of earlier sources is removed, unless the folder is the user's."""
     environment = {"NUMBA_CACHE_DIR": str(package.parent / "kept")} if users_folder else {}
-    assert noise_and_hits(package, **environment) == pytest.approx((1 / 20, 0))
-    assert noise_and_hits(package, **environment) == pytest.approx((1 / 20, 1))
-    edit(package / "kalman" / "motion.py", NOISE, NOISE.replace("20.0", "10.0"))
-    assert noise_and_hits(package, **environment) == pytest.approx((1 / 10, 0))
+    with running(package, **environment) as noise_and_hits:
+        assert noise_and_hits() == pytest.approx((1 / 20, 0))
+        assert noise_and_hits() == pytest.approx((1 / 20, 1))
+        edit(package / "kalman" / "motion.py", NOISE, NOISE.replace("20.0", "10.0"))
+        assert noise_and_hits() == pytest.approx((1 / 10, 0))
     assert len(list(package.parent.rglob("compiled-*"))) == (2 if users_folder else 1)
 
 
@@ -71,8 +107,9 @@ def test_a_package_that_cannot_be_written_to_compiles_in_memory(package: Path) -
     """And leaves nothing in the user's own cache, where it could go stale."""
     (package / "__pycache__").write_text("no folder can be made here, not even by root")
     before = sorted(package.parent.rglob("*"))
-    for _ in range(2):
-        assert noise_and_hits(package) == pytest.approx((1 / 20, 0))
+    with running(package) as noise_and_hits:
+        for _ in range(2):
+            assert noise_and_hits() == pytest.approx((1 / 20, 0))
     assert sorted(package.parent.rglob("*")) == before
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from pypdf import PdfReader
 
+from pipeline.engine import executors, processes
 from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.helpers import Steadyhand, run
 
@@ -65,6 +66,8 @@ def test_the_same_study_gives_the_same_archive_anywhere_and_it_names_no_place(
         monkeypatch.setenv(name, value)
     monkeypatch.setattr(platform, "node", lambda: "heart-of-gold")
     monkeypatch.setattr(socket, "gethostname", lambda: "heart-of-gold")
+    # One that was forked from a process of an earlier test would have that one's home, user and time zone.
+    monkeypatch.setattr(executors, "starting_with", lambda _modules: processes.SPAWN)
     time.tzset()
     monkeypatch.chdir(elsewhere / "study")
     before = os.umask(0o077)

@@ -6,10 +6,13 @@ import ast
 import re
 import shutil
 import subprocess
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
 
+from pipeline.engine import code_digest as code_digests
 from pipeline.engine.code_digest import Code, code_digest, imports
 from pipeline.stages import STAGES
 from tests.conftest import CLONE
@@ -32,6 +35,15 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(CLONE / name, root / name)
     return root
+
+
+@pytest.fixture(autouse=True, scope="module")
+def imports_found_once() -> Iterator[None]:
+    """What a text imports is the same each time; the packages are gone through anew for every edit of a file."""
+    once = cache(lambda source: tuple(imports(source)))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(code_digests, "imports", once)
+        yield
 
 
 def digests(root: Path) -> dict[str, str]:

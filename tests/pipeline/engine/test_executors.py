@@ -135,8 +135,11 @@ def test_tables_of_an_archive_are_joined_in_a_process_of_its_own(
             bring_up_to_date(many, (*COMPARE[:3], dying), resources)
 
 
-def test_an_archive_leaves_the_processes_of_the_run_before_others_start(study: Path, tmp_path: Path) -> None:
+def test_an_archive_leaves_the_processes_of_the_run_before_others_start(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """So that no more of them are there at once than the user allowed."""
+    monkeypatch.setattr(processes, "SPAWN", FORKED)
     noting = replace(COMPARE[3], function="tests.pipeline.dying:note_helper")
     with Processes(2, FORKED) as executor:
         of_run = executor.submit(os.getpid).result()
@@ -238,10 +241,10 @@ def test_a_scheduler_that_does_not_answer_is_said() -> None:
     pytest.importorskip("distributed")
     from pipeline.engine.dask_cluster import on_dask
 
-    answers = on_dask("tcp://127.0.0.1:1", 1, print, connect_s=0.5)
+    answers = on_dask("tcp://127.0.0.1:1", 1, print, connect_s=0.1)
     with pytest.raises(PipelineError, match=r"dask://127.0.0.1:1: no Dask scheduler answers there"), answers:
         pass
-    answers = on_dask("tls://127.0.0.1:1", 1, print, connect_s=0.5)
+    answers = on_dask("tls://127.0.0.1:1", 1, print, connect_s=0.1)
     with pytest.raises(PipelineError, match=r"with the certificates of distributed.comm.tls"), answers:
         pass
 
@@ -283,7 +286,7 @@ def test_a_process_ends_with_the_one_that_started_it() -> None:
     import multiprocessing
 
     here, there = multiprocessing.Pipe()
-    starter = multiprocessing.get_context("spawn").Process(target=_start_one, args=(there,))
+    starter = FORKED.Process(target=_start_one, args=(there,))
     starter.start()
     pid = here.recv()
     assert starter.pid is not None

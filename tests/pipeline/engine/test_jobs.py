@@ -34,9 +34,16 @@ def fail(folder: Path) -> None:
     raise ValueError(f"nothing goes into {folder.name}")
 
 
-def note_late(folder: Path, number: int, wait_s: float = 0.2) -> None:
+def note_late(folder: Path, number: int, wait_s: float = 0.05) -> None:
     time.sleep(wait_s)
     note(folder, number)
+
+
+def wait_for(file: Path) -> None:
+    end = time.monotonic() + 60
+    while not file.exists():
+        assert time.monotonic() < end
+        time.sleep(0.005)
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +81,10 @@ def test_the_executor_does_jobs_while_more_are_added(tmp_path: Path, executor: E
 
 def test_what_the_executor_has_not_begun_is_done_here(tmp_path: Path) -> None:
     with Processes(1) as executor, Jobs(executor) as jobs:
-        jobs.add(time.sleep, 1)
+        jobs.add(wait_for, tmp_path / "00")  # of those that follow, the last that is done here
         for number in range(20):
             jobs.add(note_process, tmp_path, number)
-    assert len(read(tmp_path)) == 20
-    assert read(tmp_path)[-1] == str(os.getpid())
+    assert read(tmp_path) == [str(os.getpid())] * 20
 
 
 def test_what_a_dying_process_leaves_is_done_here(tmp_path: Path, processes: Processes) -> None:
@@ -91,13 +97,13 @@ def test_what_a_dying_process_leaves_is_done_here(tmp_path: Path, processes: Pro
 def test_an_error_of_a_job_is_raised_once_no_other_is_at_work(tmp_path: Path, executor: Executor | None) -> None:
     """What they write into may be gone a moment later."""
     (tmp_path / "gone").mkdir()
-    wait_s = 0.2 if isinstance(executor, Processes) else 0.01  # in this process each job waits for the one before
+    longest_s = 0.3 if isinstance(executor, Processes) else 0.01  # in this process each job waits for the one before
     with pytest.raises(ValueError, match="nothing goes into"), Jobs(executor) as jobs:
         jobs.add(fail, tmp_path)
-        for number in range(20):
-            jobs.add(note_late, tmp_path / "gone", number, wait_s)
+        for number in range(20):  # the first is still at work when all others are done
+            jobs.add(note_late, tmp_path / "gone", number, 0.01 if number else longest_s)
     written = read(tmp_path / "gone")
-    time.sleep(2.5 * wait_s)
+    time.sleep(1.5 * longest_s)
     assert read(tmp_path / "gone") == written
 
 
@@ -105,10 +111,11 @@ def test_an_error_beside_the_jobs_ends_them(tmp_path: Path, processes: Processes
     with pytest.raises(KeyboardInterrupt), Jobs(processes) as jobs:
         for number in range(50):
             jobs.add(note_late, tmp_path, number)
+        wait_for(tmp_path / "00")  # both processes are at work
         raise KeyboardInterrupt
     written = read(tmp_path)
     assert len(written) < 50
-    time.sleep(0.5)
+    time.sleep(0.15)
     assert read(tmp_path) == written
 
 
@@ -118,10 +125,11 @@ def test_all_but_one_process_help_and_the_fewest_are_started(tmp_path: Path) -> 
         with executor.all_but_one() as helpers:
             assert helpers is not None
             assert [helpers.submit(os.getpid).result() for _ in range(5)] == [first] * 5
-            asleep = [helpers.submit(time.sleep, 0.3) for _ in range(3)]
-            while not all(future.running() for future in asleep[:2]):
+            waiting = [helpers.submit(wait_for, tmp_path / "go on") for _ in range(3)]
+            while not all(future.running() for future in waiting[:2]):
                 time.sleep(0.01)
-            assert not asleep[2].running()
+            assert not waiting[2].running()
+            (tmp_path / "go on").touch()
         assert executor.submit(os.getpid).result()
     with Processes(1) as executor, executor.all_but_one() as helpers:
         assert helpers is None
