@@ -1,6 +1,6 @@
 """Every command that README, docs and `make help` show runs: on copies of the bundled studies, in a folder of its own.
 
-A name in a page, such as path/to/study, stands for the bundled study that suits the command, with two of its logs. What
+A name in a page, such as path/to/study, stands for the bundled study that suits the command, or for a part of it. What
 takes minutes is marked as slow.
 """
 
@@ -72,6 +72,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(CLONE / "studies" / name, root / "studies" / name)
     most = shutil.ignore_patterns("R0[3-8]_reach.mcap")
     shutil.copytree(CLONE / "studies" / "reach", root / "two" / "reach", ignore=most)
+    shutil.copytree(CLONE / "studies" / "feng2016", root / "one_scale" / "feng2016")
+    fewer = (root / "one_scale" / "feng2016" / "study.yaml").read_text(encoding="utf-8")
+    fewer = fewer.replace("nasa_tlx/*", "nasa_tlx/effort").replace("printed: printed.yaml\n", "")
+    (root / "one_scale" / "feng2016" / "study.yaml").write_text(fewer, encoding="utf-8")
     (root / "studies" / "peephole").mkdir()
     settings = (CLONE / "studies" / "peephole" / "study.yaml").read_text(encoding="utf-8")
     (root / "studies" / "peephole" / "study.yaml").write_text(briefer(settings), encoding="utf-8")
@@ -95,7 +99,7 @@ def briefer(settings: str) -> str:
 def in_place_of_names(command: str, place: Path) -> list[str]:
     """The words of a command with the bundled studies in the place of a page's examples."""
     copies = {
-        "path/to/study": "two/reach" if command.split(maxsplit=1)[0] in _WITH_LOGS else "studies/feng2016",
+        "path/to/study": _suits(command),
         "path/to/another": "another/reach_again",
         "path/to/folder": "folder",
         "path/to/empty": "empty",
@@ -110,6 +114,13 @@ def in_place_of_names(command: str, place: Path) -> list[str]:
     if words[0] in _WITH_JOBS:  # what processes compute is for tests/pipeline/engine
         words += ["--jobs", "1"]
     return words
+
+
+def _suits(command: str) -> str:
+    """Two logs of the reach, or the paper's study; with one scale in the place of six where others compute it too."""
+    if command.split(maxsplit=1)[0] in _WITH_LOGS:
+        return "two/reach"
+    return "one_scale/feng2016" if "--against" in command else "studies/feng2016"
 
 
 def prepared(words: list[str], place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,9 @@ from pipeline.study.simulation import SelectionSimulation
 from pipeline.study.streams import AccelerationStream, PositionStream
 from pipeline.tables.columns import S_PER_NS
 
-_USUAL_S = 120.0  # most sessions are done by then; a longer one is run again from its begin with more room
+# Most sessions are done by then; a longer one is run again from its begin with more room.
+_USUAL_S = 120.0
+_USUAL_S_A_TARGET = 15.0
 _MOMENT_S = 1.0
 _TREMOR_HZ, _TREMOR_DAMPING = 8.0, 0.1
 _DRIFT_HZ, _DRIFT_DAMPING = 0.3, 0.7
@@ -185,11 +187,12 @@ class Outcome:
 def simulate(setting: Setting, participant: str, condition: str, *, compiled: bool = True) -> Outcome:
     """One session, independent of all other sessions. `compiled=False`: by the plain loop."""
     longest_s = setting.simulation.longest_s
-    length_s = min(_USUAL_S, longest_s)
-    outcome, done = _attempt(setting, prepare(setting, participant, condition, length_s), condition, compiled)
-    if not done and length_s < longest_s:
-        outcome, done = _attempt(setting, prepare(setting, participant, condition, longest_s), condition, compiled)
-    return outcome
+    length_s = min(_USUAL_S, _USUAL_S_A_TARGET * len(setting.layout.targets_mm), longest_s)
+    while True:
+        outcome, done = _attempt(setting, prepare(setting, participant, condition, length_s), condition, compiled)
+        if done or length_s >= longest_s:
+            return outcome
+        length_s = min(2 * length_s, longest_s)
 
 
 def compile_loop(setting: Setting) -> None:

@@ -212,8 +212,8 @@ MUTANTS = (
     Mutant("pooled_df = float(sizes.sum() - 2)", "pooled_df = float(sizes.sum() - 1)", _GROUPS),
     Mutant("float(np.sqrt(variances.mean())), error, df", "float(np.sqrt(variances.sum())), error, df", _GROUPS),
     Mutant(
-        "stats.studentized_range.ppf(0.95, len(groups), df)",
-        "stats.studentized_range.ppf(0.975, len(groups), df)",
+        "stats.studentized_range.ppf(0.95, groups, df)",
+        "stats.studentized_range.ppf(0.975, groups, df)",
         _GROUPS,
     ),
     Mutant('"levene": "mean", "brown_forsythe": "median"', '"levene": "median", "brown_forsythe": "mean"', _GROUPS),
