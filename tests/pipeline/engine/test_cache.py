@@ -25,6 +25,8 @@ from tests.conftest import STREAMS, session_messages, write_session
 from tests.pipeline.forked import FORKED
 from tests.pipeline.helpers import Ran, Steadyhand, run
 
+pytestmark = pytest.mark.forks
+
 SETTINGS = (
     "conditions: [a, b]\nsessions: data/{participant}_{condition}.mcap\nestimators: {raw: {type: raw}}\n" + STREAMS
 )

@@ -34,6 +34,8 @@ from tests.pipeline.dying import POISONED
 from tests.pipeline.forked import FORKED
 from tests.pipeline.helpers import run
 
+pytestmark = pytest.mark.forks
+
 Folder = Callable[..., Path]
 SETTINGS = (
     "conditions: [a, b]\nsessions: data/{participant}_{condition}.mcap\nestimators: {raw: {type: raw}}\n" + STREAMS

@@ -354,6 +354,7 @@ def test_values_are_read_as_study_yaml_reads_them() -> None:
     assert asked == {"a.b": {"window": [3, 0.5]}, "gp": {"jerk": ["1e5", 1e6], "path": ["event_time"]}}
 
 
+@pytest.mark.forks
 def test_processes_give_the_same_results_as_this_process(study: Path, steadyhand: Steadyhand) -> None:
     steadyhand("replay", study, "--set", "fusion.window=3")
     here = (steadyhand.out / "results.json").read_bytes()

@@ -140,6 +140,7 @@ def test_results_do_not_depend_on_what_else_is_explored_or_on_the_order_of_work(
     assert same.reset_index(drop=True).equals(alone)
 
 
+@pytest.mark.forks
 @pytest.mark.usefixtures("blank_figures", "blank_print")
 def test_processes_give_the_same_results_as_this_process(study: Path, command: Command, tmp_path: Path) -> None:
     assert command(study, *SMALL, "--latency", "0.1").code == 0
