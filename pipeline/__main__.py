@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 from collections.abc import Callable
@@ -16,6 +18,9 @@ from pipeline.commands.options import Anonymise, CacheFolder, ExecutorName, Jobs
 from pipeline.engine import threads
 
 _INTERRUPTED = 130
+
+# A process that ends looks through all of its memory for garbage: half a second of a run, for what ends with it anyway.
+atexit.register(gc.freeze)
 
 app = typer.Typer(
     name="steadyhand",
