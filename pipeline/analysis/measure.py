@@ -92,7 +92,7 @@ def run(work: Work) -> Outcome:
     order_rows, sequences = _orders(work, tabled)
     checked += table_checks.order_rows(order_rows, _starts(work))
     checked += copied_rows(work.sessions, work.entries["ingest"])
-    tables.write("checks", tables.frame("checks", checked), work.out)
+    tables.write("checks", tables.of_rows("checks", checked), work.out)
     _write_values(study, measures, orders.with_periods(values, order_rows, sequences), score_names, work.out)
     if study.exclusions:
         whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(all_values, [])
@@ -102,8 +102,8 @@ def run(work: Work) -> Outcome:
             whole, counted, orders.with_periods(unfiltered, order_rows, sequences), score_names, work.out / ALL_DATA
         )
     tables.write("orders", order_rows, work.out)
-    tables.write("reliability", tables.frame("reliability", agreement), work.out)
-    tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
+    tables.write("reliability", tables.of_rows("reliability", agreement), work.out)
+    tables.write("exclusions", tables.of_rows("exclusions", exclusions), work.out)
     return Outcome()
 
 
