@@ -400,13 +400,16 @@ def _plain(value: Any) -> Any:
 
 def participant_means(measures: pd.DataFrame, measure: str, conditions: Sequence[str]) -> pd.DataFrame:
     """One row per participant and one column per condition, in the given order: means over all else, or NaN."""
-    rows = measures[measures["measure"] == measure]
-    rows = rows[rows["value"].notna()]
+    counts = (measures["measure"] == measure) & measures["value"].notna()
     # By the numbers of cells: to group by two texts and to pivot takes half as long again.
-    people, names = pd.factorize(rows["participant"], sort=True)
-    places, met = pd.factorize(rows["condition"], sort=True)
-    means = rows["value"].groupby(people * len(met) + places).mean()
-    wide = np.full((len(names), len(met)), np.nan)
-    wide.flat[means.index] = means
-    frame = pd.DataFrame(wide, index=names.rename("participant"), columns=met.rename("condition"), copy=False)
-    return frame.reindex(columns=list(conditions))
+    people, names = pd.factorize(measures["participant"][counts], sort=True)
+    places, met = pd.factorize(measures["condition"][counts], sort=True)
+    means = measures["value"][counts].groupby(people * len(met) + places).mean()
+    by_met = np.full((len(names), len(met)), np.nan)
+    by_met.flat[means.index] = means
+    columns = pd.Index(list(conditions), name="condition")
+    wide = np.full((len(names), len(columns)), np.nan)
+    for place, of_met in enumerate(met.get_indexer(columns)):
+        if of_met >= 0:
+            wide[:, place] = by_met[:, of_met]
+    return pd.DataFrame(wide, index=names.rename("participant"), columns=columns, copy=False)
