@@ -55,27 +55,29 @@ def run(work: Work) -> Outcome:
         "measures": measures,
         "reliability": tables.read("reliability", measured),
         "descriptives": tables.frame("descriptives", descriptives(means, observations)),
-        "intervals_within": tables.frame("intervals_within", intervals_within(means, observations)),
-        "differences": tables.frame("differences", differences(means)),
+    }
+    written = {  # what nothing here looks at is never a frame, which takes most of the time for few rows
+        "intervals_within": tables.of_rows("intervals_within", intervals_within(means, observations)),
+        "differences": tables.of_rows("differences", differences(means)),
     }
     refuse_undefined(study, list(measures["measure"].unique()), tables.read("exclusions", measured))
     answers = answered(study, values)
     rows, left_out = compared(answers)
     frames["comparisons"] = tables.frame("comparisons", rows)
     rows, uncomparable = _comparisons_of_all_data(study, measured / ALL_DATA, values.people)
-    frames["comparisons_all_data"] = tables.frame("comparisons_all_data", rows)
+    written["comparisons_all_data"] = tables.of_rows("comparisons_all_data", rows)
     left_out += uncomparable
     requests = [answer.request for answer in answers]
-    frames["group_members"] = tables.frame("group_members", group_members(requests))
-    frames["normal_quantiles"] = tables.frame("normal_quantiles", normality_rows(requests))
-    frames["descriptives_by_group"] = tables.frame("descriptives_by_group", by_group(requests))
+    written["group_members"] = tables.of_rows("group_members", group_members(requests))
+    written["normal_quantiles"] = tables.of_rows("normal_quantiles", normality_rows(requests))
+    written["descriptives_by_group"] = tables.of_rows("descriptives_by_group", by_group(requests))
     design_rows = findings(study, requests, tables.read("orders", measured), frames["trials"], work.sessions)
-    frames["design_check"] = tables.frame("design_check", design_rows)
+    written["design_check"] = tables.of_rows("design_check", design_rows)
     movements = tables.read("movements", measured)
-    frames["learning"] = tables.frame("learning", learning_rows(movements, study.conditions))
+    written["learning"] = tables.of_rows("learning", learning_rows(movements, study.conditions))
     fitts = fitts_law(movements, study.conditions)
-    frames["fitts"] = tables.frame("fitts", fitts.lines)
-    frames["fitts_points"] = tables.frame("fitts_points", fitts.points)
+    written["fitts"] = tables.of_rows("fitts", fitts.lines)
+    written["fitts_points"] = tables.of_rows("fitts_points", fitts.points)
     gathered = {name: tables.read(name, work.entries[stage]) for name, stage in GATHERED.items()}
     gathered["checks"] = pd.concat([tables.read("checks", work.entries[name]) for name in TABLES["checks"].stages[:-1]])
     left_out += _without_accuracy(work, gathered["quality"], gathered["accuracy"])
@@ -90,7 +92,7 @@ def run(work: Work) -> Outcome:
     for name, table in gathered.items():
         frames[name] = _without_excluded(study, work, table)
     frames["accuracy_means"] = tables.frame("accuracy_means", accuracy_means(frames["accuracy"]))
-    frames["shown_at_selection"] = tables.frame("shown_at_selection", shown_at_selection(study, frames["trials"]))
+    written["shown_at_selection"] = tables.of_rows("shown_at_selection", shown_at_selection(study, frames["trials"]))
     if study.printed is not None:
         path = work.folder / study.printed
         frames["printed"] = compare_printed(
@@ -100,12 +102,13 @@ def run(work: Work) -> Outcome:
         file = TableFile(work.folder / study.repeats, "repeats", study.conditions)
         repeats = given_tables.read_repeats(file)
         rows = list(reductions(study.simulation, study.conditions, repeats))
-        frames["simulated_reductions"] = tables.frame("simulated_reductions", rows)
+        written["simulated_reductions"] = tables.of_rows("simulated_reductions", rows)
     facts = _participant_facts(work, measures, tables.read("exclusions", measured))
-    frames["preregistration"] = tables.frame("preregistration", _beside_plan(work, frames))
-    for name, table in frames.items():
-        tables.write(name, table, work.out)
-    results.write(work.out / "results.json", work.study_name, study, frames, facts)
+    written["preregistration"] = tables.of_rows("preregistration", _beside_plan(work, frames))
+    written |= {name: tables.as_arrow(name, table) for name, table in frames.items()}
+    for name, whole in written.items():
+        tables.write(name, whole, work.out)
+    results.write(work.out / "results.json", work.study_name, study, written, facts)
     return Outcome()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +92,7 @@ def run(work: Work) -> Outcome:
     order_rows, sequences = _orders(work, tabled)
     checked += table_checks.order_rows(order_rows, _starts(work))
     checked += copied_rows(work.sessions, work.entries["ingest"])
-    tables.write("checks", tables.frame("checks", checked), work.out)
+    tables.write("checks", tables.of_rows("checks", checked), work.out)
     _write_values(study, measures, orders.with_periods(values, order_rows, sequences), score_names, work.out)
     if study.exclusions:
         whole, unfiltered = study.model_copy(update={"exclusions": ()}), finite_values(all_values, [])
@@ -102,8 +102,8 @@ def run(work: Work) -> Outcome:
             whole, counted, orders.with_periods(unfiltered, order_rows, sequences), score_names, work.out / ALL_DATA
         )
     tables.write("orders", order_rows, work.out)
-    tables.write("reliability", tables.frame("reliability", agreement), work.out)
-    tables.write("exclusions", tables.frame("exclusions", exclusions), work.out)
+    tables.write("reliability", tables.of_rows("reliability", agreement), work.out)
+    tables.write("exclusions", tables.of_rows("exclusions", exclusions), work.out)
     return Outcome()
 
 
@@ -202,30 +202,35 @@ def _cells(values: pd.DataFrame, cell: list[str]) -> pd.DataFrame:
     empty = {key: values[key].iloc[:1] for key in keys if len(values) and values[key].isna().all()}  # costs a key each
     by = [key for key in keys if key not in empty]
     grouped: Any = values.groupby(by, dropna=False, sort=False)["value"]
-    found = pd.DataFrame({"mean": grouped.mean(), "size": grouped.size()}).reset_index()
-    found = found.assign(**{key: one.repeat(len(found)).to_numpy() for key, one in empty.items()})
-    return found[[*keys, "mean", "size"]].rename(columns={"mean": "value", "size": "n"})
+    found = grouped.mean().reset_index()
+    found = found.assign(
+        n=grouped.size().to_numpy(), **{key: one.repeat(len(found)).to_numpy() for key, one in empty.items()}
+    )
+    columns: pd.DataFrame = found[[*keys, "value", "n"]]
+    return columns
 
 
 def _with_totals(study: Study, cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:
     """Cells and the questionnaires' totals without those that study.yaml excludes, in the order of the table."""
-    rows = pd.concat([cells, _totals(cells, cell, scores)]).reset_index(drop=True)
+    rows, totals = cells, list(_totals(cells, cell, scores))
+    if totals:
+        columns = [*cell, "factors", "measure", "value", "n"]
+        rows = pd.concat([cells, pd.DataFrame(totals, columns=columns)]).reset_index(drop=True)
     for excluded in study.exclusions:
         if excluded.session is None:
             rows = rows[~matches(excluded, rows)]
     return rows.sort_values(["measure", *CELL, "factors"], kind="stable")
 
 
-def _totals(cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd.DataFrame:
+def _totals(cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> Iterator[tuple[Any, ...]]:
     """`nasa_tlx/total`: a participant's plain sum over the scales; none where a scale is missing.
 
-    Only instruments whose record says that a sum is reported have a total.
+    A row is its cell, factors, name, value and n. Only instruments whose record says that a sum is reported have one.
     """
     parts = [str(measure).partition("/") for measure in cells["measure"]]
     keys = [*cell, "factors"]
-    rows: list[tuple[Any, ...]] = []
     if not any(scale for _, _, scale in parts):
-        return pd.DataFrame(rows, columns=[*keys, "measure", "value", "n"])
+        return
     split = cells.assign(questionnaire=[part[0] for part in parts], scale=[part[2] for part in parts])
     ratings = split[(split["scale"] != "") & ~split["measure"].isin(list(scores))]
     for questionnaire, answered in ratings.groupby("questionnaire", sort=False):
@@ -234,8 +239,7 @@ def _totals(cells: pd.DataFrame, cell: list[str], scores: Collection[str]) -> pd
             continue
         for key, rated in answered.groupby(keys, dropna=False, sort=False):
             if set(rated["scale"]) == scales:
-                rows.append((*key, f"{questionnaire}/total", rated["value"].sum(), rated["n"].min()))
-    return pd.DataFrame(rows, columns=[*keys, "measure", "value", "n"])
+                yield *key, f"{questionnaire}/total", rated["value"].sum(), rated["n"].min()
 
 
 def _check_sources(values: pd.DataFrame) -> None:

@@ -52,9 +52,13 @@ def normality_rows(requests: Iterable[Request]) -> list[Row]:
 
 def _samples(request: Request) -> Iterator[Sample]:
     make = _SAMPLES.get(request.entry.test)
-    values = request.measures.loc[request.measures["measure"] == request.measure, "value"]
-    if make is not None and not (on_logarithms(request) and (values <= 0).any()):
+    if make is not None and not (on_logarithms(request) and _has_no_logarithm(request)):
         yield from make(request)
+
+
+def _has_no_logarithm(request: Request) -> bool:
+    values = request.measures.loc[request.measures["measure"] == request.measure, "value"]
+    return bool((values <= 0).any())
 
 
 def _rows(request: Request, sample: Sample) -> Iterator[Row]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError
 from pipeline.sessions import movements
 from pipeline.sessions.target_widths import widths_mm
-from pipeline.sessions.trials import coordinates, selections_by_trial, with_movements
+from pipeline.sessions.trials import selections_by_trial
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study import given_tables
 from pipeline.study.settings import Study
@@ -27,6 +27,11 @@ CELL = ["participant", "condition"]
 
 _FIGURES = ("duration_s", "amplitude_mm", "width_mm", "moved_mm", "along_mm")
 """Of a movement from one trial of a table to the next."""
+_OF_A_MOVEMENT = (
+    *("trial", "start_s", "selection_s", "target_width_mm"),
+    *(f"{what}_{axis}_mm" for what in ("target", "selected") for axis in "xyz"),
+)
+"""What a trial of a table says of it."""
 
 
 def given_table(work: Work, table: str) -> TableFile | None:
@@ -91,37 +96,50 @@ def all_movements(work: Work, table: pd.DataFrame | None) -> pd.DataFrame:
     by_start = np.argsort(table["start_s"].to_numpy(np.float64), kind="stable")
     cell = table.groupby([*CELL, "session"], sort=True).ngroup().to_numpy()[by_start]
     order = by_start[np.argsort(cell, kind="stable")]
-    # Cell by cell into whole columns: as frames, of which each cell has one, they would be held three times.
+    # Cell by cell into whole columns, from arrays: a frame of a few trials takes forty times as long.
+    given = {name: table[name].to_numpy(np.float64) for name in _OF_A_MOVEMENT}
     figures = {name: np.empty(len(table)) for name in _FIGURES}
     places = np.empty(len(table), np.int64)
     edges = [0, *np.cumsum(np.bincount(cell)).tolist()]
     for begin, end in pairwise(edges):
-        moved = _with_widths(work.study, with_movements(_as_left(table.iloc[order[begin:end]])))
-        places[begin:end] = moved["order"].to_numpy(np.int64)
-        for name, column in figures.items():
-            column[begin:end] = moved[name].to_numpy(np.float64)
+        own = {name: column[order[begin:end]] for name, column in given.items()}
+        places[begin:end] = _places(own)
+        for name, column in _moved(work.study, own).items():
+            figures[name][begin:end] = column
     who = table[[*CELL, "session", "trial"]].iloc[order]
     from_trials = who.assign(session=who["session"].replace("", None), order=places, **figures)
     factors = factors_of_rows(work.study, table).iloc[order]
     return tables.as_table("movements", from_trials).assign(factors=factors)
 
 
-def _as_left(trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials that end with their selection, which is the only one that a table has."""
-    left = {f"left_{axis}_mm": trials[f"selected_{axis}_mm"] for axis in "xyz"}
-    return trials.assign(left_s=trials["selection_s"], **left)
+def _moved(study: Study, trials: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The figures of the movements of one session of trials.csv.
+
+    A trial ends with its selection, which is the only one that a table has.
+    """
+    duration_s = trials["selection_s"] - trials["start_s"]
+    pause_s = trials["start_s"] - movements.previous(trials["selection_s"])
+    target, selected = (
+        np.column_stack([trials[f"{what}_{axis}_mm"] for axis in "xyz"]) for what in ("target", "selected")
+    )
+    stated, known = trials["target_width_mm"], widths_mm(study.task, target)
+    return {
+        "duration_s": np.where(duration_s >= 0, duration_s, np.nan),
+        "width_mm": np.where(np.isnan(stated), known, stated),
+        **vars(movements.aimed(target, selected, selected, pause_s)),
+    }
 
 
-def _with_widths(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials of one session of trials.csv with the place of each in the session and the width of its target.
+def _places(trials: Mapping[str, FloatArray]) -> np.ndarray:
+    """The place of each trial in its session.
 
     Trials whose starts do not tell their order, as where each has a clock of its own, go by their numbers.
     """
     starts = trials["start_s"]
-    told = starts.notna().all() and starts.is_unique
-    order = trials["start_s" if told else "trial"].rank(method="first").astype("Int64")
-    known = widths_mm(study.task, coordinates(trials, "target"))
-    return trials.assign(order=order, width_mm=trials["target_width_mm"].fillna(pd.Series(known, index=trials.index)))
+    told = not np.isnan(starts).any() and len(np.unique(starts)) == len(starts)
+    places = np.empty(len(starts), np.int64)
+    places[np.argsort(starts if told else trials["trial"], kind="stable")] = np.arange(1, len(starts) + 1)
+    return places
 
 
 def _values(rows: pd.DataFrame, measure: str, column: str, source: str) -> pd.DataFrame:

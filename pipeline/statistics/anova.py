@@ -9,7 +9,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics import NO_ERROR, OK
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
@@ -17,6 +16,7 @@ from pipeline.statistics.diagnostics import normality
 from pipeline.statistics.effect_size import partial_eta_squared_interval
 from pipeline.statistics.result import Result, degenerate, from_first, negligible, too_few
 from pipeline.statistics.sphericity import sphericity
+from pipeline.statistics.tails import f_above
 
 
 def rm_anova(values: FloatArray, factors: Sequence[str]) -> list[Result]:
@@ -123,7 +123,7 @@ def tested(blank: Result, stratum: Stratum, variation: float, values: FloatArray
         statistic=statistic,
         df1=df1,
         df2=df2,
-        p=float(stats.f.sf(statistic, df1, df2)),
+        p=f_above(statistic, df1, df2),
         effect_size=explained / (explained + variation),
         ci_low=low,
         ci_high=high,

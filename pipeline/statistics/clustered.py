@@ -31,6 +31,7 @@ from pipeline.statistics import (
 )
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.result import IntArray, Result, too_few
+from pipeline.statistics.tails import f_above, t_above, t_quantile
 from pipeline.statistics.with_statsmodels import Estimated
 
 Family = Literal["logit", "poisson"]
@@ -122,7 +123,7 @@ def _f_row(blank: Result, estimated: Estimated, df: float) -> Result:
     difference = contrasts @ estimated.estimates
     statistic = float(difference @ np.linalg.solve(covariance, difference)) * df2 / (q * df)
     details = {**blank.details, "no_effect_size": EACH_PAIR}
-    p = float(stats.f.sf(statistic, q, df2))
+    p = f_above(statistic, q, df2)
     return replace(blank, statistic=statistic, df1=float(q), df2=df2, p=p, details=details)
 
 
@@ -135,13 +136,13 @@ def _pair_rows(blank: Result, estimated: Estimated, df: float, pairs: Sequence[s
             yield replace(blank, contrast=pair, status=NO_ERROR)
             continue
         error = float(np.sqrt(variance))
-        margin = float(stats.t.ppf(0.975, df)) * error
+        margin = t_quantile(0.975, df) * error
         yield replace(
             blank,
             contrast=pair,
             statistic=log_ratio / error,
             df2=df,
-            p=float(2 * stats.t.sf(abs(log_ratio) / error, df)),
+            p=2 * t_above(abs(log_ratio) / error, df),
             effect_size=float(np.exp(log_ratio)),
             ci_low=float(np.exp(log_ratio - margin)),
             ci_high=float(np.exp(log_ratio + margin)),

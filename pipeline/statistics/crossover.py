@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NO_COMPLETE, NO_ERROR, ONE_ORDER, TOO_FEW_VALUES
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
@@ -19,6 +18,7 @@ from pipeline.statistics.result import (
     step_of,
     tied,
 )
+from pipeline.statistics.tails import t_above, t_quantile
 
 EFFECTS = ("treatment", "period", "carry-over")
 
@@ -73,7 +73,7 @@ def _tested(blank: Result, values: FloatArray, early: npt.NDArray[np.bool_], wei
         return replace(blank, status=NO_ERROR if np.any(values) else ALL_ZERO)
     error = abs(weights[0]) * float(np.sqrt(squares / df * (1 / len(groups[0]) + 1 / len(groups[1]))))
     estimate = sum(weight * float(group.mean()) for weight, group in zip(weights, groups, strict=True))
-    margin = float(stats.t.ppf(0.975, df)) * error
+    margin = t_quantile(0.975, df) * error
     effect_size, low, high = (
         float(np.ldexp(figure, exponent)) for figure in (estimate, estimate - margin, estimate + margin)
     )
@@ -81,7 +81,7 @@ def _tested(blank: Result, values: FloatArray, early: npt.NDArray[np.bool_], wei
         blank,
         statistic=estimate / error,
         df2=float(df),
-        p=float(2 * stats.t.sf(abs(estimate) / error, df)),
+        p=2 * t_above(abs(estimate) / error, df),
         effect_size=effect_size,
         ci_low=low,
         ci_high=high,

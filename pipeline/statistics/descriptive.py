@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics import NONE_OF_ALIKE, T_BEYOND, T_OF_SHARES, WILSON, T
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.tails import t_quantile
 from pipeline.statistics.with_statsmodels import wilson_interval
 
 
@@ -37,7 +37,7 @@ def mean_interval(values: FloatArray, method: str = T) -> tuple[float, float] | 
         return wilson_interval(int(values.sum()), n)
     if n < 2 or (method == T_OF_SHARES and np.ptp(values) == 0):
         return None
-    mean, margin = float(values.mean()), float(stats.t.ppf(0.975, n - 1)) * float(np.std(values, ddof=1)) / np.sqrt(n)
+    mean, margin = float(values.mean()), t_quantile(0.975, n - 1) * float(np.std(values, ddof=1)) / np.sqrt(n)
     low, high = mean - margin, mean + margin
     return (max(low, 0.0), min(high, 1.0)) if method == T_OF_SHARES else (low, high)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from math import isfinite
 
 import numpy as np
 from scipy import optimize, special, stats
@@ -114,7 +115,12 @@ def partial_eta_squared_interval(
 
 
 def _solve(function: Callable[[float], float], low: float, high: float) -> float | None:
-    ends = function(low), function(high)
-    if not np.all(np.isfinite(ends)) or ends[0] * ends[1] > 0:
+    ends = {low: function(low), high: function(high)}
+    if not all(map(isfinite, ends.values())) or ends[low] * ends[high] > 0:
         return None
-    return float(optimize.brentq(function, low, high, xtol=1e-10, rtol=1e-12))
+
+    def known(at: float) -> float:
+        """SciPy begins with the ends, of which each takes as long as a step."""
+        return ends[at] if at in ends else function(at)
+
+    return float(optimize.brentq(known, low, high, xtol=1e-10, rtol=1e-12))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from scipy import stats
-
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.effect_size import dz_interval
 from pipeline.statistics.paired import differences_of
 from pipeline.statistics.result import Result
+from pipeline.statistics.tails import t_above, t_quantile
 
 
 def tost(first: FloatArray, second: FloatArray, bounds: tuple[float, float], effect: str = "condition") -> Result:
@@ -23,9 +22,9 @@ def tost(first: FloatArray, second: FloatArray, bounds: tuple[float, float], eff
         return replace(blank, status=summary)
     df, mean, error = summary.n - 1, summary.mean, summary.error
     t_lower, t_upper = (mean - bounds[0]) / error, (mean - bounds[1]) / error
-    p_lower, p_upper = float(stats.t.sf(t_lower, df)), float(stats.t.cdf(t_upper, df))
+    p_lower, p_upper = t_above(t_lower, df), t_above(-t_upper, df)
     low, high = dz_interval(summary.dz, summary.n)
-    margin = float(stats.t.ppf(0.95, df)) * error
+    margin = t_quantile(0.95, df) * error
     return replace(
         blank,
         statistic=float(t_lower if p_lower >= p_upper else t_upper),

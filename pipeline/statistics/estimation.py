@@ -10,6 +10,7 @@ from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.result import rounded_differences
+from pipeline.statistics.tails import t_quantile
 
 RESAMPLES = 9_999
 PERMUTATIONS = 99_999
@@ -146,7 +147,7 @@ def within_intervals(
     (scaled,), exponent = at_unit_scale([values])
     normalized = scaled - scaled.mean(axis=1, keepdims=True)
     error = np.std(normalized, axis=0, ddof=1) * np.sqrt(k / (k - 1) / n)
-    margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * error
+    margin = t_quantile((1 + level) / 2, n - 1) * error
     means = scaled.mean(axis=0)
     low, high = np.ldexp(means - margin, exponent), np.ldexp(means + margin, exponent)
     if bounded:

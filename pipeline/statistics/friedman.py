@@ -28,6 +28,7 @@ from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray
 from pipeline.statistics.result import IntArray, Result, degenerate, room_of, step_of, tied, too_few
+from pipeline.statistics.tails import chi2_above, f_above, t_quantile
 
 MOST_SUMS = 1_500_000
 """Sums of ranks that an exact p may take: about a second of work."""
@@ -58,7 +59,7 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
     low, high = _agreement_interval(ranks)
     to_perfect = n * (k - 1) - statistic
     f = (n - 1) * statistic / to_perfect if to_perfect > 1e-9 else None
-    by_chi2 = float(stats.chi2.sf(statistic, k - 1))
+    by_chi2 = chi2_above(statistic, k - 1)
     exact = _sign_test_p(ranks) if k == 2 else exact_friedman_p(ranks)
     return replace(
         blank,
@@ -71,7 +72,7 @@ def friedman(values: FloatArray, effect: str = "condition") -> Result:
         details={
             "chi2_p": by_chi2,
             "iman_davenport_f": f,
-            "iman_davenport_p": None if f is None else float(stats.f.sf(f, k - 1, (k - 1) * (n - 1))),
+            "iman_davenport_p": None if f is None else f_above(f, k - 1, (k - 1) * (n - 1)),
             **({"no_interval": NO_SPREAD if n > 2 else TWO_PEOPLE} if low is None else {}),
         },
     )
@@ -138,7 +139,7 @@ def _agreement_interval(ranks: FloatArray, level: float = 0.95) -> tuple[float |
         return None, None
     without = ((n - 1) * _agreement(n - 1, sums - ranks, squares.sum() - squares) - 1) / (n - 2)
     influence = n * whole - (n - 1) * without
-    margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * float(np.std(influence, ddof=1)) / np.sqrt(n)
+    margin = t_quantile((1 + level) / 2, n - 1) * float(np.std(influence, ddof=1)) / np.sqrt(n)
     bounds = np.tanh(np.arctanh(whole) + np.array([-1, 1]) * margin / (1 - whole**2))
     low, high = np.clip((1 + (n - 1) * bounds) / n, 0.0, 1.0)
     return float(low), float(high)

@@ -20,6 +20,7 @@ from pipeline.statistics.result import Result
 
 EXACT_UP_TO = 200_000_000  # additions: about a second
 _PAIRS_UP_TO = 10_000_000  # of one value from each group: 80 MB
+_SQUARED_SCORE = stats.norm.ppf(0.975) ** 2
 _TOO_FEW, _TOO_MANY = "too few values for a 95 % interval", "too many pairs of values"
 
 
@@ -107,7 +108,7 @@ def _biserial_interval(theta: float, ranks: FloatArray, n: int, m: int) -> tuple
 
     def beyond(at: float) -> float:
         spread = 1 + (number / 2 - 1) * ((1 - at) / (2 - at) + at / (1 + at))
-        return float((theta - at) ** 2 - stats.norm.ppf(0.975) ** 2 * ties * at * (1 - at) * spread / (n * m))
+        return float((theta - at) ** 2 - _SQUARED_SCORE * ties * at * (1 - at) * spread / (n * m))
 
     near = 1e-12  # θ itself is a root where it is 0 or 1
     low = optimize.brentq(beyond, 0.0, min(theta, 1 - near), xtol=1e-14) if theta > 0 else 0.0

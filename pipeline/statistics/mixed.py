@@ -9,7 +9,6 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics import (
     ALIASED,
@@ -27,6 +26,7 @@ from pipeline.statistics.random_intercept import PARTICIPANT, Rows
 from pipeline.statistics.random_intercepts import Fitted, fitted, method_text
 from pipeline.statistics.result import IntArray, Result, negligible
 from pipeline.statistics.satterthwaite import Fit, degrees_of_freedom, f_test
+from pipeline.statistics.tails import f_above, t_above, t_quantile
 
 
 @dataclass(frozen=True)
@@ -231,12 +231,12 @@ def _t_row(fitted: Fit, hypothesis: FloatArray, blank: Result) -> Result:
     estimate = float(hypothesis @ fitted.coefficients)
     error = float(np.sqrt(hypothesis @ fitted.covariance @ hypothesis))
     df = degrees_of_freedom(fitted, hypothesis)
-    margin = float(stats.t.ppf(0.975, df)) * error
+    margin = t_quantile(0.975, df) * error
     return replace(
         blank,
         statistic=estimate / error,
         df2=df,
-        p=float(2 * stats.t.sf(abs(estimate) / error, df)),
+        p=2 * t_above(abs(estimate) / error, df),
         effect_size=estimate,
         ci_low=estimate - margin,
         ci_high=estimate + margin,
@@ -254,7 +254,7 @@ def _f_row(fitted: Fit, hypotheses: FloatArray, blank: Result) -> Result:
         statistic=statistic,
         df1=df1,
         df2=df2,
-        p=float(stats.f.sf(statistic, df1, df2)),
+        p=f_above(statistic, df1, df2),
         effect_size_name="partial eta squared",
         effect_size=statistic * df1 / (statistic * df1 + df2),
         ci_low=low,

@@ -16,7 +16,6 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, EQUAL_IN_GROUPS, NO_ERROR, NO_VARIATION, OK, TOO_FEW_VALUES
 from pipeline.statistics.anova import Stratum, contrasts, effect_name, effects_of, tested
@@ -28,6 +27,7 @@ from pipeline.statistics.paired import t_paired
 from pipeline.statistics.pairs import FollowUp, of_effect, of_groups
 from pipeline.statistics.pairs import follow_ups as within_pairs
 from pipeline.statistics.result import IntArray, Result, from_first, negligible, rounded_differences
+from pipeline.statistics.tails import t_above, t_quantile
 from pipeline.statistics.welch import spreads, t_welch
 
 _METHOD = "mixed ANOVA, type III, uncorrected; sphericity corrections in details"
@@ -131,7 +131,7 @@ def t_in_groups(first: FloatArray, second: FloatArray, codes: IntArray, effect: 
     mean = float(np.mean([differences[rows].mean() for rows in groups]))
     sd = float(np.sqrt(squares / df))
     error = sd * float(np.sqrt(np.sum([1 / len(rows) for rows in groups]))) / len(groups)
-    statistic, margin = mean / error, float(stats.t.ppf(0.975, df)) * error
+    statistic, margin = mean / error, t_quantile(0.975, df) * error
     low, high = standardized_interval(statistic, df, error / sd)
     correction = hedges_correction(df)
     difference, *interval = (float(np.ldexp(value, exponent)) for value in (mean, mean - margin, mean + margin))
@@ -139,7 +139,7 @@ def t_in_groups(first: FloatArray, second: FloatArray, codes: IntArray, effect: 
         blank,
         statistic=statistic,
         df2=float(df),
-        p=float(2 * stats.t.sf(abs(statistic), df)),
+        p=2 * t_above(abs(statistic), df),
         effect_size=mean / sd,
         ci_low=low,
         ci_high=high,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics import ALL_ZERO, NO_ERROR
 from pipeline.statistics.arrays import FloatArray, at_unit_scale
 from pipeline.statistics.effect_size import cohen_dz, dz_interval, hedges_correction
 from pipeline.statistics.result import Result, rounded_differences, too_few
+from pipeline.statistics.tails import t_above, t_quantile
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -
     if isinstance(summary, str):
         return replace(blank, status=summary)
     df = summary.n - 1
-    statistic, margin = summary.mean / summary.error, float(stats.t.ppf(0.975, df)) * summary.error
+    statistic, margin = summary.mean / summary.error, t_quantile(0.975, df) * summary.error
     low, high = dz_interval(summary.dz, summary.n)
     correction = hedges_correction(df)
     (scaled_first, scaled_second), exponent = at_unit_scale([first, second])
@@ -55,7 +55,7 @@ def t_paired(first: FloatArray, second: FloatArray, effect: str = "condition") -
         blank,
         statistic=float(statistic),
         df2=float(df),
-        p=float(2 * stats.t.sf(abs(statistic), df)),
+        p=2 * t_above(abs(statistic), df),
         effect_size=summary.dz,
         ci_low=low,
         ci_high=high,

@@ -20,6 +20,7 @@ from pipeline.statistics.satterthwaite import Fit
 PARTICIPANT = "participant"
 
 _RATIOS = np.concatenate([[0.0], np.logspace(-6, 25, 125)])  # of σ_b² to σ_e²: among them the search begins
+_AT_ONCE = 2**18  # numbers of designs at several ratios, to stay within a processor's cache
 _SINGULAR = 1e-8  # a ratio so small is zero, as in lme4
 
 
@@ -75,7 +76,9 @@ def fit(rows: Rows) -> Fit:
 
 def _variance_ratio(rows: Rows) -> float:
     """σ_b² / σ_e² of the highest restricted likelihood: where its slope crosses zero next to the best of a grid."""
-    lowest = int(np.argmin([_profile(rows, ratio) for ratio in _RATIOS]))
+    together = max(1, _AT_ONCE // rows.design.size)
+    parts = [_profiles(rows, _RATIOS[begin : begin + together]) for begin in range(0, len(_RATIOS), together)]
+    lowest = int(np.argmin(np.concatenate(parts)))
     if lowest == 0 and _Solved(rows, 0.0).slope >= 0:
         return 0.0
     low, high = np.sqrt(_RATIOS[max(lowest - 1, 0)]), np.sqrt(_RATIOS[min(lowest + 1, len(_RATIOS) - 1)])
@@ -91,22 +94,31 @@ def _variance_ratio(rows: Rows) -> float:
     return float(minimum.x**2)
 
 
-def _independent(rows: Rows, ratio: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _independent(rows: Rows, ratio: float | FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The values and the design less a part of their participant's mean: rows that are independent (Fuller and
-    Battese 1973); and 1 + ratio · rows a participant (G,)."""
+    Battese 1973); and 1 + ratio · rows a participant (G,). Of ratios (r, 1) as many of each: (r, N), (r, N, p), (r, G).
+    """
     stretch = 1 + ratio * rows.sizes
-    part = (1 - stretch**-0.5)[rows.participants]
+    part = (1 - stretch**-0.5)[..., rows.participants]
     mean_values, mean_design = rows.means
-    return rows.values - part * mean_values, rows.design - part[:, None] * mean_design, stretch
+    return rows.values - part * mean_values, rows.design - part[..., None] * mean_design, stretch
 
 
 def _profile(rows: Rows, ratio: float) -> float:
     """−2 log restricted likelihood of a ratio at its best σ_e²."""
-    values, design, stretch = _independent(rows, ratio)
+    return float(_profiles(rows, np.array([ratio]))[0])
+
+
+def _profiles(rows: Rows, ratios: FloatArray) -> FloatArray:
+    """−2 log restricted likelihood of each ratio (r,) at its best σ_e², of a few rows in a tenth of the time."""
+    values, design, stretch = _independent(rows, ratios[:, None])
     orthogonal, triangle = np.linalg.qr(design)
-    squares = np.sum((values - orthogonal @ (orthogonal.T @ values)) ** 2)
-    determinants = np.sum(np.log(stretch)) + 2 * np.sum(np.log(np.abs(np.diag(triangle))))
-    return float(rows.free * (1 + np.log(2 * np.pi * squares / rows.free)) + determinants)
+    column = values[..., None]
+    squares = np.sum((column - orthogonal @ (orthogonal.transpose(0, 2, 1) @ column)) ** 2, axis=(1, 2))
+    diagonal = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+    determinants = np.sum(np.log(stretch), axis=1) + 2 * np.sum(np.log(diagonal), axis=1)
+    profiles: FloatArray = rows.free * (1 + np.log(2 * np.pi * squares / rows.free)) + determinants
+    return profiles
 
 
 class _Solved:

@@ -18,9 +18,9 @@ and rated differences alike; without the third part 3 to 20 % of them contradict
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.tails import t_quantile
 
 
 def rank_biserial(differences: FloatArray, ranks: FloatArray) -> float:
@@ -38,7 +38,7 @@ def rank_biserial_interval(
     of_one_sign = 2 * ((1 - level) / 2) ** (1 / m) - 1
     low, high = -1.0, 1.0
     if abs(r) < 1:
-        margin = float(stats.t.ppf((1 + level) / 2, n - 1)) * _error(differences, ranks) / (1 - r**2)
+        margin = t_quantile((1 + level) / 2, n - 1) * _error(differences, ranks) / (1 - r**2)
         low, high = (float(np.tanh(np.arctanh(r) + sign * margin)) for sign in (-1, 1))
     low, high = (of_one_sign, 1.0) if r == 1 else (low, max(high, -of_one_sign))
     low, high = (-1.0, -of_one_sign) if r == -1 else (min(low, of_one_sign), high)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -79,10 +80,11 @@ def tied(values: FloatArray, room: FloatArray) -> FloatArray:
 
 def step_of(*arrays: FloatArray) -> float:
     """One in the last decimal that any of the values is written with: 0.001 for 1.5 and 2.375."""
-    values = np.unique(np.concatenate([array.ravel() for array in arrays]))
-    return float(10.0 ** min((_exponent(value) for value in values.tolist()), default=0))
+    values = {value for array in arrays for value in array.ravel().tolist()}
+    return float(10.0 ** min(map(_exponent, values), default=0))
 
 
+@lru_cache(maxsize=4096)  # the values of a study are looked at once for each test and pair
 def _exponent(value: float) -> int:
     exponent = Decimal(repr(value)).normalize().as_tuple().exponent
     return exponent if isinstance(exponent, int) else 0
@@ -98,7 +100,8 @@ def rounded_differences(first: FloatArray, second: FloatArray) -> FloatArray:
 
 def from_first(values: FloatArray) -> FloatArray:
     """Values (n, k) less each row's first, zero and tied as `rounded_differences` has it: what within-tests rest on."""
-    return np.column_stack([rounded_differences(column, values[:, 0]) for column in values.T])
+    first, *others = values.T
+    return np.column_stack([np.zeros(len(values)), *(rounded_differences(column, first) for column in others)])
 
 
 def negligible(sum_of_squares: float, values: FloatArray) -> bool:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
 
 from pipeline.statistics.arrays import FloatArray
+from pipeline.statistics.tails import chi2_above, f_above
 
 NAMES = ("p_gg", "p_hf", "epsilon_gg", "epsilon_hf", "mauchly_w", "mauchly_p")
 
@@ -33,8 +33,8 @@ def sphericity(
         w = float(np.linalg.det(relative * d))
         p = _mauchly_p(w, d, error_df, cells)
     return {
-        "p_gg": float(stats.f.sf(statistic, gg * df1, gg * df2)),
-        "p_hf": None if hf is None else float(stats.f.sf(statistic, hf * df1, hf * df2)),
+        "p_gg": f_above(statistic, gg * df1, gg * df2),
+        "p_hf": None if hf is None else f_above(statistic, hf * df1, hf * df2),
         "epsilon_gg": gg,
         "epsilon_hf": hf,
         "mauchly_w": w,
@@ -53,5 +53,5 @@ def _mauchly_p(w: float, d: int, df: int, cells: int) -> float | None:
     rho = 1 - (2 * d**2 + d + 2) / (6 * d * df)
     second = (d + 2) * (d - 1) * (d - 2) * (2 * d**3 + 6 * d**2 + 3 * cells + 2) / (288 * (df * d * rho) ** 2)
     statistic, freedom = -df * rho * np.log(w), d * (d + 1) / 2 - 1
-    first = stats.chi2.sf(statistic, freedom)
-    return float(first + second * (stats.chi2.sf(statistic, freedom + 4) - first))
+    first = chi2_above(statistic, freedom)
+    return float(first + second * (chi2_above(statistic, freedom + 4) - first))

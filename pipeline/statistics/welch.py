@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
+from math import sqrt
 from typing import Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from pipeline.statistics.diagnostics import normality
 from pipeline.statistics.effect_size import hedges_correction, partial_eta_squared_interval, standardized_interval
 from pipeline.statistics.groups import untestable, unweightable
 from pipeline.statistics.result import Result
+from pipeline.statistics.tails import t_above, t_quantile
 
 Interval = tuple[float | None, float | None]
 
@@ -42,7 +44,7 @@ def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Res
     shares = variances / sizes
     error = float(np.sqrt(shares.sum()))
     df = float(shares.sum() ** 2 / np.sum(shares**2 / (sizes - 1)))
-    statistic, margin = difference / error, float(stats.t.ppf(0.975, df)) * error
+    statistic, margin = difference / error, t_quantile(0.975, df) * error
     pooled_df = float(sizes.sum() - 2)
     pooled = float(np.sqrt(np.sum((sizes - 1) * variances) / pooled_df))
     d_s, d_s_ci = _standardized(difference, pooled, pooled * float(np.sqrt(np.sum(1 / sizes))), pooled_df)
@@ -52,7 +54,7 @@ def t_welch(first: FloatArray, second: FloatArray, effect: str = "group") -> Res
         blank,
         statistic=statistic,
         df2=df,
-        p=float(2 * stats.t.sf(abs(statistic), df)),
+        p=2 * t_above(abs(statistic), df),
         effect_size=d_av,
         ci_low=d_av_ci[0],
         ci_high=d_av_ci[1],
@@ -121,7 +123,9 @@ def games_howell(groups: Sequence[FloatArray], names: Sequence[str], effect: str
 
 @lru_cache(maxsize=1024)  # a tenth of a second each; comparisons without the exclusions ask for most of them again
 def _range_of_95(groups: int, df: float) -> float:
-    """What the studentized range of so many groups stays below in 95 of 100 studies."""
+    """What the studentized range of so many groups stays below in 95 of 100 studies. That of two is √2 |t|."""
+    if groups == 2:
+        return sqrt(2) * t_quantile(0.975, df)
     return float(stats.studentized_range.ppf(0.95, groups, df))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 
 from pipeline.errors import PipelineError
 from pipeline.study.settings import Study
@@ -20,7 +21,7 @@ from pipeline.tables.differences import OF_A_REPLAY, OF_A_STUDY
 SCHEMA_VERSION = 1
 
 
-def write(path: Path, name: str, study: Study, frames: Mapping[str, pd.DataFrame], people: Mapping[str, Any]) -> None:
+def write(path: Path, name: str, study: Study, frames: Mapping[str, pa.Table], people: Mapping[str, Any]) -> None:
     """Write a study's file; `details` of a comparison become an object, and what does not apply is null."""
     head = {
         "name": name,

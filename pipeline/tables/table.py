@@ -6,6 +6,7 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,7 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
     if len(data) == 0:
         data = TABLES[name].schema.empty_table()
     elif isinstance(data, pd.DataFrame):
-        data = _as_arrow(name, as_table(name, data))
+        data = as_arrow(name, data)
     with pa.OSFile(str(folder / f"{name}.parquet"), "wb") as file:
         if len(data):
             pq.write_table(data.replace_schema_metadata(None), file, **_as_file(name, len(data) <= _SMALL))
@@ -154,9 +155,13 @@ def write(name: str, data: pd.DataFrame | pa.Table, folder: Path) -> None:
             file.write(_empty_file(name))
 
 
-def _as_arrow(name: str, data: pd.DataFrame) -> pa.Table:
-    """Column by column: `Table.from_pandas` also makes metadata for pandas, which is not kept."""
+def as_arrow(name: str, data: pd.DataFrame) -> pa.Table:
+    """A frame as an Arrow table with exactly the table's columns, in its order and types."""
     schema = TABLES[name].schema
+    if len(data) == 0:
+        return schema.empty_table()
+    data = as_table(name, data)
+    # Column by column: `Table.from_pandas` also makes metadata for pandas, which is not kept.
     columns = [pa.array(data[column.name], column.type, from_pandas=True) for column in schema]
     return pa.Table.from_arrays(columns, schema=schema)
 
@@ -381,31 +386,30 @@ class _Numbers(Mapping[str, "np.ndarray[Any, Any]"]):
         return len(self._table.column_names)
 
 
-def records(name: str, data: pd.DataFrame) -> Iterator[dict[str, Any]]:
+def records(name: str, data: pd.DataFrame | pa.Table) -> Iterator[dict[str, Any]]:
     """Rows as plain objects for JSON, None for what does not apply; `details` and `factors` stay text."""
-    if len(data) == 0:
-        return
-    for row in as_table(name, data).itertuples(index=False, name=None):
-        yield {key: _plain(value) for key, value in zip(TABLES[name].names, row, strict=True)}
+    table = data if isinstance(data, pa.Table) else as_arrow(name, data)
+    for part in table.to_batches(max_chunksize=_LINES_AT_ONCE):
+        for row in part.to_pylist():
+            yield {key: _plain(value) for key, value in row.items()}
 
 
 def _plain(value: Any) -> Any:
-    if value is None or value is pd.NA or (isinstance(value, float) and not np.isfinite(value)):
-        return None
-    if isinstance(value, np.integer):
-        return int(value)
-    return float(value) if isinstance(value, float) else value
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def participant_means(measures: pd.DataFrame, measure: str, conditions: Sequence[str]) -> pd.DataFrame:
     """One row per participant and one column per condition, in the given order: means over all else, or NaN."""
-    rows = measures[measures["measure"] == measure]
-    rows = rows[rows["value"].notna()]
+    counts = (measures["measure"] == measure) & measures["value"].notna()
     # By the numbers of cells: to group by two texts and to pivot takes half as long again.
-    people, names = pd.factorize(rows["participant"], sort=True)
-    places, met = pd.factorize(rows["condition"], sort=True)
-    means = rows["value"].groupby(people * len(met) + places).mean()
-    wide = np.full((len(names), len(met)), np.nan)
-    wide.flat[means.index] = means
-    frame = pd.DataFrame(wide, index=names.rename("participant"), columns=met.rename("condition"), copy=False)
-    return frame.reindex(columns=list(conditions))
+    people, names = pd.factorize(measures["participant"][counts], sort=True)
+    places, met = pd.factorize(measures["condition"][counts], sort=True)
+    means = measures["value"][counts].groupby(people * len(met) + places).mean()
+    by_met = np.full((len(names), len(met)), np.nan)
+    by_met.flat[means.index] = means
+    columns = pd.Index(list(conditions), name="condition")
+    wide = np.full((len(names), len(columns)), np.nan)
+    for place, of_met in enumerate(met.get_indexer(columns)):
+        if of_met >= 0:
+            wide[:, place] = by_met[:, of_met]
+    return pd.DataFrame(wide, index=names.rename("participant"), columns=columns, copy=False)

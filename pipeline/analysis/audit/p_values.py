@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -41,12 +42,22 @@ def p_two_sided(symbol: Symbol, statistic: float, df: Sequence[float | FloatArra
 
 def p_bounds(symbol: Symbol, statistic: Interval, df: Sequence[Interval]) -> Bounds:
     """The smallest and the largest p for a statistic and degrees of freedom within intervals."""
+    return _p_bounds(symbol, statistic, tuple(df))
+
+
+@lru_cache(maxsize=1024)  # of one printed test several checks ask
+def _p_bounds(symbol: Symbol, statistic: Interval, df: tuple[Interval, ...]) -> Bounds:
     grid = np.meshgrid(*(_points(part) for part in df), indexing="ij")
     return _bounds(symbol, statistic, grid)
 
 
 def p_bounds_corrected(statistic: Interval, df: Sequence[Interval], epsilon: Interval) -> Bounds:
     """The same for F with both degrees of freedom times one ε, as corrections for sphericity have it."""
+    return _p_bounds_corrected(statistic, tuple(df), epsilon)
+
+
+@lru_cache(maxsize=1024)
+def _p_bounds_corrected(statistic: Interval, df: tuple[Interval, ...], epsilon: Interval) -> Bounds:
     first, second, factor = np.meshgrid(*(_points(part) for part in (*df, epsilon)), indexing="ij")
     return _bounds("F", statistic, [first * factor, second * factor])
 
