@@ -53,6 +53,7 @@ def test_a_photograph_is_shown_small_upright_and_without_its_place(tmp_path: Pat
     assert any(len(page.images) for page in pages)
 
 
+@pytest.mark.usefixtures("blank_print")
 def test_a_drawing_stays_one(tmp_path: Path, steadyhand: Steadyhand) -> None:
     entry = "file: pictures/sketch.png, alt: A sketch, caption: Look."
     assert steadyhand("report", study(tmp_path / "study", entry)).code == 0
@@ -60,6 +61,7 @@ def test_a_drawing_stays_one(tmp_path: Path, steadyhand: Steadyhand) -> None:
         assert image.size == (40, 30)
 
 
+@pytest.mark.usefixtures("blank_print")
 def test_another_picture_is_another_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
     folder = study(tmp_path / "study")
     assert steadyhand("report", folder, "--format", "html").code == 0
