@@ -223,7 +223,7 @@ def headed(axes: Axes, title: str, **look: Any) -> None:
 
     It has none where it is `grouped`, and where it has names, or numbers near 0. matplotlib would move the title out of
     a factor's way; told where the title is, it need not look, which it does three times a panel with every label
-    measured: a twelfth of what drawing costs.
+    measured: a fifteenth of what drawing costs.
     """
     axes.set_title(title, y=1.0, **look)
 
