@@ -17,6 +17,7 @@ from pipeline.report.figures.style import (
     colour,
     draw_mean,
     finite,
+    headed,
     legend,
     marker,
     mean_and_interval,
@@ -77,10 +78,10 @@ def errors(accuracy: pd.DataFrame, contradicted: str = "") -> Figure:
     axes[0].invert_yaxis()
     along_rmse(axes[0], accuracy["rmse_mm"], standard)
     what = "Distance" if SMOOTHED in standard else "Error"
-    axes[0].set_title(f"{what} (n = {counted(accuracy['session'].nunique(), 'session')})")
+    headed(axes[0], f"{what} (n = {counted(accuracy['session'].nunique(), 'session')})")
     axes[1].axvline(0, color=GREY, linewidth=0.8)
     axes[1].set_xlabel(lag_label(standard))
-    axes[1].set_title("Lag")
+    headed(axes[1], "Lag")
     for panel in axes:
         panel.grid(axis="y", color=PALE, linewidth=0.8)
         panel.set_axisbelow(True)

@@ -19,6 +19,7 @@ from pipeline.report.figures.style import (
     as_label,
     finite,
     grouped,
+    headed,
     legend,
     panels,
     styled,
@@ -165,7 +166,7 @@ def _estimate(axes: Axes, excerpts: pd.DataFrame, estimator: str, shade: str) ->
         axes.plot(*reference, color=BLACK, linewidth=1, linestyle=(0, (4, 1.5)), label="reference")
     if frames is not None:
         axes.scatter(*frames, s=4, color=GREY, label="tracker, as it arrives", zorder=3)
-    axes.set_title(as_label(estimator))
+    headed(axes, as_label(estimator))
     axes.set_ylabel(f"{_axis(excerpts)} (mm)")
     grouped(axes)
 
@@ -178,7 +179,7 @@ def _error(axes: Axes, excerpts: pd.DataFrame, estimator: str, shade: str) -> No
     axes.plot(time, error, color=shade)
     known = finite(error)
     rmse = float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
-    axes.set_title(f"error: RMS {rmse:.1f} mm in this stretch" if len(known) else "error: unknown")
+    headed(axes, f"error: RMS {rmse:.1f} mm in this stretch" if len(known) else "error: unknown")
     axes.set_ylabel("error (mm)")
     grouped(axes)
 

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
-from pipeline.report.figures.style import as_label, colour, grouped, legend, marker, panels, styled
+from pipeline.report.figures.style import as_label, colour, grouped, headed, legend, marker, panels, styled
 from pipeline.report.figures.wording import listed
 from pipeline.words.numbers import MINUS, fraction, number
 
@@ -56,7 +56,7 @@ def fitts(points: pd.DataFrame, lines: pd.DataFrame, conditions: Sequence[str]) 
             for row in _line_of(lines, condition, basis):
                 ends = np.array([where[0].min(), where[0].max()])
                 axes.plot(ends, row.intercept_s + row.slope_s_bit * ends, color=colour(place), linewidth=1.6, zorder=1)
-        axes.set_title(_TITLES[basis])
+        headed(axes, _TITLES[basis])
         axes.set_xlabel("Index of difficulty (bits)")
         grouped(axes)
     every[0].set_ylabel("Movement time (s)")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.rainclouds import Drawn, from_zero, method_of, rainclouds
-from pipeline.report.figures.style import as_label, finite, multiples, styled
+from pipeline.report.figures.style import as_label, finite, headed, multiples, styled
 from pipeline.report.figures.wording import listed, mean_with_interval, spaced
 from pipeline.words.names import measure_label, short_label, unit_of
 from pipeline.words.phrases import counted
@@ -71,7 +71,7 @@ def groups(tables: Mapping[str, pd.DataFrame], factor: str, looks: Sequence[int]
         rainclouds(axes, wide, drawn, small=not alone, joined=wide)
         length = max(8, _LETTERS // (across * len(wide.columns)))
         axes.set_xticks(range(len(wide.columns)), [_in_lines(name, length) for name in wide.columns])
-        axes.set_title(f"{as_label(short_label(measure), 40)} by {as_label(factor, 20)}")
+        headed(axes, f"{as_label(short_label(measure), 40)} by {as_label(factor, 20)}")
         if index % across == 0:
             axes.set_ylabel(as_label(measure_label(measure)) if alone else "Rating")
     from_zero(every[0], tables.values())

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.drawing import Words, drawing
 from pipeline.report.figures.named_marks import name_marks, people
-from pipeline.report.figures.style import COLOURS, GREY, MARKS_MAX, PALE, as_label, lowest, multiples, styled
+from pipeline.report.figures.style import COLOURS, GREY, MARKS_MAX, PALE, as_label, headed, lowest, multiples, styled
 from pipeline.report.figures.wording import listed
 from pipeline.study.statistical_tests import TESTS
 from pipeline.words.names import measure_label
@@ -110,7 +110,7 @@ def normality(table: pd.DataFrame) -> Figure:
             names = [f"{person}, {cell}" if isinstance(cell, str) else str(person) for person, cell in whose]
             name_marks(marks, people(names, some["value"]))
         title = f"{as_label(panel.measure, _LINE)}\n{as_label(panel.title, _LINE)}"
-        chart.set_title(title, fontsize=8)
+        headed(chart, title, fontsize=8)
         if place % across == 0:
             chart.set_ylabel("Standardised")
     for chart in lowest(axes, across):

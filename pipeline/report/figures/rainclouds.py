@@ -22,6 +22,7 @@ from pipeline.report.figures.style import (
     draw_mean,
     finite,
     grouped,
+    headed,
     marker,
     multiples,
     panels,
@@ -134,12 +135,12 @@ def paired(wide: pd.DataFrame, measure: str, shares: bool = False) -> Figure:
     rainclouds(axes[0], wide, Drawn(method_of(wide, measure, shares), unit_of(measure)))
     from_zero(axes[0], [wide])
     axes[0].set_ylabel(as_label(measure_label(measure)))
-    axes[0].set_title(f"Participants (n = {len(wide) if one_condition_each(wide) else f'{len(complete)} complete'})")
+    headed(axes[0], f"Participants (n = {len(wide) if one_condition_each(wide) else f'{len(complete)} complete'})")
     if compared:
         unit = unit_of(measure)
         _differences(axes[1], complete, unit)
         axes[1].set_ylabel(as_label(f"Difference ({unit})") if unit else "Difference")
-        axes[1].set_title(f"Differences (n = {len(complete)})")
+        headed(axes[1], f"Differences (n = {len(complete)})")
     return figure
 
 
@@ -181,7 +182,7 @@ def scales(wide: Mapping[str, pd.DataFrame]) -> Figure:
     figure, every, across = multiples(len(wide), 1.9, a_row=3, sharex=False)
     for index, (axes, (measure, table)) in enumerate(zip(every, wide.items(), strict=True)):
         rainclouds(axes, table, Drawn(method_of(table, measure)), small=True)
-        axes.set_title(f"{as_label(short_label(measure), 24)} (n = {len(table.dropna())})")
+        headed(axes, f"{as_label(short_label(measure), 24)} (n = {len(table.dropna())})")
         if index % across == 0:
             axes.set_ylabel("Rating")
     limits = {score_limits(name) for name in wide}

@@ -22,6 +22,7 @@ from pipeline.report.figures.style import (
     as_label,
     colour,
     finite,
+    headed,
     marker,
     multiples,
     styled,
@@ -79,7 +80,7 @@ def selection_errors(
         rows = selections[selections["condition"] == condition]
         offsets = scale * offsets_mm(rows, plane)
         reach = max(reach, _scatter(axes, offsets, (colour(index), marker(index))))
-        axes.set_title(f"{as_label(condition, 80 // across)} (n = {number(len(offsets), 0)})", fontsize=9)
+        headed(axes, f"{as_label(condition, 80 // across)} (n = {number(len(offsets), 0)})", fontsize=9)
         axes.axhline(0, color=GREY, linewidth=0.6, zorder=0)
         axes.axvline(0, color=GREY, linewidth=0.6, zorder=0)
         square(axes, plane, unit)

@@ -218,6 +218,16 @@ def grouped(axes: Axes) -> None:
     )
 
 
+def headed(axes: Axes, title: str, **look: Any) -> None:
+    """A title above a panel whose upright axis has no factor such as 1e6 above it.
+
+    It has none where it is `grouped`, and where it has names, or numbers near 0. matplotlib would move the title out of
+    a factor's way; told where the title is, it need not look, which it does three times a panel with every label
+    measured: a fifteenth of what drawing costs.
+    """
+    axes.set_title(title, y=1.0, **look)
+
+
 def as_pixels(axes: Axes, marks: int) -> float:
     """The zorder for a panel with so many marks; if there are too many, they become one bitmap."""
     if marks <= MARKS_MAX:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.sessions.checks.band import rising
 from pipeline.sessions.checks.finding import Finding, Status, graded, of
 from pipeline.sessions.checks.motion import Compared, Interval
 from pipeline.sessions.checks.recorded import Imu, Positions, Recorded
@@ -225,11 +226,10 @@ def speed(recorded: Recorded) -> Iterator[Finding]:
 
 def _fastest_tenth(positions: Positions) -> float:
     """The speed in mm/s that a tenth of the steps of 0.2 s exceed; NaN where the stream is shorter than 1 s."""
-    time_s, first = np.unique(positions.times.stamp_s, return_index=True)
+    time_s, value = rising(positions.times.stamp_s, positions.value_mm)
     if len(time_s) < 5 or time_s[-1] - time_s[0] < 1.0:
         return float("nan")
     later = np.searchsorted(time_s, time_s + _OVER_S)
     there = later < len(time_s)
-    value = positions.value_mm[first]
     moved = np.linalg.norm(value[later[there]] - value[there.nonzero()[0]], axis=1)
     return float(np.percentile(moved / (time_s[later[there]] - time_s[there]), 90))

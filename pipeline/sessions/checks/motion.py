@@ -240,12 +240,12 @@ class _Blocks:
         cross, own, power, explained, lag = cross[:-2], own[:-2], power[:-2], explained[:-2], lag[:-2]
         at = int(np.argmin(np.abs(self.shifts_s - lag[0])))
         heading = np.eye(3) if heading_known else _about_vertical(cross[0, at])
-        cross, own = cross @ heading, heading.T @ own @ heading
+        cross, own = cross[:, at] @ heading, heading.T @ own @ heading
         chance = np.sqrt(np.mean(np.einsum("kii->ki", self.dealt @ heading) ** 2, axis=0))
         turn, mirror, size = _procrustes(
-            cross[:, at], own, chance * np.sqrt(np.clip(1 - by_axis[0, at] / power[0], _LEFT_MIN, 1.0))
+            cross, own, chance * np.sqrt(np.clip(1 - by_axis[0, at] / power[0], _LEFT_MIN, 1.0))
         )
-        samples, flat = count * _BLOCK, _flat(cross[0, at], heading_known)
+        samples, flat = count * _BLOCK, _flat(cross[0], heading_known)
         return Compared(
             float(explained[0].max()),
             float(np.sqrt(self.power.sum() / samples)),
@@ -256,7 +256,7 @@ class _Blocks:
             float(np.percentile(power.sum(axis=1) / np.maximum(size * np.trace(own, axis1=1, axis2=2), 1e-300), 97.5)),
             _interval(turn if heading_known else np.full_like(turn, np.nan)),
             float(np.mean(mirror[1:])) if mirror[0] and not flat else 0.0,
-            _axes(cross[0, at]) if heading_known else "",
+            _axes(cross[0]) if heading_known else "",
             float(late - early),
             flat,
         )

@@ -16,14 +16,22 @@ def turned(orientation_xyzw: FloatArray, vectors: FloatArray) -> FloatArray:
         part = slice(begin, begin + _AT_ONCE)
         quaternions, own = orientation_xyzw if len(orientation_xyzw) == 1 else orientation_xyzw[part], vectors[part]
         axis, scalar = quaternions[:, :3], quaternions[:, 3:]
-        twice = 2 * np.cross(axis, own)
-        found[part] = own + scalar * twice + np.cross(axis, twice)
+        twice = 2 * _cross(axis, own)
+        found[part] = own + scalar * twice + _cross(axis, twice)
+    return found
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The cross products (n, 3) of vectors: what `np.cross` gives, which copies both before."""
+    found = np.empty((max(len(first), len(second)), 3))
+    for axis, (one, other) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.subtract(first[:, one] * second[:, other], first[:, other] * second[:, one], out=found[:, axis])
     return found
 
 
 def rotation_vector(before: FloatArray, after: FloatArray) -> FloatArray:
     """The turn (n, 3) in rad, in the body's frame, between quaternions (n, 4) of about unit length."""
-    vector = before[:, 3:] * after[:, :3] - after[:, 3:] * before[:, :3] - np.cross(before[:, :3], after[:, :3])
+    vector = before[:, 3:] * after[:, :3] - after[:, 3:] * before[:, :3] - _cross(before[:, :3], after[:, :3])
     scalar = np.sum(before * after, axis=1)
     vector, scalar = vector * np.where(scalar < 0, -1.0, 1.0)[:, None], np.abs(scalar)
     length = np.linalg.norm(vector, axis=1)

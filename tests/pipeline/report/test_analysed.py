@@ -9,7 +9,7 @@ import pytest
 from tests.pipeline.analysis.test_options import TIMES, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 TESTS = ["measure: time_s, test: t_paired"]
 

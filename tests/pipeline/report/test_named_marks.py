@@ -92,6 +92,7 @@ def test_groups_with_long_names_are_told_apart_below_small_panels() -> None:
     assert labels == ["short\ncourse\nkinect", "short\ncourse\nfusion", "short talk\nkinect", "short talk\nfusion"]
 
 
+@pytest.mark.usefixtures("blank_print")
 def test_groups_that_are_compared_have_a_figure_of_their_own(steadyhand: Steadyhand, tmp_path: Path) -> None:
     people = "participant,training\n" + "".join(f"P{at:02},{'long' if at % 2 else 'none'}\n" for at in range(1, 11))
     entries = ["measure: time_s, test: mixed_anova", "measure: errors, test: mann_whitney"]

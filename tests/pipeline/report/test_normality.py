@@ -106,6 +106,7 @@ def test_a_measure_without_a_plot_is_named(steadyhand: Steadyhand, tmp_path: Pat
     assert "Without a panel, for fewer than three values or none that vary: Strain." in page
 
 
+@pytest.mark.usefixtures("no_figures")  # one of each of 15 measures beside them
 def test_of_many_samples_those_with_most_outside_are_drawn(steadyhand: Steadyhand, tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     values: dict[str, Mapping[str, list[float]]] = {

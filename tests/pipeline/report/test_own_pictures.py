@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +16,23 @@ pytestmark = pytest.mark.usefixtures("blank_figures")
 PLACE = "51.5 North"
 
 
+@cache
+def photograph() -> Image.Image:
+    """A picture of noise that is larger than a report shows one."""
+    pixels = np.random.default_rng(1).integers(0, 255, (90, 120, 3), dtype=np.uint8)
+    return Image.fromarray(pixels).resize((2000, 1500))
+
+
 def study(folder: Path, entry: str = "file: pictures/setup.jpg, alt: A hand, caption: Look at the hand.") -> Path:
     (folder / "pictures").mkdir(parents=True)
     rows = "".join(f"P{p},{c},m,{p + 0.5 * p * (c == 'b')}\n" for p in range(1, 7) for c in "ab")
     (folder / "measures.csv").write_text(f"participant,condition,measure,value\n{rows}", encoding="utf-8")
     text = f"conditions: [a, b]\nmeasures: measures.csv\npictures:\n  - {{{entry}}}\n"
     (folder / "study.yaml").write_text(text, encoding="utf-8")
-    pixels = np.random.default_rng(1).integers(0, 255, (90, 120, 3), dtype=np.uint8)
-    photograph = Image.fromarray(pixels).resize((3600, 2700))
     exif = Image.Exif()
     exif[0x010E], exif[0x0112] = PLACE, 6  # a description, and that the camera was held on its side
-    photograph.save(folder / "pictures" / "setup.jpg", exif=exif)
-    photograph.resize((40, 30)).save(folder / "pictures" / "sketch.png")
+    photograph().save(folder / "pictures" / "setup.jpg", exif=exif)
+    photograph().resize((40, 30)).save(folder / "pictures" / "sketch.png")
     (folder / "pictures" / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\n and no more")
     return folder
 
@@ -47,6 +53,7 @@ def test_a_photograph_is_shown_small_upright_and_without_its_place(tmp_path: Pat
     assert any(len(page.images) for page in pages)
 
 
+@pytest.mark.usefixtures("blank_print")
 def test_a_drawing_stays_one(tmp_path: Path, steadyhand: Steadyhand) -> None:
     entry = "file: pictures/sketch.png, alt: A sketch, caption: Look."
     assert steadyhand("report", study(tmp_path / "study", entry)).code == 0
@@ -54,6 +61,7 @@ def test_a_drawing_stays_one(tmp_path: Path, steadyhand: Steadyhand) -> None:
         assert image.size == (40, 30)
 
 
+@pytest.mark.usefixtures("blank_print")
 def test_another_picture_is_another_report(tmp_path: Path, steadyhand: Steadyhand) -> None:
     folder = study(tmp_path / "study")
     assert steadyhand("report", folder, "--format", "html").code == 0

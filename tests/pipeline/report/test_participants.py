@@ -26,7 +26,7 @@ def many(folder: Folder, people: int) -> Path:
     return root
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 @pytest.mark.parametrize(("people", "pages"), [(40, 0), (41, 41)])
 def test_more_than_forty_participants_have_a_page_each(
     people: int, pages: int, folder: Folder, steadyhand: Steadyhand

@@ -42,7 +42,7 @@ def without_orientation_or_turning(log: Log) -> Log:
 def test_fusion_that_is_worse_than_its_tracker_is_named_and_nothing_is_best(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
-    log, _ = session(Hand(seconds=30.0))
+    log, _ = session(Hand(seconds=20.0))
     ran = steadyhand("report", study_with(folder, log, ("[0, 0, -9806.65]", "[0, 0, 9806.65]")))
     assert ran.code == 0
     (row,) = (row for row in steadyhand.results()["checks"] if row["check"] == "fusion against tracker: fusion")
@@ -60,7 +60,7 @@ def test_fusion_that_is_worse_than_its_tracker_is_named_and_nothing_is_best(
 def test_a_replay_says_beside_its_ranking_that_the_data_contradict_themselves(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
-    log, _ = session(Hand(seconds=30.0))
+    log, _ = session(Hand(seconds=20.0))
     ran = steadyhand("replay", study_with(folder, log, ("[0, 0, -9806.65]", "[0, 0, 9806.65]")))
     assert ran.code == 0, ran.err
     caution = "1 of 1 session with a red check (P01_a): do not rely on the order of the variants"
@@ -73,7 +73,7 @@ def test_an_estimator_with_settings_that_do_not_suit_is_no_contradiction(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
     """Where another does better than the tracker with the same readings, these are as study.yaml states them."""
-    log, _ = session(Hand(seconds=30.0))
+    log, _ = session(Hand(seconds=20.0))
     unsuited = f"{ESTIMATORS[:-1]}, still: {{type: window_gp, window: 60, inverse_scale_s2: 0.05}}}}"
     ran = steadyhand("report", study_with(folder, log, (ESTIMATORS, unsuited)))
     assert ran.code == 0, ran.err
@@ -88,7 +88,7 @@ def test_an_estimator_with_settings_that_do_not_suit_is_no_contradiction(
 
 
 def test_without_a_contradiction_the_best_is_named(folder: Folder, steadyhand: Steadyhand) -> None:
-    log, _ = session(Hand(seconds=30.0))
+    log, _ = session(Hand(seconds=20.0))
     ran = steadyhand("report", study_with(folder, log))
     rows = {row["check"]: row["status"] for row in steadyhand.results()["checks"]}
     assert rows["fusion against tracker: fusion"] == "green"
@@ -102,7 +102,7 @@ def test_without_a_contradiction_the_best_is_named(folder: Folder, steadyhand: S
 
 
 def test_an_estimator_that_used_no_acceleration_is_shown_as_such(folder: Folder, steadyhand: Steadyhand) -> None:
-    log = without_orientation_or_turning(session(Hand(seconds=30.0, span_mm=(0.0, 0.0, 0.0), turn_rad=0.0))[0])
+    log = without_orientation_or_turning(session(Hand(seconds=20.0, span_mm=(0.0, 0.0, 0.0), turn_rad=0.0))[0])
     assert steadyhand("report", study_with(folder, log)).code == 0
     (row,) = (row for row in steadyhand.results()["checks"] if row["check"] == "accelerations used: imu")
     assert row["status"] == "red", row

@@ -155,7 +155,7 @@ def played(folder: Folder, steadyhand: Steadyhand, settings: str) -> dict[str, d
     return {session["condition"]: session["scene"] for session in json.loads(data)}
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_a_session_is_played_on_its_task_beside_an_estimator_that_it_did_not_show(
     folder: Folder, steadyhand: Steadyhand
 ) -> None:
@@ -188,7 +188,7 @@ def test_a_selection_that_names_no_target_has_that_of_its_trial(tmp_path: Path) 
     )
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_a_session_of_one_axis_is_not_played(folder: Folder, steadyhand: Steadyhand) -> None:
     one_axis = TASK.replace("conditions", "axes: [x]\nconditions", 1)
     one_axis = "".join(line for line in one_axis.splitlines(keepends=True) if not line.startswith("task"))
@@ -214,7 +214,7 @@ def test_positions_are_those_of_the_whole_recording(folder: Folder, tmp_path: Pa
         np.testing.assert_allclose(quick[name].arrival + late_s, samples.arrival, atol=2e-9)
 
 
-@pytest.mark.usefixtures("blank_figures", "blank_print")
+@pytest.mark.usefixtures("no_figures", "blank_print")
 def test_a_study_of_tables_alone_has_no_page_of_traces(folder: Folder, steadyhand: Steadyhand) -> None:
     rows = "participant,condition,measure,value\n" + "".join(f"P{p},{c},m,{p}\n" for p in range(3) for c in "ab")
     assert steadyhand("report", folder("conditions: [a, b]\nmeasures: m.csv\n", **{"m.csv": rows})).code == 0

@@ -9,7 +9,7 @@ import pytest
 from tests.pipeline.analysis.test_options import TIMES, Values, read, study
 from tests.pipeline.helpers import Steadyhand
 
-pytestmark = pytest.mark.usefixtures("blank_figures", "blank_print")
+pytestmark = pytest.mark.usefixtures("no_figures", "blank_print")
 
 
 def test_two_models_of_one_measure_are_told_apart(tmp_path: Path, steadyhand: Steadyhand) -> None:
