@@ -20,10 +20,10 @@ def t_quantile(probability: float, df: float) -> float:
 
 
 def f_above(f: float, df1: float, df2: float) -> float:
-    """P(F > f) of an f that is not negative."""
-    return float(special.fdtrc(df1, df2, f))
+    """P(F > f); round-off may leave an f below 0."""
+    return float(special.fdtrc(df1, df2, max(f, 0.0)))
 
 
 def chi2_above(chi2: float, df: float) -> float:
-    """P(χ² > chi2) of at least one degree of freedom."""
-    return float(special.chdtrc(df, chi2))
+    """P(χ² > chi2); round-off may leave it below 0, as in Mauchly's test of values that are spherical."""
+    return float(special.chdtrc(df, max(chi2, 0.0)))

@@ -55,8 +55,8 @@ MUTANTS = (
     Mutant("float(np.prod(levels) * np.sum(", "float(np.sum(", _TESTS),
     Mutant('squared": explained / (explained + error)', 'squared": explained / (explained + df2 * error)', _TESTS),
     Mutant("-df * rho * np.log(w), d * (d + 1) / 2 - 1", "-df * rho * np.log(w), d * (d + 1) / 2", _TESTS),
-    Mutant("first + second * (stats.chi2.sf(statistic, freedom + 4) - first)", "first", _TESTS),
-    Mutant("stats.f.sf(statistic, gg * df1, gg * df2)", "stats.f.sf(statistic, gg * df1, df2)", _TESTS),
+    Mutant("first + second * (chi2_above(statistic, freedom + 4) - first)", "first", _TESTS),
+    Mutant("f_above(statistic, gg * df1, gg * df2)", "f_above(statistic, gg * df1, df2)", _TESTS),
     # Aligned ranks.
     Mutant("values - values.mean(axis=0) + _effect(", "values + _effect(", _TESTS),
     Mutant("(-1) ** (len(effect) - size)", "(-1) ** size", _TESTS),
@@ -73,7 +73,7 @@ MUTANTS = (
     Mutant("elif n < 3:", "elif n < 2:", _FEW),
     Mutant("elif early.all() or not early.any():", "elif early.all():", _FEW),
     # Descriptives and diagnostics.
-    Mutant("stats.t.ppf(0.975, n - 1)) * float(np.std(", "stats.t.ppf(0.975, n)) * float(np.std(", _TESTS),
+    Mutant("t_quantile(0.975, n - 1) * float(np.std(", "t_quantile(0.975, n) * float(np.std(", _TESTS),
     Mutant('row["sd"] = float(np.std(values, ddof=1))', 'row["sd"] = float(np.std(values))', _TESTS),
     Mutant("_FAR_OUT = 3.5", "_FAR_OUT = 3.0", _DIAGNOSTICS),
     Mutant("_NORMAL_QUARTILE = 0.6745", "_NORMAL_QUARTILE = 1.0", _DIAGNOSTICS),
@@ -103,14 +103,16 @@ MUTANTS = (
         "(mean - bounds[1]) / error, (mean - bounds[0]) / error",
         _MODELS,
     ),
-    Mutant("float(stats.t.ppf(0.95, df)) * error", "float(stats.t.ppf(0.975, df)) * error", _MODELS),
+    Mutant("t_quantile(0.95, df) * error", "t_quantile(0.975, df) * error", _MODELS),
     # Mixed models.
     Mutant(
-        "np.sum(np.log(stretch)) + 2 * np.sum(np.log(np.abs(np.diag(triangle))))", "np.sum(np.log(stretch))", _MODELS
+        "np.sum(np.log(stretch), axis=1) + 2 * np.sum(np.log(diagonal), axis=1)",
+        "np.sum(np.log(stretch), axis=1)",
+        _MODELS,
     ),
     Mutant(
-        "df2=df2,\n        p=float(stats.f.sf(statistic, df1, df2)),\n        effect_size_name=",
-        "df2=df2,\n        p=float(stats.f.sf(statistic, df1, df2 + 1)),\n        effect_size_name=",
+        "df2=df2,\n        p=f_above(statistic, df1, df2),\n        effect_size_name=",
+        "df2=df2,\n        p=f_above(statistic, df1, df2 + 1),\n        effect_size_name=",
         _MODELS,
     ),
     Mutant("uncertainty=np.linalg.inv(second / 2)", "uncertainty=np.linalg.inv(second)", _INTERCEPTS),
@@ -190,7 +192,7 @@ MUTANTS = (
     Mutant("np.triu_indices(n)", "np.triu_indices(n, 1)", _TESTS),
     Mutant("(n * squares - k * expected**2)", "(n * n * (k**3 - k) / 12)", _FRIEDMAN),
     Mutant("statistic = n * (k - 1) * agreement", "statistic = n * k * agreement", _TESTS),
-    Mutant("stats.f.sf(f, k - 1, (k - 1) * (n - 1))", "stats.f.sf(f, k - 1, k * (n - 1))", _TESTS),
+    Mutant("f_above(f, k - 1, (k - 1) * (n - 1))", "f_above(f, k - 1, k * (n - 1))", _TESTS),
     Mutant("n * whole - (n - 1) * without", "n * whole - n * without", _TESTS),
     Mutant("/ 2) / np.sqrt(np.sum(ranks**2) / 4)", "/ 2) / np.sqrt(np.sum(ranks**2) / 2)", _TESTS),
     # Friedman's exact p.
