@@ -139,12 +139,11 @@ def examiners() -> Iterator[Executor]:
 
 @contextmanager
 def nothing_to_search() -> Iterator[None]:
-    """What is in memory by now is no garbage. Searched for it, as happens now and then, the loop stops for 70 ms.
+    """Hardly anything in memory is garbage by now. Searched for it, as happens now and then, the loop stops for 70 ms.
 
     That is long enough for a port under a flood to overflow. What is made from here on is searched as always. What the
     caller has taken out of the search already stays out of it: it cannot be told from what is taken out here.
     """
-    gc.collect()
     had_its_own = gc.get_freeze_count() > 0
     gc.freeze()
     try:
