@@ -14,7 +14,7 @@ from pipeline.engine.stage import Work
 from pipeline.errors import PipelineError
 from pipeline.sessions import movements
 from pipeline.sessions.target_widths import widths_mm
-from pipeline.sessions.trials import selections_by_trial
+from pipeline.sessions.trials import moved, selections_by_trial
 from pipeline.statistics.arrays import FloatArray
 from pipeline.study import given_tables
 from pipeline.study.settings import Study
@@ -104,7 +104,7 @@ def all_movements(work: Work, table: pd.DataFrame | None) -> pd.DataFrame:
     for begin, end in pairwise(edges):
         own = {name: column[order[begin:end]] for name, column in given.items()}
         places[begin:end] = _places(own)
-        for name, column in _moved(work.study, own).items():
+        for name, column in _movement_figures(work.study, own).items():
             figures[name][begin:end] = column
     who = table[[*CELL, "session", "trial"]].iloc[order]
     from_trials = who.assign(session=who["session"].replace("", None), order=places, **figures)
@@ -112,22 +112,16 @@ def all_movements(work: Work, table: pd.DataFrame | None) -> pd.DataFrame:
     return tables.as_table("movements", from_trials).assign(factors=factors)
 
 
-def _moved(study: Study, trials: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+def _movement_figures(study: Study, trials: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """The figures of the movements of one session of trials.csv.
 
     A trial ends with its selection, which is the only one that a table has.
     """
-    duration_s = trials["selection_s"] - trials["start_s"]
-    pause_s = trials["start_s"] - movements.previous(trials["selection_s"])
-    target, selected = (
-        np.column_stack([trials[f"{what}_{axis}_mm"] for axis in "xyz"]) for what in ("target", "selected")
-    )
+    left = {f"left_{axis}_mm": trials[f"selected_{axis}_mm"] for axis in "xyz"}
+    target = np.column_stack([trials[f"target_{axis}_mm"] for axis in "xyz"])
     stated, known = trials["target_width_mm"], widths_mm(study.task, target)
-    return {
-        "duration_s": np.where(duration_s >= 0, duration_s, np.nan),
-        "width_mm": np.where(np.isnan(stated), known, stated),
-        **vars(movements.aimed(target, selected, selected, pause_s)),
-    }
+    figures = moved({**trials, **left, "left_s": trials["selection_s"]})
+    return {**figures, "width_mm": np.where(np.isnan(stated), known, stated)}
 
 
 def _places(trials: Mapping[str, FloatArray]) -> np.ndarray:

@@ -150,7 +150,7 @@ def _above_zero(difference: FloatArray, time: FloatArray) -> bool:
     means = np.bincount(block, difference)[there] / count[there]
     if len(means) < _BLOCKS_MIN:
         return False
-    from scipy.special import stdtrit  # a tenth of what a process imports that computes sessions
+    from pipeline.statistics.tails import t_quantile  # a tenth of what a process imports that computes sessions
 
-    half = float(stdtrit(len(means) - 1, 0.975) * np.std(means, ddof=1) / np.sqrt(len(means)))
+    half = float(t_quantile(0.975, len(means) - 1) * np.std(means, ddof=1) / np.sqrt(len(means)))
     return float(np.mean(means)) - half > 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,10 @@ from pipeline.tables.columns import S_PER_NS
 from pipeline.tables.table import Row
 
 _EVENT_COLUMNS = ["trial", "start_s", "selection_s", "left_s"]
+_OF_A_MOVEMENT = (
+    *("start_s", "selection_s", "left_s"),
+    *(f"{what}_{axis}_mm" for what in ("target", "selected", "left") for axis in "xyz"),
+)
 
 
 def selections_by_trial(events: Sequence[Row]) -> tuple[list[Row], list[tuple[Row, int]]]:
@@ -62,13 +66,20 @@ def trial_table(events: Sequence[Row], origin_ns: int) -> pd.DataFrame:
 
 def with_movements(trials: pd.DataFrame) -> pd.DataFrame:
     """Trials of one session, in order, from `trial_table`, with duration_s and the columns of a movement added."""
-    duration_s = (trials["selection_s"] - trials["start_s"]).to_numpy(np.float64)
-    pause_s = trials["start_s"].to_numpy(np.float64) - movements.previous(trials["left_s"].to_numpy(np.float64))
-    target, selected, left = (coordinates(trials, what) for what in ("target", "selected", "left"))
-    return trials.assign(
-        duration_s=np.where(duration_s >= 0, duration_s, np.nan),
-        **vars(movements.aimed(target, selected, left, pause_s)),
+    return trials.assign(**moved({name: trials[name].to_numpy(np.float64) for name in _OF_A_MOVEMENT}))
+
+
+def moved(trials: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """duration_s and the columns of a movement (n,), of columns (n,) of the n trials of one session, in order."""
+    duration_s = trials["selection_s"] - trials["start_s"]
+    pause_s = trials["start_s"] - movements.previous(trials["left_s"])
+    target, selected, left = (
+        np.column_stack([trials[f"{what}_{axis}_mm"] for axis in "xyz"]) for what in ("target", "selected", "left")
     )
+    return {
+        "duration_s": np.where(duration_s >= 0, duration_s, np.nan),
+        **vars(movements.aimed(target, selected, left, pause_s)),
+    }
 
 
 def coordinates(trials: pd.DataFrame, what: str, axes: str = "xyz") -> FloatArray:
